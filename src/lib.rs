@@ -134,7 +134,7 @@ pub mod erk {
 /// Many intervals at once: what [`Batch`] stands for.
 #[cfg(feature = "alloc")]
 pub mod batch {
-    pub use casados_core::batch::{Batched, Integrator, Slice};
+    pub use casados_core::batch::{Batched, Integrator, Single, Slice, Standard};
 }
 
 /// Steps of variable size: what [`Adaptive`] stands for, and the results of [`Piecewise`] and

@@ -45,7 +45,10 @@ const ARROWS: &[(&str, &str)] = &[
         "error shape statistics tableau memory options scalar function model linalg result quadrature integrator \
          erk irk",
     ),
-    ("batch", "error shape statistics tableau memory options scalar model linalg result finite irk"),
+    (
+        "batch",
+        "error shape statistics tableau memory options scalar model linalg result finite integrator erk irk",
+    ),
     ("testing", "error shape memory scalar model result integrator"),
     (
         "ocp",

@@ -18,17 +18,17 @@ use nalgebra::{SVector, Vector1, vector};
 #[test]
 fn chains() -> Test {
     for count in COUNTS {
-        check::<_, Gauss<2>, _, 2>(steps(1), &chain::<21>(count), ORDINARY)?;
-        check::<_, Gauss<4>, _, 4>(steps(4), &chain::<21>(count), ORDINARY)?;
+        check::<Irk<_, Gauss<2>, _>>(steps(1), &chain::<21>(count), ORDINARY)?;
+        check::<Irk<_, Gauss<4>, _>>(steps(4), &chain::<21>(count), ORDINARY)?;
     }
-    check::<_, Gauss<2>, _, 2>(steps(2), &chain::<33>(40), ORDINARY)
+    check::<Irk<_, Gauss<2>, _>>(steps(2), &chain::<33>(40), ORDINARY)
 }
 
 #[test]
 fn pendulums() -> Test {
     for count in COUNTS {
-        check::<_, Gauss<2>, _, 2>(steps(1), &pendulum::<f64>(count), ORDINARY)?;
-        check::<_, Gauss<4>, _, 4>(steps(4), &pendulum::<f64>(count), ORDINARY)?;
+        check::<Irk<_, Gauss<2>, _>>(steps(1), &pendulum::<f64>(count), ORDINARY)?;
+        check::<Irk<_, Gauss<4>, _>>(steps(4), &pendulum::<f64>(count), ORDINARY)?;
     }
     Ok(())
 }
@@ -61,10 +61,10 @@ fn kinematic_states() -> Test {
             h: vec![0.2],
             lambda: vec![vector![1.0, -0.5, 0.25, 2.0, -1.0, 0.75]],
         };
-        check::<_, Gauss<2>, _, 2>(steps(2), &horizon, ORDINARY)?;
-        check::<_, Gauss<3>, _, 3>(steps(1), &horizon, ORDINARY)?;
-        check::<_, Gauss<4>, _, 4>(steps(3), &horizon, ORDINARY)?;
-        check::<_, RadauIIA<3>, _, 3>(steps(2), &horizon, ORDINARY)?;
+        check::<Irk<_, Gauss<2>, _>>(steps(2), &horizon, ORDINARY)?;
+        check::<Irk<_, Gauss<3>, _>>(steps(1), &horizon, ORDINARY)?;
+        check::<Irk<_, Gauss<4>, _>>(steps(3), &horizon, ORDINARY)?;
+        check::<Irk<_, RadauIIA<3>, _>>(steps(2), &horizon, ORDINARY)?;
     }
     Ok(())
 }
@@ -86,7 +86,7 @@ fn driven(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, t: f64) -> [f64; 3] {
 #[test]
 fn jacobian_in_the_middle() -> Test {
     fn same<B: Method<S>, const S: usize>(options: Options) -> Test {
-        let mut batch = batch::Integrator::<Driven, B, S, f64>::new(options)?;
+        let mut batch = batch::Integrator::<irk::Integrator<Driven, B, S, f64, Heap>>::new(options)?;
         let mut single = irk::Integrator::<Driven, B, S, f64, Heap>::new(options)?;
         single.set_time(0.7)?;
         let (x0, u) = ([vector![1.5, -1.0]; 8], [Vector1::new(0.5)]);
@@ -158,7 +158,7 @@ fn beyond_coarse_numbers() -> Test {
 #[test]
 fn in_single_precision() -> Test {
     for count in COUNTS {
-        check::<_, Gauss<2>, _, 2>(steps(2), &pendulum::<f32>(count), ORDINARY)?;
+        check::<Irk<_, Gauss<2>, _>>(steps(2), &pendulum::<f32>(count), ORDINARY)?;
     }
     Ok(())
 }
@@ -166,7 +166,7 @@ fn in_single_precision() -> Test {
 #[test]
 fn aircraft_on_its_orbit() -> Test {
     for count in COUNTS {
-        check::<_, RadauIIA<4>, _, 4>(steps(1), &aircraft(count)?, AIRCRAFT)?;
+        check::<Irk<_, RadauIIA<4>, _>>(steps(1), &aircraft(count)?, AIRCRAFT)?;
     }
     Ok(())
 }
@@ -180,7 +180,7 @@ fn options_of_newton() -> Test {
         Newton { fixed_iterations: Some(8), ..newton },
     ] {
         let options = Options { steps: 2, newton, ..Default::default() };
-        check::<_, Gauss<2>, _, 2>(options, &chain::<21>(7), ORDINARY)?;
+        check::<Irk<_, Gauss<2>, _>>(options, &chain::<21>(7), ORDINARY)?;
     }
     Ok(())
 }

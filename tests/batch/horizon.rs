@@ -5,11 +5,11 @@ use crate::models::awe::Awe;
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;
 use casados::__private::Matrix;
-use casados::Heap;
+use casados::batch::{Single, Standard};
 use casados::model::{VectorP, VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use casados::{Method, Real, batch, irk};
+use casados::{Real, batch};
 use nalgebra::{SVector, Vector1, vector};
 
 pub type Test = Result<(), Box<dyn std::error::Error>>;
@@ -98,13 +98,17 @@ macro_rules! pairs {
 pub(crate) use pairs;
 
 /// Every call of a batch against single calls.
-pub fn check<M: Dae, B: Method<S>, T: Real, const S: usize>(
-    options: Options,
-    horizon: &Horizon<M, T>,
+pub fn check<I: Standard>(options: Options, horizon: &Horizon<I::Model, I::Number>, bound: f64) -> Test {
+    check_with(batch::Integrator::<I>::new(options)?, I::of(&options, &I::TABLEAU)?, horizon, bound)
+}
+
+/// The same of a batch and an integrator that are there.
+pub fn check_with<I: Single>(
+    mut batch: batch::Integrator<I>,
+    mut single: I,
+    horizon: &Horizon<I::Model, I::Number>,
     bound: f64,
 ) -> Test {
-    let mut batch = batch::Integrator::<M, B, S, T>::new(options)?;
-    let mut irk = irk::Integrator::<M, B, S, T, Heap>::new(options)?;
     let count = horizon.x0.len();
     let mut nominal = vec![Nominal::default(); count];
     let mut forward = vec![Forward::default(); count];
@@ -129,9 +133,9 @@ pub fn check<M: Dae, B: Method<S>, T: Real, const S: usize>(
         let h = horizon.h[k % horizon.h.len()];
         let lambda = &horizon.lambda[k % horizon.lambda.len()];
         if let Some(p) = horizon.p.get(k) {
-            irk.set_parameters(p)?;
+            single.set_parameters(p)?;
         }
-        let expected = irk.hessian(x0, u, h, lambda)?;
+        let expected = single.hessian(x0, u, h, lambda)?;
         close("nominal", bound, pairs!(nominal[k], expected; x z z0));
         for result in [&forward[k], &both[k].forward, &hessian[k].first.forward] {
             let fields =

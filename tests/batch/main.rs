@@ -8,8 +8,10 @@ mod models {
     pub mod awe;
     pub mod chain;
     pub mod pendulum;
+    pub mod quadrotor;
 }
 
 mod agreement;
+mod explicit;
 mod failures;
 mod horizon;

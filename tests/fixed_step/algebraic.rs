@@ -114,7 +114,7 @@ const DIFFERENCE: f64 = 210.0 * ROUNDING;
 fn check<B: Method<S>, const S: usize>() -> Test {
     for steps in [1, 3] {
         let mut single = Integrator::<B, S>::new(options(steps))?;
-        let mut group = batch::Integrator::<Cart, B, S, f64>::new(options(steps))?;
+        let mut group = batch::Integrator::<Integrator<B, S>>::new(options(steps))?;
         for count in [1, 5, 40] {
             let starts: Vec<W> = (0..count).map(start).collect();
             let (x0, u): (Vec<_>, Vec<_>) = starts.iter().map(parts).unzip();

@@ -282,7 +282,7 @@ where
         assert!(iterations <= 2 * steps && dense == 0, "{iterations} iterations, {dense} pivoted");
     }
     // Registers, whose factors may have half of the digits.
-    let mut batch = casados::batch::Integrator::<M, B, S, f64>::new(options)?;
+    let mut batch = casados::batch::Integrator::<Integrator<M, B, S, f64, Heap>>::new(options)?;
     let mut found = vec![Default::default(); 8];
     let (x0, h) = (vec![x; 8], [LENGTH]);
     batch.solve(&Intervals { x0: &x0, u: &[u; 8], p: &[p; 8], h: &h, ..Default::default() }, &mut found)?;

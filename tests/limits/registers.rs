@@ -4,14 +4,11 @@
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;
 use casados::__private::Matrix;
-use casados::batch;
+use casados::batch::{self, Single};
+use casados::model::{VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
 use casados::testing::{Level, limit};
-use casados::{
-    Heap, irk,
-    model::{VectorU, VectorX},
-};
 use nalgebra::{SVector, Vector1, vector};
 
 type Test = Result<(), Box<dyn std::error::Error>>;
@@ -20,7 +17,7 @@ type Test = Result<(), Box<dyn std::error::Error>>;
 const COUNT: usize = 13;
 
 /// Conditions of the Newton matrices are of order ten, and four steps add up (as in
-/// `tests/batch`).
+/// `tests/batch`). One step of an explicit method of four stages is 120 apart at most (there, too).
 const TOLERANCE: f64 = 2.0 * 100.0 * f64::EPSILON;
 
 struct Horizon<M: Dae> {
@@ -54,18 +51,18 @@ fn flatten<M: Dae>(
     .to_vec()
 }
 
-fn results<M: Dae, B: Send + Sync, const S: usize>(
-    horizon: &Horizon<M>,
-    irk: &mut irk::Integrator<M, B, S, f64, Heap>,
-    batch: &mut batch::Integrator<M, B, S, f64>,
+fn results<I: Single<Number = f64>>(
+    horizon: &Horizon<I::Model>,
+    single: &mut I,
+    batch: &mut batch::Integrator<I>,
 ) -> Result<Vec<Vec<f64>>, Box<dyn std::error::Error>> {
     let Horizon { x0, u, h, lambda } = horizon;
     let mut all = Vec::new();
     for ((x0, u), lambda) in x0.iter().zip(u).zip(lambda) {
-        let nominal = *irk.solve(x0, u, *h)?;
-        let forward = *irk.forward(x0, u, *h)?;
-        let adjoint = *irk.adjoint(x0, u, *h, lambda)?;
-        all.extend(flatten(&nominal, &forward, &adjoint, irk.hessian(x0, u, *h, lambda)?));
+        let nominal = *single.solve(x0, u, *h)?;
+        let forward = *single.forward(x0, u, *h)?;
+        let adjoint = *single.adjoint(x0, u, *h, lambda)?;
+        all.extend(flatten(&nominal, &forward, &adjoint, single.hessian(x0, u, *h, lambda)?));
     }
     let intervals = Intervals { x0, u, h: &[*h], ..Default::default() };
     let mut nominal = vec![Nominal::default(); COUNT];
@@ -82,20 +79,17 @@ fn results<M: Dae, B: Send + Sync, const S: usize>(
     Ok(all)
 }
 
-fn check<M: Dae, B: Send + Sync, const S: usize>(
-    horizon: &Horizon<M>,
-    mut build: impl FnMut() -> Result<
-        (irk::Integrator<M, B, S, f64, Heap>, batch::Integrator<M, B, S, f64>),
-        casados::Error,
-    >,
+fn check<I: Single<Number = f64>>(
+    horizon: &Horizon<I::Model>,
+    mut build: impl FnMut() -> Result<(I, batch::Integrator<I>), Error>,
 ) -> Test {
     limit(Level::Single);
-    let (mut irk, mut batch) = build()?;
-    let expected = results(horizon, &mut irk, &mut batch)?;
+    let (mut single, mut batch) = build()?;
+    let expected = results(horizon, &mut single, &mut batch)?;
     for level in [Level::Base, Level::Avx2, Level::Avx512] {
         limit(level);
-        let (mut irk, mut batch) = build()?;
-        let found = results(horizon, &mut irk, &mut batch)?;
+        let (mut single, mut batch) = build()?;
+        let found = results(horizon, &mut single, &mut batch)?;
         for (place, (found, expected)) in found.iter().zip(&expected).enumerate() {
             let size = expected.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
             for (found, expected) in found.iter().zip(expected) {
@@ -122,12 +116,14 @@ fn every_kind_of_registers_gives_the_same() -> Test {
         lambda: vec![vector![1.0, -0.5, 0.25, 2.0]; COUNT],
     };
     let options = Options { steps: 2, ..Default::default() };
+    let one = Options::default();
     check(&pendulum, || {
         Ok((Irk::<Pendulum, Gauss<2>>::new(options)?, Batch::<Pendulum, Gauss<2>>::new(options)?))
     })?;
     check(&pendulum, || {
         Ok((Irk::<Pendulum, RadauIIA<3>>::new(options)?, Batch::<Pendulum, RadauIIA<3>>::new(options)?))
     })?;
+    check(&pendulum, || Ok((Erk::<Pendulum, Rk4>::new(one)?, Batch::<Pendulum, Rk4>::new(one)?)))?;
     let wave = |k: usize| SVector::<f64, 9>::from_fn(|i, _| 0.01 * ((k * (i + 3)) as f64).sin());
     let chain = Horizon::<Chain<9>> {
         x0: (0..COUNT).map(|k| stretched::<9>() + wave(k + 1)).collect(),
@@ -138,6 +134,7 @@ fn every_kind_of_registers_gives_the_same() -> Test {
     check(&chain, || {
         Ok((Irk::<Chain<9>, Gauss<4>>::new(options)?, Batch::<Chain<9>, Gauss<4>>::new(options)?))
     })?;
+    check(&chain, || Ok((Erk::<Chain<9>, Rk4>::new(one)?, Batch::<Chain<9>, Rk4>::new(one)?)))?;
     check(&chain, || {
         Ok((Irk::<Chain<9>, Gauss<6>>::new(options)?, Batch::<Chain<9>, Gauss<6>>::new(options)?))
     })

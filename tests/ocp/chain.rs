@@ -56,6 +56,48 @@ solves!(seven_masses, "ocp/chain_7.json", 33, 2 x 2, "objective_gl2x2", 7);
 solves!(three_masses_order_eight, "ocp/chain_3.json", 9, 4 x 4, "objective_gl4x4", 6);
 solves!(seven_masses_order_eight, "ocp/chain_7.json", 33, 4 x 4, "objective_gl4x4", 7);
 
+/// With an explicit method all intervals at once lead where one after the other do: functions
+/// differ by rounding, and both solutions have residuals of `1e-10`. Multiplied by the inverse of
+/// the Hessian, which is 0.004 for controls (`R Ts/2` twice) and 0.4 and more for states, that is
+/// 2.5e-8 and 2.5e-10; twice, as each has its own.
+#[test]
+fn explicit_methods_side_by_side() -> Test {
+    let record = Record::load("ocp/chain_3.json")?;
+    let options = Options { steps: 4, ..Default::default() };
+    macro_rules! solution {
+        ($dynamics:expr, $of:ident $(($argument:expr))?) => {{
+            let mut ocp = problem!(9, &record, $dynamics);
+            let mut sqp = HeapSqp::new(&ocp)?.$of($($argument)?);
+            (sqp.options.tolerance, sqp.qp_solver.options.tolerance) = (1e-10, 1e-11);
+            let outcome = sqp.solve(&mut ocp)?;
+            assert!(outcome.is_converged(), "{outcome}");
+            let stages: Vec<_> = ocp.iterate().stages().map(|s| (s.x.to_vec(), s.u.to_vec())).collect();
+            (outcome.iterations, stages)
+        }};
+    }
+    macro_rules! same {
+        ($of:ident $(($argument:expr))?) => {{
+            let together = Shooting::new(Batch::<Chain<9>, Rk4>::new(options)?);
+            let (many, found) = solution!(together, $of $(($argument))?);
+            let (one, expected) = solution!(Erk::<Chain<9>, Rk4>::new(options)?, $of $(($argument))?);
+            // One more where the last residual is just above the tolerance.
+            assert!(usize::abs_diff(many, one) <= 1, "{many} {one}");
+            for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                for (a, b) in found.0.iter().zip(&expected.0) {
+                    assert!((a - b).abs() < 5e-10, "stage {k}: {a} {b}");
+                }
+                for (a, b) in found.1.iter().zip(&expected.1) {
+                    assert!((a - b).abs() < 5e-8, "stage {k}: {a} {b}");
+                }
+            }
+        }};
+    }
+    same!(gauss_newton);
+    same!(exact(Exact { convexification: Convexification::Project }));
+    same!(keep_jacobians);
+    Ok(())
+}
+
 /// A solver of QPs whose own tolerances are relative, and larger than what is asked for: it is told
 /// what is needed.
 #[test]

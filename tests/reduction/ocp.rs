@@ -98,11 +98,11 @@ fn options() -> Options {
     Options { steps: 4, ..Default::default() }
 }
 
-fn by_rope() -> Shooting<Crane, Gauss<4>, 4, f64> {
+fn by_rope() -> Shooting<Irk<Crane, Gauss<4>>> {
     Shooting::new(Batch::<Crane, Gauss<4>>::new(options()).unwrap())
 }
 
-fn without_rope() -> Shooting<ByAngle, Gauss<4>, 4, f64> {
+fn without_rope() -> Shooting<Irk<ByAngle, Gauss<4>>> {
     Shooting::new(Batch::<ByAngle, Gauss<4>>::new(options()).unwrap())
 }
 

@@ -3,23 +3,23 @@
 use super::Together;
 use super::results::{Results, of_adjoint, of_forward, of_hessian, of_nominal, places, vector};
 use crate::case::{Case, Mode, Values};
+use casados::batch::Single;
 use casados::model::{VectorU, VectorX};
-use casados::prelude::*;
 use casados::{BatchError, Intervals, batch};
 use std::hint::black_box;
 
 /// A batch with its intervals and its results in place.
-pub(super) struct Side<M: Dae, B, const S: usize> {
-    batch: batch::Integrator<M, B, S, f64>,
-    x0: Vec<VectorX<M, f64>>,
-    u: Vec<VectorU<M, f64>>,
-    lambda: Vec<VectorX<M, f64>>,
+pub(super) struct Side<I: Single<Number = f64>> {
+    batch: batch::Integrator<I>,
+    x0: Vec<VectorX<I::Model, f64>>,
+    u: Vec<VectorU<I::Model, f64>>,
+    lambda: Vec<VectorX<I::Model, f64>>,
     h: f64,
-    results: Results<M>,
+    results: Results<I::Model>,
 }
 
-impl<M: Dae, B, const S: usize> Side<M, B, S> {
-    pub(super) fn new(case: &Case, batch: batch::Integrator<M, B, S, f64>) -> Self {
+impl<I: Single<Number = f64>> Side<I> {
+    pub(super) fn new(case: &Case, batch: batch::Integrator<I>) -> Self {
         Self {
             batch,
             x0: case.inputs.iter().map(|(x0, _)| vector(x0)).collect(),
@@ -31,7 +31,7 @@ impl<M: Dae, B, const S: usize> Side<M, B, S> {
     }
 }
 
-impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
+impl<I: Single<Number = f64>> Together for Side<I> {
     fn call(&mut self, mode: Mode) -> Result<(), BatchError> {
         let Self { batch, x0, u, lambda, h, results } = self;
         let count = x0.len();

@@ -88,7 +88,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
         slope: &mut ArrayX<M, T>,
     ) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        let numbers = point.v.as_mut();
+        let numbers = point.variables_mut();
         numbers[nx..2 * nx].copy_from_slice(x);
         if let Some(time) = numbers.last_mut() {
             *time = t;
@@ -140,9 +140,9 @@ fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
     fn go(&mut self, inputs: &[T], x: &[T]) {
         let Memory { point, record, .. } = &mut *self.memory;
-        point.v.as_mut().copy_from_slice(inputs);
+        point.variables_mut().copy_from_slice(inputs);
         // An explicit model is evaluated at `ẋ = 0`.
-        point.v.as_mut()[..M::Shape::NX].fill(T::ZERO);
+        point.variables_mut()[..M::Shape::NX].fill(T::ZERO);
         record.x.as_mut().copy_from_slice(x);
     }
 
@@ -157,10 +157,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         let grid = Grid { start: t, h, steps: 1, compensated: false };
         for stage in 1..S {
             let at = Place { step: 0, stage, iteration: 0 };
-            point.go(&self.scheme, grid, record, at)?;
+            point.go(&self.scheme, &grid, record, at)?;
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
         }
-        record.end(&self.scheme, grid, 0, end, None)
+        record.end(&self.scheme, &grid, 0, end, None, &mut point.doubt)
     }
 
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {

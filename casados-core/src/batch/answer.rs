@@ -1,12 +1,10 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
-use super::group::Group;
 use super::intervals::{Interval, vector};
 use super::lanes::{MOST_LANES, Verdict, unpack, yes};
+use super::single::{Group, Single};
 use crate::error::Error;
-use crate::irk::{Arguments, Integrator};
-use crate::memory::Heap;
-use crate::model::{ArrayK, Dae};
+use crate::model::Dae;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
@@ -78,69 +76,52 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
 pub trait Answer<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
     type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
-
-    /// Bytes of the factors, where Newton's method takes those of the `shared` Jacobian or not, and
-    /// of their right-hand sides.
-    fn working_set<E: Lanes, const S: usize>(shared: bool) -> usize;
+    /// How many columns of derivatives are computed for it.
+    const COLUMNS: usize;
 
     /// For several intervals at once.
-    fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
-        group: &mut Group<M, E, S>,
-        warm: bool,
+    fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+        group: &mut I::Group<E>,
     ) -> Verdict<'_, E, Self::Wide<E>>;
 
     /// For one interval, where it belongs: results that are large are written once.
-    fn alone<B, const S: usize>(
+    fn alone<I: Single<Model = M, Number = T>>(
         &mut self,
-        irk: &mut Integrator<M, B, S, T, Heap>,
+        single: &mut I,
         interval: &Interval<'_, M, T>,
     ) -> Result<(), Error>;
 }
 
 macro_rules! answer {
-    ($type:ident, $together:ident, $columns:expr, |$to:ident, $irk:ident, $at:ident, $of:ident| $alone:expr) => {
+    ($type:ident, $together:ident, $columns:expr, |$single:ident, $at:ident, $to:ident| $alone:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
+            const COLUMNS: usize = $columns;
 
-            fn working_set<E: Lanes, const S: usize>(shared: bool) -> usize {
-                // Derivatives take the factors of each stage in any case.
-                let factors = if shared && const { $columns == 0 } {
-                    size_of::<M::Factors<[E::Coarse; S]>>()
-                } else {
-                    size_of::<M::Factors<[[E; S]; S]>>()
-                };
-                factors + size_of::<ArrayK<M, [E; S]>>() * ($columns).max(1)
-            }
-            fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
-                group: &mut Group<M, E, S>,
-                warm: bool,
+            fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+                group: &mut I::Group<E>,
             ) -> Verdict<'_, E, Self::Wide<E>> {
-                group.$together(warm)
+                group.$together()
             }
-            fn alone<B, const S: usize>(
+            fn alone<I: Single<Model = M, Number = T>>(
                 &mut self,
-                $irk: &mut Integrator<M, B, S, T, Heap>,
+                $single: &mut I,
                 $at: &Interval<'_, M, T>,
             ) -> Result<(), Error> {
-                let ($to, u) = (self, &vector($at.u));
-                let $of: &Arguments<'_, M, T> = &Arguments { x0: $at.x0, u, h: $at.h };
+                let $to = self;
                 $alone
             }
         }
     };
 }
-answer!(Nominal, solve, 0, |to, irk, _at, of| {
-    assign(to, irk.solve(of.x0, of.u, of.h)?);
+answer!(Nominal, solve, 0, |single, at, to| {
+    assign(to, single.solve_along(at.x0, &vector(at.u), at.h, None)?);
     Ok(())
 });
-answer!(Forward, forward, M::Shape::NW, |to, irk, _at, of| irk.forward_to(of, to));
-answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |to, irk, at, of| {
-    irk.forward_adjoint_to(of, at.lambda, to)
-});
-answer!(Adjoint, adjoint, 1, |to, irk, at, of| {
-    assign(to, irk.adjoint(of.x0, of.u, of.h, &vector(at.lambda))?);
+answer!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
+answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single.forward_adjoint_to(at, to));
+answer!(Adjoint, adjoint, 1, |single, at, to| {
+    assign(to, single.adjoint_along(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
     Ok(())
 });
-answer!(Hessian, hessian, M::Shape::NW, |to, irk, at, of| {
-    irk.hessian_to(of, at.lambda, at.nu, None, Some(to))
-});
+answer!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));

@@ -3,24 +3,27 @@
 use super::answer::Answer;
 use super::error::BatchError;
 use super::intervals::{Inputs, Intervals};
+use super::single::{Single, Standard};
 use super::statistics::BatchStatistics;
 #[cfg(feature = "parallel")]
 use super::work::parallel;
 use super::work::{Share, Work, Worker, fill, width};
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
-use crate::irk;
-use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, VectorX, VectorZ};
+use crate::integrator::Integrator as Alone;
+use crate::model::{Dae, VectorX, VectorZ};
 use crate::options::{Newton, Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use crate::scalar::Real;
 use crate::shape::Matrix;
-use crate::tableau::{Custom, Method, Tableau};
+use crate::tableau::{Custom, Tableau};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// Integrates many intervals of one model with `S` stages of the method `B`; see
+/// Start values `ẋ` and `z`.
+type Given<I> =
+    (VectorX<<I as Alone>::Model, <I as Alone>::Number>, VectorZ<<I as Alone>::Model, <I as Alone>::Number>);
+
+/// Integrates many intervals of one model, as the integrator `I` does one; see
 /// [`Batch`](super::Batch).
 ///
 /// Every call writes one result for each interval into the caller's slice. An interval that fails
@@ -30,17 +33,17 @@ use bytemuck::Zeroable;
 /// # Errors
 /// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
 /// [`BatchError::Intervals`] if intervals failed.
-pub struct Integrator<M: Dae, B, const S: usize, T: Real> {
+pub struct Integrator<I: Single> {
     options: Options,
-    tableau: Tableau<S>,
+    tableau: I::Tableau,
     /// One for each thread.
-    workers: Vec<Worker<M, B, S, T>>,
+    workers: Vec<Worker<I>>,
     #[cfg(feature = "parallel")]
     threads: usize,
-    given: Option<(VectorX<M, T>, VectorZ<M, T>)>,
+    given: Option<Given<I>>,
     status: Vec<Result<(), Error>>,
     /// The stages of every step of every interval, and whether there are any.
-    records: Vec<ArrayK<M, [T; S]>>,
+    stages: Vec<I::Stages>,
     warm: Vec<bool>,
     /// Whether stages are remembered without a warm start, too; and whether those are solutions.
     keeps: bool,
@@ -48,37 +51,37 @@ pub struct Integrator<M: Dae, B, const S: usize, T: Real> {
     statistics: BatchStatistics,
 }
 
-impl<M: Dae, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T> {
+impl<I: Standard> Integrator<I> {
     /// A batch of any number of intervals.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]
     pub fn new(options: Options) -> Result<Self, Error> {
-        Self::build(options, B::TABLEAU)
+        Self::build(options, I::TABLEAU)
     }
 }
 
-impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T> {
+impl<I: Single<Method = Custom<S>, Tableau = Tableau<S>>, const S: usize> Integrator<I> {
     /// A batch for a tableau of the user's own.
     ///
     /// # Errors
     /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
-    /// two nodes are equal.
+    /// two nodes are equal; [`Error::NotExplicit`] of an implicit tableau for explicit methods.
     pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Self::build(options, tableau)
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Integrator<M, B, S, T> {
+impl<I: Single> core::fmt::Debug for Integrator<I> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let model = M::STRUCTURE.name;
+        let model = I::Model::STRUCTURE.name;
         f.debug_struct("Batch").field("model", &model).field("options", &self.options).finish_non_exhaustive()
     }
 }
 
 /// A batch with the same options and start values: its memory is its own, and empty until the first
 /// call.
-impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T> {
+impl<I: Single> Clone for Integrator<I> {
     fn clone(&self) -> Self {
         Self {
             options: self.options,
@@ -88,7 +91,7 @@ impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T> {
             threads: self.threads,
             given: self.given,
             status: Vec::new(),
-            records: Vec::new(),
+            stages: Vec::new(),
             warm: Vec::new(),
             keeps: false,
             solved: false,
@@ -97,11 +100,11 @@ impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T> {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
-    fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+impl<I: Single> Integrator<I> {
+    fn build(options: Options, tableau: I::Tableau) -> Result<Self, Error> {
         let mut workers = Vec::new();
-        workers.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of::<Worker<M, B, S, T>>() })?;
-        workers.push(Worker::new(options, tableau)?);
+        workers.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of::<Worker<I>>() })?;
+        workers.push(Worker::new(&options, &tableau)?);
         Ok(Self {
             options,
             tableau,
@@ -110,7 +113,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             threads: rayon::current_num_threads(),
             given: None,
             status: Vec::new(),
-            records: Vec::new(),
+            stages: Vec::new(),
             warm: Vec::new(),
             keeps: false,
             solved: false,
@@ -119,14 +122,18 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     }
 
     /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the
-    /// nominal values of the model: with [`Start::Zero`] they are not read, and with
-    /// [`Start::Warm`] only where there is no warm start.
+    /// nominal values of the model. Explicit methods do not read them; with [`Start::Zero`] nobody
+    /// does, and with [`Start::Warm`] only where there is no warm start.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
-    pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
-        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
+    pub fn set_start(
+        &mut self,
+        xdot: &VectorX<I::Model, I::Number>,
+        z: &VectorZ<I::Model, I::Number>,
+    ) -> Result<(), Error> {
+        check_named::<I::Model, I::Number>(Argument::StartXdot, xdot.as_slice())?;
+        check_named::<I::Model, I::Number>(Argument::StartZ, z.as_slice())?;
         self.given = Some((*xdot, *z));
         Ok(())
     }
@@ -177,8 +184,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// See [`Integrator`].
     pub fn solve(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        results: &mut [Nominal<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        results: &mut [Nominal<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, None, None, results.len())?, results)
     }
@@ -189,8 +196,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// See [`Integrator`].
     pub fn forward(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        results: &mut [Forward<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        results: &mut [Forward<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, None, None, results.len())?, results)
     }
@@ -202,9 +209,9 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// See [`Integrator`].
     pub fn adjoint(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        lambda: &[VectorX<M, T>],
-        results: &mut [Adjoint<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        lambda: &[VectorX<I::Model, I::Number>],
+        results: &mut [Adjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
@@ -215,9 +222,9 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// See [`Integrator`].
     pub fn forward_adjoint(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        lambda: &[VectorX<M, T>],
-        results: &mut [ForwardAdjoint<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        lambda: &[VectorX<I::Model, I::Number>],
+        results: &mut [ForwardAdjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
@@ -228,9 +235,9 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// See [`Integrator`].
     pub fn hessian(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        lambda: &[VectorX<M, T>],
-        results: &mut [Hessian<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        lambda: &[VectorX<I::Model, I::Number>],
+        results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
@@ -252,10 +259,10 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// ```
     pub fn hessian_with_z0(
         &mut self,
-        intervals: &Intervals<'_, M, T>,
-        lambda: &[VectorX<M, T>],
-        nu: &[VectorZ<M, T>],
-        results: &mut [Hessian<M, T>],
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        lambda: &[VectorX<I::Model, I::Number>],
+        nu: &[VectorZ<I::Model, I::Number>],
+        results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results)
     }
@@ -265,11 +272,11 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(crate) fn single(&self) -> Result<irk::Integrator<M, B, S, T, Heap>, Error> {
+    pub(crate) fn single(&self) -> Result<I, Error> {
         let newton = Newton { fixed_iterations: None, ..self.options.newton };
-        let mut single = irk::Integrator::build(Options { newton, ..self.options }, self.tableau)?;
+        let mut single = I::of(&Options { newton, ..self.options }, &self.tableau)?;
         if let Some((xdot, z)) = &self.given {
-            single.set_start(xdot, z)?;
+            single.give([xdot.as_slice(), z.as_slice()])?;
         }
         Ok(single)
     }
@@ -278,47 +285,38 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(crate) fn start(
-        &self,
-        interval: usize,
-        single: &mut irk::Integrator<M, B, S, T, Heap>,
-    ) -> Result<(), Error> {
-        let record = self.records.chunks_exact(self.options.steps).nth(interval);
-        match (record, self.warm.get(interval), self.options.start) {
-            (Some(record), Some(true), Start::Warm) => single.set_record(record),
-            _ => {
-                single.reset();
-                Ok(())
-            }
-        }
+    pub(crate) fn start(&self, interval: usize, single: &mut I) -> Result<(), Error> {
+        let stages = self.stages.chunks_exact(self.options.steps).nth(interval);
+        let warm = self.warm.get(interval) == Some(&true) && self.options.start == Start::Warm;
+        single.start(stages.filter(|_| warm), false)
     }
 
-    fn run<R: Answer<M, T>>(
+    fn run<R: Answer<I::Model, I::Number>>(
         &mut self,
-        inputs: &Inputs<'_, M, T>,
+        inputs: &Inputs<'_, I::Model, I::Number>,
         results: &mut [R],
     ) -> Result<(), BatchError> {
         let (count, steps) = (results.len(), self.options.steps);
         self.status.clear();
         fill(&mut self.status, count, Ok(()))?;
-        if self.options.start == Start::Warm || self.keeps {
+        if I::ITERATES && (self.options.start == Start::Warm || self.keeps) {
             fill(&mut self.warm, count, false)?;
-            fill(&mut self.records, count.saturating_mul(steps), Zeroable::zeroed())?;
+            fill(&mut self.stages, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
-        let missing = self.options.start == Start::Given && self.given.is_none();
-        let lanes = if missing { 1 } else { width::<M, T, R, S>(&self.options.newton) };
+        let missing = I::ITERATES && self.options.start == Start::Given && self.given.is_none();
+        let lanes = if missing { 1 } else { width::<I, R>(&self.options) };
         // Stages of models that are too large to be differentiated side by side may still be found
         // so.
-        let simulated =
-            if missing || lanes > 1 { 1 } else { width::<M, T, Nominal<M, T>, S>(&self.options.newton) };
-        let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
+        let apart = I::ITERATES && !missing && lanes == 1;
+        let simulated = if apart { width::<I, Nominal<I::Model, I::Number>>(&self.options) } else { 1 };
         let (options, tableau) = (&self.options, &self.tableau);
+        let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
         let work = Work { inputs, options, tableau, given, lanes, simulated, solved: self.solved };
         let share = Share {
             first: 0,
             results,
             status: &mut self.status,
-            records: &mut self.records,
+            stages: &mut self.stages,
             warm: &mut self.warm,
         };
         #[cfg(feature = "parallel")]

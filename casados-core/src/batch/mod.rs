@@ -2,24 +2,28 @@
 //!
 //! Intervals `(x₀, u, p, λ)` of a horizon do not depend on each other. So each of them gets a lane
 //! of the widest registers that the machine has, and all lanes go through the same engine as a
-//! single call: the model, Newton's method, elimination, derivatives. Results are written into the
-//! caller's slice.
+//! single call: the model, stages, elimination, derivatives. Results are written into the caller's
+//! slice.
 //!
 //! Every lane is judged by itself. An interval whose iteration did not converge in its group, whose
-//! derivatives do not satisfy their equations, or whose result is not finite, is computed again
-//! alone, with all that a single call can do: the whole matrix pivoted, and an error that says what
-//! is wrong. Within a group the Jacobian is renewed as the slowest lane needs it: so neighbours
-//! change a result by rounding errors.
+//! derivatives do not satisfy their equations, or which met a value that is not finite, is computed
+//! again alone, with all that a single call can do: the whole matrix pivoted, and an error that
+//! says what is wrong. Within a group of an implicit method the Jacobian is renewed as the slowest
+//! lane needs it: so neighbours change a result by rounding errors. Of an explicit method they
+//! change nothing.
 //!
-//! One file for each thing: `intervals` what is given, `answer` what is asked, `group` intervals
-//! side by side in `lanes`, `work` who computes what, `integrator` what users see.
+//! One file for each thing: `intervals` what is given, `answer` what is asked, `single` what
+//! integrates an interval alone or several in `lanes`, `implicit` and `explicit` the methods that
+//! do, `work` who computes what, `integrator` what users see.
 
 mod answer;
 mod error;
-mod group;
+mod explicit;
+mod implicit;
 mod integrator;
 mod intervals;
 mod lanes;
+mod single;
 mod statistics;
 mod work;
 
@@ -28,25 +32,34 @@ pub use integrator::Integrator;
 pub use intervals::Intervals;
 #[cfg(feature = "casadi")]
 pub(crate) use intervals::vector;
+pub use single::{Single, Standard};
 pub use statistics::BatchStatistics;
 
-use crate::model::Dae;
+use crate::erk::Erk;
+use crate::irk::Irk;
+use crate::model::{Dae, Ode};
 use crate::scalar::Real;
-use crate::tableau::{Custom, Gauss, Method, RadauIIA};
+use crate::tableau::{
+    Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
+};
 
-/// The implicit integrator of many intervals, of the method `B` for the model `M`, with numbers
-/// `T`: `Batch<Model, Gauss<4>>`.
+/// The integrator of many intervals, of the method `B` for the model `M`, with numbers `T`:
+/// `Batch<Model, Gauss<4>>`, or `Batch<Model, Rk4>` of an explicit model.
 ///
 /// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, which [`Intervals`] lists; each is
-/// integrated as [`Irk`](crate::Irk) does, side by side in registers and, with the feature
-/// `parallel`, over threads. Results are written into the caller's slice, an element for each.
+/// integrated as [`Irk`](crate::Irk) does, or [`Erk`](crate::Erk) of an explicit method, side by
+/// side in registers and, with the feature `parallel`, over threads. Results are written into the
+/// caller's slice, an element for each.
+///
+/// `Batch<Model, Custom<S>>` takes implicit tableaux of one's own, and explicit ones as if they
+/// were implicit; `batch::Integrator<Erk<Model, Custom<S>>>` takes explicit ones as they are.
 ///
 /// It is an [`Integrator`], whose page has all that it can do:
 ///
 /// | | |
 /// | --- | --- |
 /// | [`new`](Integrator::new), [`with_tableau`](Integrator::with_tableau) | memory on the heap, for any number of intervals |
-/// | [`set_start`](Integrator::set_start) | start values of `ẋ` and `z` |
+/// | [`set_start`](Integrator::set_start) | start values of `ẋ` and `z`, which explicit methods do not read |
 /// | [`solve`](Integrator::solve) | `x₊`, and `z` at both ends |
 /// | [`forward`](Integrator::forward) | and derivatives by `(x₀, u, p)` |
 /// | [`adjoint`](Integrator::adjoint), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients of `λᵀx₊`, alone or with derivatives |
@@ -89,32 +102,66 @@ use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 /// assert!(matches!(batch.status(1), Err(Error::NonFiniteInput { .. })));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub type Batch<M, B, T = f64> = <B as Batched>::Integrator<M, T>;
+pub type Batch<M, B, T = f64> = Integrator<<B as Batched<M, T>>::Single>;
 
-/// A method that a batch takes.
+/// A method that a batch of the model `M` takes, with numbers `T`: implicit ones for every model,
+/// explicit ones for explicit models.
+///
+/// ```
+/// use casados::batch::Batched;
+/// use casados::prelude::*;
+/// use casados::{Rk4, result::Nominal};
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// /// Where carts are that stood still, whatever the method.
+/// fn ends<B: Batched<Cart, f64>>(mut batch: Batch<Cart, B>) -> Result<[f64; 3], BatchError> {
+///     let (x0, u) = ([vector![0.0, 0.0]; 3], [1.0, 2.0, 3.0].map(|u| vector![u]));
+///     let mut ends = [Nominal::default(); 3];
+///     batch.solve(&Intervals { x0: &x0, u: &u, h: &[1.0], ..Default::default() }, &mut ends)?;
+///     Ok(ends.map(|end| end.x[0]))
+/// }
+/// let (options, exact) = (Options::default(), [0.5, 1.0, 1.5]);
+/// for ends in [ends(Batch::<Cart, Rk4>::new(options)?)?, ends(Batch::<Cart, Gauss<2>>::new(options)?)?] {
+///     assert!(ends.iter().zip(exact).all(|(end, exact)| (end - exact).abs() < 1e-14));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` is not an implicit Runge-Kutta method",
-    label = "a batch needs an implicit Runge-Kutta method",
-    note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are, for explicit models too; `Erk` integrates one interval after the other with \
-            explicit methods"
+    message = "`{Self}` is not a Runge-Kutta method of a fixed step",
+    label = "a batch needs a Runge-Kutta method of a fixed step",
+    note = "explicit: `Euler`, `Midpoint`, `Heun`, `Rk4`, `DormandPrince5`, `Butcher6`, `DormandPrince8`; implicit: `Gauss<S>`, `RadauIIA<S>`, `Custom<S>`"
 )]
-pub trait Batched {
-    /// Its integrator.
-    type Integrator<M: Dae, T: Real>;
+pub trait Batched<M: Dae, T: Real> {
+    /// The integrator of a single interval.
+    type Single: Single<Model = M, Number = T>;
 }
 
-impl<const S: usize> Batched for Gauss<S>
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for Gauss<S>
 where
     Self: Method<S>,
 {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+    type Single = Irk<M, Self, T>;
 }
-impl<const S: usize> Batched for RadauIIA<S>
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for RadauIIA<S>
 where
     Self: Method<S>,
 {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+    type Single = Irk<M, Self, T>;
 }
-impl<const S: usize> Batched for Custom<S> {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for Custom<S> {
+    type Single = Irk<M, Self, T>;
 }
+
+macro_rules! explicit {
+    ($($method:ident),* $(,)?) => { $(
+        impl<M: Ode, T: Real> Batched<M, T> for $method {
+            type Single = Erk<M, Self, T>;
+        }
+    )* };
+}
+explicit!(Euler, Midpoint, Heun, Rk4, DormandPrince5, Butcher6, DormandPrince8);

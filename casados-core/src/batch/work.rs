@@ -3,21 +3,19 @@
 
 use super::answer::{Answer, Wide};
 use super::error::BatchError;
-use super::group::Group;
 use super::intervals::{Inputs, Interval, vector};
 use super::lanes::MOST_LANES;
+use super::single::{Group, Single};
 use super::statistics::BatchStatistics;
 use crate::error::Error;
-use crate::irk;
+use crate::integrator::Integrator;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::memory::Heap;
-use crate::model::{ArrayK, Dae};
-use crate::options::{Newton, Options, Start};
+use crate::model::Dae;
+use crate::options::{Options, Start};
 use crate::result::Nominal;
 use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
 use crate::shape::{Shape, assign};
-use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
@@ -31,14 +29,10 @@ const WORKING_SET: f64 = 7.0 / 8.0;
 
 /// How many intervals are computed together: as many as the widest register has whose group fits
 /// into the cache.
-pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton) -> usize {
-    let shared = S > 2
-        && options.fixed_iterations.is_none()
-        && options.jacobian.is_adaptive()
-        && !M::STRUCTURE.linear_in_state;
+pub fn width<I: Single, R: Answer<I::Model, I::Number>>(options: &Options) -> usize {
     let mut most = MOST_LANES;
     loop {
-        match T::widest(most, Fits::<M, R, S> { shared, of: PhantomData }) {
+        match I::Number::widest(most, Fits::<I> { options, columns: R::COLUMNS, of: PhantomData }) {
             Ok((lanes, true)) => return lanes,
             Ok((lanes, false)) => most = lanes.saturating_sub(1),
             Err(_) => return 1,
@@ -47,36 +41,36 @@ pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton)
 }
 
 /// The lanes of a register, and whether they are to be used.
-struct Fits<M, R, const S: usize> {
-    /// Whether Newton's method takes the shared Jacobian of the stages.
-    shared: bool,
-    of: PhantomData<(M, R)>,
+struct Fits<'a, I> {
+    options: &'a Options,
+    /// How many columns of derivatives are computed.
+    columns: usize,
+    of: PhantomData<I>,
 }
 
-impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, S> {
+impl<I: Single> Widest<I::Number> for Fits<'_, I> {
     type Output = (usize, bool);
-    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
-        let fits = R::working_set::<E, S>(self.shared) as f64 <= WORKING_SET * second_level_cache() as f64;
-        // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-        (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && fits)
+    fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> (usize, bool) {
+        let bytes = I::working_set::<E>(self.options, self.columns) as f64;
+        (E::LANES, I::TOGETHER && bytes <= WORKING_SET * second_level_cache() as f64)
     }
 }
 
 /// What is to be done.
-pub struct Work<'a, M: Dae, T: Real, const S: usize> {
-    pub inputs: &'a Inputs<'a, M, T>,
+pub struct Work<'a, I: Single> {
+    pub inputs: &'a Inputs<'a, I::Model, I::Number>,
     pub options: &'a Options,
-    pub tableau: &'a Tableau<S>,
-    pub given: Option<[&'a [T]; 2]>,
+    pub tableau: &'a I::Tableau,
+    pub given: Option<[&'a [I::Number]; 2]>,
     /// How many intervals are computed together.
     pub lanes: usize,
     /// How many are simulated together before each is differentiated alone.
     pub simulated: usize,
-    /// Whether records are solutions at these inputs.
+    /// Whether stages that are remembered are solutions at these inputs.
     pub solved: bool,
 }
 
-impl<M: Dae, T: Real, const S: usize> Work<'_, M, T, S> {
+impl<I: Single> Work<'_, I> {
     /// How many intervals a group has.
     fn size(&self) -> usize {
         self.lanes.max(self.simulated)
@@ -84,18 +78,18 @@ impl<M: Dae, T: Real, const S: usize> Work<'_, M, T, S> {
 }
 
 /// Consecutive intervals, and where what is found out about them belongs.
-pub struct Share<'a, M: Dae, T: Real, R, const S: usize> {
+pub struct Share<'a, I: Single, R> {
     pub first: usize,
     pub results: &'a mut [R],
     pub status: &'a mut [Result<(), Error>],
     /// The stages of all steps of every interval; empty without a warm start, as `warm`.
-    pub records: &'a mut [ArrayK<M, [T; S]>],
+    pub stages: &'a mut [I::Stages],
     pub warm: &'a mut [bool],
 }
 
-impl<'a, M: Dae, T: Real, R, const S: usize> Share<'a, M, T, R, S> {
+impl<'a, I: Single, R> Share<'a, I, R> {
     /// The next intervals, which are taken away.
-    fn take(&mut self, count: usize, steps: usize) -> Share<'a, M, T, R, S> {
+    fn take(&mut self, count: usize, steps: usize) -> Share<'a, I, R> {
         let first = self.first;
         let count = count.min(self.results.len());
         self.first += count;
@@ -103,7 +97,7 @@ impl<'a, M: Dae, T: Real, R, const S: usize> Share<'a, M, T, R, S> {
             first,
             results: split(&mut self.results, count),
             status: split(&mut self.status, count),
-            records: split(&mut self.records, count.saturating_mul(steps)),
+            stages: split(&mut self.stages, count.saturating_mul(steps)),
             warm: split(&mut self.warm, count),
         }
     }
@@ -127,17 +121,17 @@ fn split<'a, V>(slice: &mut &'a mut [V], count: usize) -> &'a mut [V] {
 
 /// Gives every thread as many groups as every other.
 #[cfg(feature = "parallel")]
-pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
-    work: &Work<'_, M, T, S>,
-    workers: &mut Vec<Worker<M, B, S, T>>,
+pub fn parallel<I: Single, R: Answer<I::Model, I::Number>>(
+    work: &Work<'_, I>,
+    workers: &mut Vec<Worker<I>>,
     threads: usize,
-    mut share: Share<'_, M, T, R, S>,
+    mut share: Share<'_, I, R>,
 ) -> Result<(), BatchError> {
     let groups = share.results.len().div_ceil(work.size());
     let threads = threads.min(groups).max(1);
     while workers.len() < threads {
-        let worker = Worker::new(*work.options, *work.tableau);
-        let bytes = threads.saturating_mul(size_of::<Worker<M, B, S, T>>());
+        let worker = Worker::new(work.options, work.tableau);
+        let bytes = threads.saturating_mul(size_of::<Worker<I>>());
         let (Ok(worker), Ok(())) = (worker, workers.try_reserve(1)) else {
             return Err(BatchError::OutOfMemory { bytes });
         };
@@ -161,30 +155,32 @@ pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
 type Groups = [Option<Box<dyn Any + Send + Sync>>; 2];
 
 /// What computes, with memory of its own.
-pub struct Worker<M: Dae, B, const S: usize, T: Real> {
-    single: irk::Integrator<M, B, S, T, Heap>,
+pub struct Worker<I: Single> {
+    single: I,
     /// A [`Group`] for each kind of register: results of several kinds may need different ones.
     groups: Groups,
     /// Stages of the steps of intervals that are simulated together, and where they lead.
-    stages: Vec<ArrayK<M, [T; S]>>,
-    ends: Vec<Nominal<M, T>>,
+    stages: Vec<I::Stages>,
+    ends: Vec<Nominal<I::Model, I::Number>>,
     pub statistics: BatchStatistics,
 }
 
-impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
-    pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
-        let single = irk::Integrator::build(options, tableau)?;
-        let (stages, ends) = (Vec::new(), Vec::new());
-        Ok(Self { single, groups: [None, None], stages, ends, statistics: BatchStatistics::default() })
+impl<I: Single> Worker<I> {
+    pub fn new(options: &Options, tableau: &I::Tableau) -> Result<Self, Error> {
+        Ok(Self::with(I::of(options, tableau)?))
     }
 
     /// The same with memory of its own.
     pub fn fresh(&self) -> Self {
-        let (single, stages, ends) = (self.single.clone(), Vec::new(), Vec::new());
+        Self::with(self.single.clone())
+    }
+
+    fn with(single: I) -> Self {
+        let (stages, ends) = (Vec::new(), Vec::new());
         Self { single, groups: [None, None], stages, ends, statistics: BatchStatistics::default() }
     }
 
-    pub fn run<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
+    pub fn run<R: Answer<I::Model, I::Number>>(&mut self, work: &Work<'_, I>, mut share: Share<'_, I, R>) {
         while !share.results.is_empty() {
             let group = share.take(work.size(), work.options.steps);
             self.group(work, group);
@@ -192,7 +188,7 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     }
 
     /// The intervals of one group.
-    fn group<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
+    fn group<R: Answer<I::Model, I::Number>>(&mut self, work: &Work<'_, I>, mut share: Share<'_, I, R>) {
         let mut intervals = [None; MOST_LANES];
         for (i, (interval, status)) in intervals.iter_mut().zip(share.status.iter_mut()).enumerate() {
             match work.inputs.interval(share.first + i) {
@@ -206,7 +202,7 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
             let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut share);
             let together = Together { work, groups, statistics, intervals: &intervals, share };
             // What did not get memory side by side may get it alone.
-            done = T::widest(work.lanes, together).ok().and_then(Result::ok).unwrap_or_default();
+            done = I::Number::widest(work.lanes, together).ok().and_then(Result::ok).unwrap_or_default();
         } else if several && work.simulated > 1 {
             solved = self.simulate(work, &intervals, &share).unwrap_or_default();
         }
@@ -215,10 +211,10 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
             let again = several && !solved[i];
             *(if again { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
             let mut outcome = self.alone(work, interval, i, solved[i], &mut share);
-            self.statistics.add_work(self.single.statistics());
+            self.statistics.add_work(&self.single.statistics());
             if solved[i] && outcome.is_err() {
                 outcome = self.alone(work, interval, i, false, &mut share);
-                self.statistics.add_work(self.single.statistics());
+                self.statistics.add_work(&self.single.statistics());
             }
             if let Some(status) = share.status.get_mut(i) {
                 *status = outcome;
@@ -229,16 +225,16 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     /// The stages of all intervals of a group, for those that arrive.
     fn simulate<R>(
         &mut self,
-        work: &Work<'_, M, T, S>,
-        intervals: &[Option<Interval<'_, M, T>>; MOST_LANES],
-        share: &Share<'_, M, T, R, S>,
+        work: &Work<'_, I>,
+        intervals: &Lined<'_, I>,
+        share: &Share<'_, I, R>,
     ) -> Option<[bool; MOST_LANES]> {
         let Self { groups, stages, ends, statistics, .. } = self;
         let (count, steps) = (MOST_LANES.min(share.results.len()), work.options.steps);
         fill(stages, MOST_LANES.saturating_mul(steps), Zeroable::zeroed()).ok()?;
         fill(ends, MOST_LANES, Zeroable::zeroed()).ok()?;
         let mut warm = [false; MOST_LANES];
-        for (to, from) in stages.iter_mut().zip(share.records.iter()) {
+        for (to, from) in stages.iter_mut().zip(share.stages.iter()) {
             assign(to, from);
         }
         for (to, from) in warm.iter_mut().zip(share.warm.iter()) {
@@ -248,49 +244,51 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
             first: share.first,
             results: ends.get_mut(..count)?,
             status: &mut [],
-            records: stages,
+            stages,
             warm: &mut warm,
         };
         let together = Together { work, groups, statistics, intervals, share: &mut share };
-        T::widest(work.simulated, together).ok().and_then(Result::ok)
+        I::Number::widest(work.simulated, together).ok().and_then(Result::ok)
     }
 
     /// One interval; its stages may be known.
-    fn alone<R: Answer<M, T>>(
+    fn alone<R: Answer<I::Model, I::Number>>(
         &mut self,
-        work: &Work<'_, M, T, S>,
-        interval: &Interval<'_, M, T>,
+        work: &Work<'_, I>,
+        interval: &Interval<'_, I::Model, I::Number>,
         index: usize,
         solved: bool,
-        share: &mut Share<'_, M, T, R, S>,
+        share: &mut Share<'_, I, R>,
     ) -> Result<(), Error> {
-        let irk = &mut self.single;
-        if M::Shape::NP > 0 {
-            irk.set_parameters(&vector(interval.p))?;
+        let single = &mut self.single;
+        if <I::Model as Dae>::Shape::NP > 0 {
+            single.set_parameters(&vector(interval.p))?;
         }
-        irk.set_time(interval.t0)?;
-        if let Some([xdot, z]) = work.given {
-            irk.set_start(&vector(xdot), &vector(z))?;
+        single.set_time(interval.t0)?;
+        if let Some(given) = work.given {
+            single.give(given)?;
         }
         let steps = work.options.steps;
-        let record = share.records.chunks_exact_mut(steps).nth(index);
+        let stages = share.stages.chunks_exact_mut(steps).nth(index);
         let warm = share.warm.get_mut(index);
-        match (&record, &warm, self.stages.chunks_exact(steps).nth(index)) {
-            (_, _, Some(stages)) if solved => irk.set_solution(stages)?,
-            (Some(record), Some(true), _) if work.solved => irk.set_solution(record)?,
-            (Some(record), Some(true), _) => irk.set_record(record)?,
-            _ => irk.reset(),
+        match (&stages, &warm, self.stages.chunks_exact(steps).nth(index)) {
+            (_, _, Some(stages)) if solved => single.start(Some(stages), true)?,
+            (Some(stages), Some(true), _) => single.start(Some(stages), work.solved)?,
+            _ => single.start(None, false)?,
         }
         if let Some(result) = share.results.get_mut(index) {
-            result.alone(irk, interval)?;
+            result.alone(single, interval)?;
         }
-        if let (Some(record), Some(warm)) = (record, warm) {
-            irk.record(record)?;
+        if let (Some(stages), Some(warm)) = (stages, warm) {
+            single.stages(stages)?;
             *warm = true;
         }
         Ok(())
     }
 }
+
+/// The intervals of a group that can be computed, each in its lane.
+type Lined<'a, I> = [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MOST_LANES];
 
 /// Gives every interval its result, where all is well and finite.
 struct Distribute<'a, E: Lanes, W, R> {
@@ -318,28 +316,28 @@ impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
 }
 
 /// The intervals of a group side by side.
-struct Together<'a, 'b, 'c, M: Dae, T: Real, R, const S: usize> {
-    work: &'a Work<'b, M, T, S>,
+struct Together<'a, 'b, 'c, I: Single, R> {
+    work: &'a Work<'b, I>,
     groups: &'a mut Groups,
     statistics: &'a mut BatchStatistics,
-    intervals: &'a [Option<Interval<'b, M, T>>; MOST_LANES],
-    share: &'a mut Share<'c, M, T, R, S>,
+    intervals: &'a Lined<'b, I>,
+    share: &'a mut Share<'c, I, R>,
 }
 
-impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_, '_, '_, M, T, R, S> {
+impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for Together<'_, '_, '_, I, R> {
     /// For which intervals there is a result.
     type Output = Result<[bool; MOST_LANES], Error>;
 
-    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output {
+    fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> Self::Output {
         let Self { work, groups, statistics, intervals, share } = self;
         let mut done = [false; MOST_LANES];
-        let is_mine = |group: &Box<dyn Any + Send + Sync>| (**group).is::<Group<M, E, S>>();
+        let is_mine = |group: &Box<dyn Any + Send + Sync>| (**group).is::<I::Group<E>>();
         // Its own place, or one that is free.
         let place = groups.iter_mut().find(|place| place.as_ref().is_none_or(is_mine));
         let group = place.map(|group| {
-            group.get_or_insert_with(|| Box::new(Group::<M, E, S>::new(work.options, work.tableau)))
+            group.get_or_insert_with(|| Box::new(I::Group::<E>::new(work.options, work.tableau)))
         });
-        let group = group.and_then(|group| group.downcast_mut::<Group<M, E, S>>());
+        let group = group.and_then(|group| group.downcast_mut::<I::Group<E>>());
         // Lanes that nobody needs hold a copy of the first interval.
         let first = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first)) = (group, first) else { return Ok(done) };
@@ -351,32 +349,32 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         let index = |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first };
 
         let steps = work.options.steps;
-        let mut records: [&[ArrayK<M, [T; S]>]; MOST_LANES] = [&[]; MOST_LANES];
-        let mut warm = work.options.start == Start::Warm || work.solved;
+        let mut stages: [&[I::Stages]; MOST_LANES] = [&[]; MOST_LANES];
+        let mut warm = I::ITERATES && (work.options.start == Start::Warm || work.solved);
         if warm {
-            for (lane, record) in records.iter_mut().enumerate().take(E::LANES) {
-                let from = share.records.chunks_exact(steps).nth(index(lane));
-                *record = from.unwrap_or_default();
+            for (lane, stages) in stages.iter_mut().enumerate().take(E::LANES) {
+                let from = share.stages.chunks_exact(steps).nth(index(lane));
+                *stages = from.unwrap_or_default();
                 warm &= share.warm.get(index(lane)).copied().unwrap_or(false);
             }
         }
-        group.place(lanes.get(..E::LANES).unwrap_or_default(), work.given, warm.then_some(&records))?;
+        let lanes = lanes.get(..E::LANES).unwrap_or_default();
+        group.place(lanes, work.given, warm.then_some(&stages), work.solved)?;
 
-        group.solved = warm && work.solved;
-        let (good, wide) = R::together(group, warm)?;
+        let (good, wide) = R::together::<I, E>(group)?;
         for (done, interval) in done.iter_mut().zip(intervals).take(E::LANES) {
             *done = interval.is_some();
         }
         dispatch(Distribute { good, wide, done: &mut done, results: &mut *share.results });
-        let places = share.records.chunks_exact_mut(steps).zip(share.warm.iter_mut());
-        for (lane, ((record, warm), done)) in places.zip(done).enumerate() {
+        let places = share.stages.chunks_exact_mut(steps).zip(share.warm.iter_mut());
+        for (lane, ((stages, warm), done)) in places.zip(done).enumerate() {
             if done {
-                group.record(lane, record)?;
+                group.stages(lane, stages)?;
                 *warm = true;
             }
         }
         statistics.groups += 1;
-        statistics.add_work(&group.statistics);
+        statistics.add_work(&group.work());
         Ok(done)
     }
 }

@@ -11,13 +11,12 @@ use super::integrators::Settings;
 use super::library::{Client, Failure};
 use super::signature::{self, Output};
 use super::sparsity::Relation;
-use crate::batch::{self, Intervals, vector};
+use crate::batch::{self, Intervals, Standard, vector};
 use crate::error::Error;
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::options::Options;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::shape::{Matrix, Shape};
-use crate::tableau::Method;
 use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -50,7 +49,7 @@ pub trait Horizon: Sized + Send + 'static {
     ) -> Result<(), Failure>;
 }
 
-impl<M: Dae, B: Method<S> + 'static, const S: usize> Horizon for batch::Integrator<M, B, S, f64> {
+impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::Integrator<I> {
     type Model = M;
 
     fn build(options: &Options) -> Result<Self, Error> {

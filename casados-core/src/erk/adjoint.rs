@@ -5,12 +5,14 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
+use super::along::Beside;
 use super::forward::Variation;
-use super::step::{Grid, Point, Record, Scheme, add, check};
+use super::scheme::{Grid, Scheme, is_zero};
+use super::step::{Own, Point, Record, add};
 use crate::error::{Error, Place, Quantity};
-use crate::model::{ArrayK, ArrayV, ArrayW, Ode};
-use crate::quadrature::Along;
-use crate::scalar::Real;
+use crate::linalg::{Arithmetic, beside, kernels};
+use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
+use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;
 
@@ -18,26 +20,29 @@ use bytemuck::Zeroable;
 /// `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Sweep<M: Ode, T: Real, R: Array<T>, const S: usize> {
+pub(super) struct Sweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
     /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the
     /// current stage is in `dxi`, `ξ̄_i` in `dk`.
-    pub forward: Variation<M, T, R, S>,
-    gradient: ArrayV<M, T>,
+    pub forward: Variation<M, E, R, S>,
+    gradient: ArrayV<M, [E; 1]>,
     /// `(λ_n, λ_u, λ_p)`
     pub lambda: ArrayW<M, R>,
 }
 
+/// The `μ_i` of the stages of a step.
+pub(super) type Multipliers<M, E, const S: usize> = [ArrayK<M, [E; 1]>; S];
+
 /// The way back over the steps.
-pub(super) struct Way<'a, M: Ode, T: Real, const S: usize> {
-    pub scheme: &'a Scheme<M, T, S>,
-    pub grid: Grid<T>,
+pub(super) struct Way<'a, M: Ode, E: Lanes, const S: usize> {
+    pub scheme: &'a Scheme<M, E, S>,
+    pub grid: &'a Grid<E>,
     /// How many seeds there are.
     pub columns: usize,
 }
 
-impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
+impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// Seeds: of each state the columns.
-    pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> T) {
+    pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> E) {
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
             for (column, value) in lambda.as_mut()[..columns].iter_mut().enumerate() {
                 *value = seed(x, column);
@@ -49,16 +54,16 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// every stage for the Hessian. An integrand takes part if there is one seed.
     pub fn run(
         &mut self,
-        way: Way<'_, M, T, S>,
-        point: &mut Point<M, T>,
-        records: &[Record<M, T, S>],
-        mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
-        along: &mut Along<'_, '_, M, T>,
+        way: Way<'_, M, E, S>,
+        point: &mut Point<M, E>,
+        records: &[Record<M, E, S>],
+        mut multipliers: Option<&mut [Multipliers<M, E, S>]>,
+        along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
         let columns = way.columns.min(R::LEN);
-        M::jacobian_constants::<T>(&mut self.forward.jacobian);
+        M::jacobian_constants::<Own<E>>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
-            lambda.as_mut()[..columns].fill(T::ZERO);
+            lambda.as_mut()[..columns].fill(E::zeroed());
         }
         for (step, record) in records.iter().enumerate().rev() {
             let multipliers = multipliers.as_deref_mut().and_then(|of_steps| of_steps.get_mut(step));
@@ -69,112 +74,141 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     fn step(
         &mut self,
-        &Way { scheme, grid, columns }: &Way<'_, M, T, S>,
-        point: &mut Point<M, T>,
-        (step, record): (usize, &Record<M, T, S>),
-        mut multipliers: Option<&mut [ArrayK<M, T>; S]>,
-        along: &mut Along<'_, '_, M, T>,
+        &Way { scheme, grid, columns }: &Way<'_, M, E, S>,
+        point: &mut Point<M, E>,
+        (step, record): (usize, &Record<M, E, S>),
+        mut multipliers: Option<&mut Multipliers<M, E, S>>,
+        along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
         let columns = columns.min(R::LEN);
         for stage in (0..S).rev() {
             let at = Place { step, stage, iteration: 0 };
-            self.stage_seed(scheme, grid.h, stage, columns);
+            let Self { forward: Variation { dk, dxi, jacobian, .. }, gradient, lambda } = self;
+            stage_seed::<M, E, R, S>(scheme, (&grid.h, stage, columns), &*lambda, &*dk, dxi);
             point.go(scheme, grid, record, at)?;
             if columns == 1 {
-                let mu = ArrayK::<M, T>::from_fn(|equation| {
-                    let row = scheme.rows[equation];
-                    let kbar =
-                        self.forward.dxi.as_ref().get(row.state).map_or(T::ZERO, |kbar| kbar.as_ref()[0]);
-                    row.factor * kbar
-                });
-                self.pull_one(point, &mu, at)?;
-                if let Some(integrand) = along {
-                    // ξ̄_i += h b_i φ_x, λ_w += h b_i φ_w
-                    point.show(&mut **integrand);
-                    let gradient = integrand.adjoint(grid.h * scheme.b[stage], at)?;
-                    add(T::ONE, gradient, self.gradient.as_mut());
+                let mut mu = ArrayK::<M, [E; 1]>::zeroed();
+                multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
+                // `∇(μᵀ f)` by reverse mode.
+                M::adjoint::<Own<E>>(&point.v, &mu, gradient);
+                point.check(gradient.as_ref().as_flattened(), Quantity::Adjoint, at, |variable| variable)?;
+                along.adjoint(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
+                if let Some(xibar) = dk.get_mut(stage) {
+                    keep::<M, E, R>(&*gradient, xibar, lambda);
                 }
-                self.keep(stage);
                 if let Some(multipliers) = &mut multipliers {
                     multipliers[stage] = mu;
                 }
             } else {
-                point.jacobian(&mut self.forward.jacobian, at)?;
-                self.pull_many(scheme, stage, columns);
+                point.jacobian(jacobian, at)?;
+                if let Some(xibar) = dk.get_mut(stage) {
+                    pull::<M, E, R, S>(scheme, &*jacobian, &*dxi, columns, (xibar, lambda));
+                }
             }
         }
-        let (lambda, xibars) = (&mut self.lambda.as_mut()[..M::Shape::NX], &self.forward.dk);
-        for xibar in xibars {
-            add_rows(T::ONE, xibar.as_ref(), lambda, columns);
-        }
+        advance::<M, E, R>(E::from_f64(1.0), &self.forward.dk, columns, &mut self.lambda);
         Ok(())
     }
+}
 
+kernels! { by beside;
     /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
-    fn stage_seed(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
-        let Variation { dk, dxi, .. } = &mut self.forward;
-        let kbar = dxi.as_mut();
+    fn stage_seed [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        of: (&'k E, usize, usize),
+        lambda: &'k ArrayW<M, R>,
+        xibars: &'k [ArrayX<M, R>; S],
+        kbar: &'k mut ArrayX<M, R>,
+    ) {
+        let ((&h, stage, columns), kbar) = (of, kbar.as_mut());
         for row in &mut *kbar {
-            row.as_mut()[..columns].fill(T::ZERO);
+            row.as_mut()[..columns].fill(E::zeroed());
         }
-        add_rows(h * scheme.b[stage], self.lambda.as_ref(), kbar, columns);
-        for (a, xibar) in scheme.a.iter().zip(&*dk).skip(stage + 1) {
-            if a[stage] != T::ZERO {
-                add_rows(h * a[stage], xibar.as_ref(), kbar, columns);
+        add_rows::<A, E, R>(h * scheme.b[stage], lambda.as_ref(), kbar, columns);
+        for (a, xibar) in scheme.a.iter().zip(xibars).skip(stage + 1) {
+            if !is_zero(a[stage]) {
+                add_rows::<A, E, R>(h * a[stage], xibar.as_ref(), kbar, columns);
             }
         }
     }
 
-    /// `∇(μᵀ f)` by reverse mode.
-    fn pull_one(&mut self, point: &Point<M, T>, mu: &ArrayK<M, T>, at: Place) -> Result<(), Error> {
-        M::adjoint::<T>(&point.v, mu, &mut self.gradient);
-        check(self.gradient.as_ref(), Quantity::Adjoint, at, |variable| variable)
+    /// `μ_i`, of the equations in place of the states.
+    fn multiplier [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        kbar: &'k ArrayX<M, R>,
+        mu: &'k mut ArrayK<M, [E; 1]>,
+    ) {
+        for (mu, row) in mu.as_mut().iter_mut().zip(scheme.rows.as_ref()) {
+            let kbar = kbar.as_ref().get(row.state).map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
+            *mu = [row.factor * kbar];
+        }
     }
 
     /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.
-    fn keep(&mut self, stage: usize) {
+    fn keep [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
+        gradient: &'k ArrayV<M, [E; 1]>,
+        xibar: &'k mut ArrayX<M, R>,
+        lambda: &'k mut ArrayW<M, R>,
+    ) {
         let nx = M::Shape::NX;
-        for (x, xibar) in self.forward.dk[stage].as_mut().iter_mut().enumerate() {
-            xibar.as_mut()[0] = self.gradient[nx + x];
+        for (x, xibar) in xibar.as_mut().iter_mut().enumerate() {
+            [xibar.as_mut()[0]] = gradient[nx + x];
         }
         for w in nx..M::Shape::NW {
-            let lambda = self.lambda[w].as_mut();
-            lambda[0] = lambda[0] + self.gradient[nx + w];
+            let (lambda, [own]) = (lambda[w].as_mut(), gradient[nx + w]);
+            lambda[0] = lambda[0] + own;
         }
     }
 
-    /// Products with the Jacobian, one evaluation for all seeds.
-    fn pull_many(&mut self, scheme: &Scheme<M, T, S>, stage: usize, columns: usize) {
-        let nx = M::Shape::NX;
-        let Variation { dk, dxi, jacobian, .. } = &mut self.forward;
-        let Some(xibar) = dk.get_mut(stage) else { return };
+    /// `ξ̄_i` and `λ_w` by products with the Jacobian, one evaluation for all seeds.
+    fn pull [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        jacobian: &'k M::Jacobian<[E; 1]>,
+        kbar: &'k ArrayX<M, R>,
+        columns: usize,
+        to: (&'k mut ArrayX<M, R>, &'k mut ArrayW<M, R>),
+    ) {
+        let (nx, (xibar, lambda)) = (M::Shape::NX, to);
         for row in xibar.as_mut() {
-            row.as_mut()[..columns].fill(T::ZERO);
+            row.as_mut()[..columns].fill(E::zeroed());
         }
         for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
             let w = variable - nx;
-            let sum = if w < nx { xibar.as_mut().get_mut(w) } else { self.lambda.as_mut().get_mut(w) };
-            let (Some(sum), Some(&value), Some(row)) =
+            let sum = if w < nx { xibar.as_mut().get_mut(w) } else { lambda.as_mut().get_mut(w) };
+            let (Some(sum), Some(&[value]), Some(row)) =
                 (sum, jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
             else {
                 continue;
             };
-            if let Some(kbar) = dxi.as_ref().get(row.state) {
-                add(row.factor * value, &kbar.as_ref()[..columns], sum.as_mut());
+            if let Some(kbar) = kbar.as_ref().get(row.state) {
+                add::<A, E>(row.factor * value, &kbar.as_ref()[..columns], sum.as_mut());
             }
+        }
+    }
+
+    /// `λ_n = λ_{n+1} + Σ_i ξ̄_i`
+    fn advance [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
+        one: E,
+        xibars: &'k [ArrayX<M, R>],
+        columns: usize,
+        lambda: &'k mut ArrayW<M, R>,
+    ) {
+        let lambda = &mut lambda.as_mut()[..M::Shape::NX];
+        for xibar in xibars {
+            add_rows::<A, E, R>(one, xibar.as_ref(), lambda, columns);
         }
     }
 }
 
 /// `sums += a rows`, the first columns of them.
 #[inline(always)]
-fn add_rows<T: Real, R: Array<T>>(a: T, rows: &[R], sums: &mut [R], columns: usize) {
+fn add_rows<A: Arithmetic, E: Lanes, R: Array<E>>(a: E, rows: &[R], sums: &mut [R], columns: usize) {
     if R::LEN == 1 {
         // Numbers next to each other: no loop over columns.
-        return add(a, R::flat(rows), R::flat_mut(sums));
+        return add::<A, E>(a, R::flat(rows), R::flat_mut(sums));
     }
     for (sum, row) in sums.iter_mut().zip(rows) {
-        add(a, &row.as_ref()[..columns], &mut sum.as_mut()[..columns]);
+        add::<A, E>(a, &row.as_ref()[..columns], &mut sum.as_mut()[..columns]);
     }
 }

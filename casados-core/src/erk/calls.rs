@@ -1,19 +1,15 @@
 //! The calls that all integrators have in common, with an integrand or without.
 
-use super::adjoint::Way;
-use super::along::forward;
-use super::forward::Unit;
-use super::integrator::{ForwardMemory, HessianMemory, Integrator, finite};
-use super::sensitivities::{gradient_element, write_forward, write_hessian};
-use super::step::Base;
+use super::integrator::{Integrator, finite};
+use super::sweeps::Whole;
 use crate::error::{Argument, Error};
-use crate::integrator;
+use crate::integrator::{self, With};
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Ode, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, begin, finish};
+use crate::quadrature::{Along, Integrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Matrix;
 use crate::statistics::Statistics;
 
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for Integrator<M, B, S, T, W> {
@@ -43,15 +39,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
-        begin(&mut along);
-        let base = W::nominal(&mut self.base)?;
-        let run = base.run(&self.scheme, grid, &mut along);
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-        let Base { x, result, .. } = base;
-        result.x.as_mut_slice().copy_from_slice(x.as_ref());
-        Ok(result)
+        Ok(self.engine.solve(&grid, &mut along)?.1)
     }
 
     fn forward_along(
@@ -65,18 +53,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         W: WithForward,
     {
         let grid = self.begin(x0, u, h)?;
-        begin(&mut along);
-        let base = W::nominal(&mut self.base)?;
-        let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;
-        let scheme = &self.scheme;
-        let run = sweep.forward.run(scheme, grid, base, Unit, |point, dxi, at| {
-            forward(&mut along, point, dxi, grid.h * scheme.b[at.stage], false, at)
-        });
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
-        Ok(&result.forward)
+        Ok(self.engine.forward(&grid, &mut Whole, &mut along)?.1)
     }
 
     fn adjoint_along(
@@ -104,58 +81,19 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
     where
         W: WithHessian,
     {
-        begin(&mut along);
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        let base = W::nominal(&mut self.base)?;
-        let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;
-        let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
-        let HessianMemory { curvature, result } = W::hessian(&mut self.hessian)?;
-        let records = W::tape(&mut self.trajectory, grid.steps)?;
-        let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
-        let scheme = &self.scheme;
+        Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut Whole, &mut along)?.1)
+    }
+}
 
-        // The adjoint first: then the forward sweep meets each stage with its multipliers known,
-        // and no derivative of a stage has to be kept.
-        let start = base.x;
-        sweep.seed(1, |x, _| lambda.as_slice()[x]);
-        curvature.start();
-        let mut run = || {
-            base.record(scheme, grid, records, &mut None)?;
-            sweep.run(
-                Way { scheme, grid, columns: 1 },
-                &mut base.point,
-                records,
-                Some(multipliers),
-                &mut along,
-            )?;
-            base.x = start;
-            base.point.counts.steps = 0;
-            variation.run(scheme, grid, base, Unit, |point, dxi, at| {
-                let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
-                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
-                forward(&mut along, point, dxi, grid.h * b, true, at)?;
-                curvature.add(scheme, point, mu, dxi, at)
-            })
-        };
-        let run = run();
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-
-        write_forward(grid, base, variation, &mut result.first.forward)?;
-        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-        for (w, lambda) in sweep.lambda.as_ref().iter().enumerate() {
-            let [value] = *lambda;
-            if !value.is_finite() {
-                return Err(Error::Overflow { step: 0, index: w });
-            }
-            *gradient_element(&mut result.first, w, nx, nu) = value;
-        }
-        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
-            curvature.add_lower(second);
-        }
-        write_hessian(curvature, result)?;
-        Ok(result)
+impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those
+    /// of the solution; see [`quadrature`](crate::quadrature).
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
+        With { integrator: self, integrand }
     }
 }

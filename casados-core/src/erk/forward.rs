@@ -1,20 +1,25 @@
 //! First-order sensitivities along with the step: the variational equations of the stages.
 
-use super::step::{Base, Grid, Point, Record, Scheme, add};
+use super::doubt::Doubt;
+use super::scheme::{Grid, Scheme, is_zero};
+use super::step::{Base, Own, Point, Record, add};
+use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place};
-use crate::model::{ArrayX, Dae, Ode};
+use crate::linalg::{Arithmetic, beside, kernels};
+use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Matrix, Shape};
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 use core::ops::Range;
 
 /// Derivatives of the state in the directions of the columns: `R` is the longest row, of which the
 /// first `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Variation<M: Ode, T: Real, R: Array<T>, const S: usize> {
-    pub jacobian: M::Jacobian<T>,
+pub(crate) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
+    pub jacobian: M::Jacobian<[E; 1]>,
     /// `dx_n`
     pub dx: ArrayX<M, R>,
     /// `dξ_i` of the current stage.
@@ -24,24 +29,24 @@ pub(super) struct Variation<M: Ode, T: Real, R: Array<T>, const S: usize> {
 }
 
 /// Directions in the space of `w = (x₀, u, p)`.
-pub(super) trait Directions<M: Ode, T: Real>: Copy {
+pub(crate) trait Directions<M: Ode, E: Lanes>: Copy {
     /// How many.
     fn columns(self) -> usize;
     /// `row += coefficient · (direction of w_i)`
-    fn add(self, i: usize, coefficient: T, row: &mut [T]);
+    fn add(self, i: usize, coefficient: E, row: &mut [E]);
 }
 
 /// All unit vectors.
 #[derive(Clone, Copy)]
 pub(super) struct Unit;
 
-impl<M: Ode, T: Real> Directions<M, T> for Unit {
+impl<M: Ode, E: Lanes> Directions<M, E> for Unit {
     #[inline(always)]
     fn columns(self) -> usize {
         M::Shape::NW
     }
     #[inline(always)]
-    fn add(self, i: usize, coefficient: T, row: &mut [T]) {
+    fn add(self, i: usize, coefficient: E, row: &mut [E]) {
         if let Some(element) = row.get_mut(i) {
             *element = *element + coefficient;
         }
@@ -87,30 +92,25 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
     }
 }
 
-impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
+impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and
     /// `dξ_i` are known.
     pub fn run(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        base: &mut Base<M, T, S>,
-        directions: impl Directions<M, T>,
-        mut at_stage: impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        base: &mut Base<M, E, S>,
+        directions: impl Directions<M, E>,
+        mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let columns = directions.columns();
-        M::jacobian_constants::<T>(&mut self.jacobian);
-        for (i, row) in self.dx.as_mut().iter_mut().enumerate() {
-            let row = &mut row.as_mut()[..columns];
-            row.fill(T::ZERO);
-            directions.add(i, T::ONE, row);
-        }
+        M::jacobian_constants::<Own<E>>(&mut self.jacobian);
+        begin::<M, E, R, _>(E::from_f64(1.0), &mut self.dx, directions);
         for step in 0..grid.steps {
             let Base { point, record, x, rest, .. } = &mut *base;
             record.x = *x;
             self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest))?;
-            self.end(scheme, grid.h, columns);
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
+            self.end(scheme, &grid.h, directions);
             point.counts.steps += 1;
         }
         Ok(())
@@ -119,45 +119,104 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
     /// The stages of one step with their derivatives.
     fn stages(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        (point, record): (&mut Point<M, T>, &mut Record<M, T, S>),
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        (point, record): (&mut Point<M, E>, &mut Record<M, E, S>),
         step: usize,
-        directions: impl Directions<M, T>,
-        at_stage: &mut impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        directions: impl Directions<M, E>,
+        at_stage: &mut impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, record, at)?;
             point.derivative_jacobian(scheme, &mut record.k[stage], &mut self.jacobian, at)?;
-            self.stage_state(scheme, grid.h, stage, directions.columns());
+            self.stage_state(scheme, &grid.h, stage, directions);
             at_stage(point, &self.dxi, at)?;
-            self.stage_derivative(scheme, stage, directions);
+            let Self { dk, dxi, jacobian, .. } = self;
+            if let Some(dk) = dk.get_mut(stage) {
+                stage_derivative::<M, E, R, _, S>(scheme, jacobian, dxi, directions, dk);
+            }
         }
         Ok(())
     }
 
+    /// `dk_i` by a Jacobian that is elsewhere.
+    #[cfg(feature = "alloc")]
+    pub fn stage_derivative(
+        &mut self,
+        scheme: &Scheme<M, E, S>,
+        jacobian: &M::Jacobian<[E; 1]>,
+        stage: usize,
+        directions: impl Directions<M, E>,
+    ) {
+        if let Some(dk) = self.dk.get_mut(stage) {
+            stage_derivative::<M, E, R, _, S>(scheme, jacobian, &self.dxi, directions, dk);
+        }
+    }
+
     /// `dξ_i = dx_n + h Σ_{j<i} a_ij dk_j`
-    fn stage_state(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
-        combine::<M, T, R>(&self.dx, h, &scheme.a[stage][..stage], &self.dk, columns, &mut self.dxi);
+    pub fn stage_state(
+        &mut self,
+        scheme: &Scheme<M, E, S>,
+        h: &E,
+        stage: usize,
+        directions: impl Directions<M, E>,
+    ) {
+        let weights = &scheme.a[stage][..stage];
+        combine::<M, E, R, _>(&self.dx, h, weights, &self.dk, directions, &mut self.dxi);
+    }
+
+    /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
+    pub fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, directions: impl Directions<M, E>) {
+        combine::<M, E, R, _>(&self.dx, h, &scheme.b, &self.dk, directions, &mut self.dxi);
+        self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
+    }
+}
+
+kernels! { by beside;
+    /// The directions, of each state a row.
+    pub fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
+        one: E,
+        dx: &'k mut ArrayX<M, R>,
+        directions: D,
+    ) {
+        let columns = directions.columns();
+        for (i, row) in dx.as_mut().iter_mut().enumerate() {
+            let row = &mut row.as_mut()[..columns];
+            row.fill(E::zeroed());
+            directions.add(i, one, row);
+        }
     }
 
     /// `dk_i = g_x dξ_i + g_w dw`
-    fn stage_derivative(
-        &mut self,
-        scheme: &Scheme<M, T, S>,
-        stage: usize,
-        directions: impl Directions<M, T>,
+    fn stage_derivative [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>, const S: usize] [M, E, R, D, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        jacobian: &'k M::Jacobian<[E; 1]>,
+        dxi: &'k ArrayX<M, R>,
+        directions: D,
+        dk: &'k mut ArrayX<M, R>,
     ) {
         let (nx, columns) = (M::Shape::NX, directions.columns());
-        let Self { dk, dxi, jacobian, .. } = self;
-        let Some(dk) = dk.get_mut(stage) else { return };
-        for row in dk.as_mut() {
-            row.as_mut()[..columns].fill(T::ZERO);
+        let mut begin = M::STRUCTURE.blocks[1];
+        if const { E::LANES > 1 } {
+            // Entries by states lie row by row.
+            for (equation, row) in scheme.rows.as_ref().iter().enumerate() {
+                let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
+                let end = M::STRUCTURE.blocks[2];
+                let entries = begin..(begin..end).find(is_other).unwrap_or(end);
+                begin = entries.end;
+                let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
+                let (factor, dk) = (row.factor, dk.as_mut());
+                each_tile::<A, _, 4>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
+            }
+        } else {
+            for row in dk.as_mut() {
+                row.as_mut()[..columns].fill(E::zeroed());
+            }
         }
-        for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
+        for entry in begin..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-            let (Some(&value), Some(row)) =
+            let (Some(&[value]), Some(row)) =
                 (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
             else {
                 continue;
@@ -165,59 +224,133 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
             let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
             let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
             if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
-                add(coefficient, dxi.as_ref(), sum);
+                add::<A, E>(coefficient, dxi.as_ref(), sum);
             } else {
                 directions.add(w, coefficient, sum);
             }
         }
     }
 
-    /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
-    fn end(&mut self, scheme: &Scheme<M, T, S>, h: T, columns: usize) {
-        combine::<M, T, R>(&self.dx, h, &scheme.b, &self.dk, columns, &mut self.dxi);
-        self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
+    /// `sum = start + h Σ_j weights_j rates_j`, row by row.
+    fn combine [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
+        start: &'k ArrayX<M, R>,
+        h: &'k E,
+        weights: &'k [E],
+        rates: &'k [ArrayX<M, R>],
+        directions: D,
+        sum: &'k mut ArrayX<M, R>,
+    ) {
+        let columns = directions.columns();
+        for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
+            let sum = &mut sum.as_mut()[..columns];
+            if const { E::LANES > 1 } {
+                let start = start.as_ref();
+                each_tile::<A, _, 4>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
+                continue;
+            }
+            sum.fill(E::zeroed());
+            for (&weight, rate) in weights.iter().zip(rates) {
+                if !is_zero(weight) {
+                    add::<A, E>(weight, rate[row].as_ref(), sum);
+                }
+            }
+            for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
+                *sum = A::add(start, *h, *sum);
+            }
+        }
+    }
+
+    /// See [`write`].
+    fn copy [E: Lanes, R: Array<E>, K: Matrix<E>] [E, R, K] <A>(
+        rows: &'k [R],
+        source: Range<usize>,
+        target: &'k mut K,
+        first: usize,
+        doubt: &'k mut Doubt<E>,
+    ) {
+        let mut finite = doubt.none();
+        for (r, row) in rows.iter().enumerate() {
+            for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
+                finite = E::and(finite, value.is_finite());
+                target[(r, first + column)] = value;
+            }
+        }
+        doubt.keep(finite);
+    }
+}
+
+/// A row of the product of the Jacobian with `dξ`.
+struct Product<'a, M: Ode, E: Lanes, R: Array<E>> {
+    entries: Range<usize>,
+    jacobian: &'a M::Jacobian<[E; 1]>,
+    factor: E,
+    dxi: &'a ArrayX<M, R>,
+    dk: &'a mut [E],
+}
+
+impl<M: Ode, E: Lanes, R: Array<E>> AtColumns for Product<'_, M, E, R> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = [E::zeroed(); W];
+        for entry in self.entries.clone() {
+            let w = M::STRUCTURE.jacobian.at(entry).1 - M::Shape::NX;
+            if let (Some(&[value]), Some(dxi)) = (self.jacobian.as_ref().get(entry), self.dxi.as_ref().get(w))
+            {
+                tiles::add::<A, E, W>(&mut sum, self.factor * value, dxi.as_ref(), first);
+            }
+        }
+        tiles::store(&sum, self.dk, first);
+    }
+}
+
+/// A row of a [combination](combine).
+struct Combination<'a, E, R, X> {
+    start: &'a [E],
+    h: E,
+    weights: &'a [E],
+    rates: &'a [X],
+    row: usize,
+    sum: &'a mut [E],
+    of: PhantomData<R>,
+}
+
+impl<E: Lanes, R: Array<E>, X: Array<R>> AtColumns for Combination<'_, E, R, X> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = [E::zeroed(); W];
+        for (&weight, rate) in self.weights.iter().zip(self.rates) {
+            if let (false, Some(rate)) = (is_zero(weight), rate.as_ref().get(self.row)) {
+                tiles::add::<A, E, W>(&mut sum, weight, rate.as_ref(), first);
+            }
+        }
+        for (sum, start) in sum.iter_mut().zip(tiles::load::<E, W>(self.start, first)) {
+            *sum = A::add(start, self.h, *sum);
+        }
+        tiles::store(&sum, self.sum, first);
     }
 }
 
 /// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an
-/// error.
-pub(super) fn write<T: Real, R: Array<T>>(
+/// error, or doubted.
+pub(super) fn write<E: Lanes, R: Array<E>>(
     rows: &[R],
     source: Range<usize>,
-    target: &mut impl Matrix<T>,
+    target: &mut impl Matrix<E>,
     first: usize,
     step: usize,
+    doubt: &mut Doubt<E>,
 ) -> Result<(), Error> {
+    if const { E::LANES > 1 } {
+        copy(rows, source, target, first, doubt);
+        return Ok(());
+    }
     for (r, row) in rows.iter().enumerate() {
         for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
-            if !value.is_finite() {
+            if !E::all(value.is_finite()) {
                 return Err(Error::Overflow { step, index: r });
             }
             target[(r, first + column)] = value;
         }
     }
     Ok(())
-}
-
-/// `sum = start + h Σ_j weights_j rates_j`, row by row.
-fn combine<M: Dae, T: Real, R: Array<T>>(
-    start: &ArrayX<M, R>,
-    h: T,
-    weights: &[T],
-    rates: &[ArrayX<M, R>],
-    columns: usize,
-    sum: &mut ArrayX<M, R>,
-) {
-    for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
-        let sum = &mut sum.as_mut()[..columns];
-        sum.fill(T::ZERO);
-        for (&weight, rate) in weights.iter().zip(rates) {
-            if weight != T::ZERO {
-                add(weight, rate[row].as_ref(), sum);
-            }
-        }
-        for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
-            *sum = start + h * *sum;
-        }
-    }
 }

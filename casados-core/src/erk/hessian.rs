@@ -1,35 +1,39 @@
 //! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from
 //! the forward sweep and `μ_i` from the adjoint.
 
-use super::step::{Point, Scheme, add, check, directions};
+use super::scheme::{Scheme, directions, is_zero};
+use super::step::{Own, Point, add};
+use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place, Quantity};
+use crate::linalg::{Arithmetic, beside, kernels};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
-use crate::scalar::Real;
+use crate::scalar::Lanes;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
+use core::ops::Range;
 
 /// The Hessian that the stages are added to.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Curvature<M: Ode, T: Real> {
+pub(super) struct Curvature<M: Ode, E: Lanes> {
     /// `∇²(μᵀ f)`, lower triangle.
-    entries: M::Hessian<T>,
+    entries: M::Hessian<[E; 1]>,
     /// `∇²(μᵀ f) D`, of the rows that are not zero.
-    product: ArrayW<M, ArrayW<M, T>>,
+    product: ArrayW<M, ArrayW<M, E>>,
     /// The sum over the stages, upper triangle.
-    pub sum: ArrayW<M, ArrayW<M, T>>,
+    pub sum: ArrayW<M, ArrayW<M, E>>,
 }
 
-impl<M: Ode, T: Real> Curvature<M, T> {
+impl<M: Ode, E: Lanes> Curvature<M, E> {
     /// No stages yet.
     pub fn start(&mut self) {
         for row in self.sum.as_mut() {
-            row.as_mut().fill(T::ZERO);
+            row.as_mut().fill(E::zeroed());
         }
     }
 
     /// Adds a matrix of which the lower triangle is there.
-    pub fn add_lower(&mut self, lower: &[ArrayW<M, T>]) {
+    pub fn add_lower(&mut self, lower: &[ArrayW<M, E>]) {
         for (i, row) in lower.iter().enumerate() {
             for (j, value) in row.as_ref().iter().enumerate().take(i + 1) {
                 let sum = self.sum.as_mut().get_mut(j).and_then(|row| row.as_mut().get_mut(i));
@@ -52,61 +56,174 @@ impl<M: Ode, T: Real> Curvature<M, T> {
     /// Adds `Dᵀ ∇²(μᵀ f) D` at one stage.
     pub fn add<const S: usize>(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        point: &Point<M, T>,
-        mu: &ArrayK<M, T>,
-        dxi: &ArrayX<M, ArrayW<M, T>>,
+        scheme: &Scheme<M, E, S>,
+        point: &mut Point<M, E>,
+        mu: &ArrayK<M, [E; 1]>,
+        dxi: &ArrayX<M, ArrayW<M, E>>,
         at: Place,
     ) -> Result<(), Error> {
-        M::hessian::<T>(&point.v, mu, &mut self.entries);
-        check(self.entries.as_ref(), Quantity::Hessian, at, |entry| M::STRUCTURE.hessian.at(entry).0)?;
-        self.multiply(&scheme.curved, dxi);
-        self.project(&scheme.curved, dxi);
+        let Self { entries, product, sum } = self;
+        M::hessian::<Own<E>>(&point.v, mu, entries);
+        point.check(entries.as_ref().as_flattened(), Quantity::Hessian, at, |entry| {
+            M::STRUCTURE.hessian.at(entry).0
+        })?;
+        multiply::<M, E>(&*entries, &scheme.curved, dxi, product);
+        project::<M, E>(&*product, &scheme.curved, dxi, sum);
         Ok(())
     }
+}
 
+kernels! { by beside;
     /// `product = ∇²(μᵀ f) D`
-    fn multiply(&mut self, curved: &ArrayW<M, bool>, dxi: &ArrayX<M, ArrayW<M, T>>) {
-        let nx = M::Shape::NX;
-        for (row, _) in self.product.as_mut().iter_mut().zip(curved.as_ref()).filter(|(_, curved)| **curved) {
-            row.as_mut().fill(T::ZERO);
+    fn multiply [M: Ode, E: Lanes] [M, E] <A>(
+        entries: &'k M::Hessian<[E; 1]>,
+        curved: &'k ArrayW<M, bool>,
+        dxi: &'k ArrayX<M, ArrayW<M, E>>,
+        product: &'k mut ArrayW<M, ArrayW<M, E>>,
+    ) {
+        for (row, _) in product.as_mut().iter_mut().zip(curved.as_ref()).filter(|(_, curved)| **curved) {
+            row.as_mut().fill(E::zeroed());
         }
-        // Variables u and p move only in their own directions.
-        let mut add_row = |row: usize, value: T, column: usize| {
-            let Some(sum) = self.product.as_mut().get_mut(row) else { return };
-            if let (true, Some(dxi)) = (column < nx, dxi.as_ref().get(column)) {
-                add(value, dxi.as_ref(), sum.as_mut());
-            } else if let Some(sum) = sum.as_mut().get_mut(column) {
-                *sum = *sum + value;
+        if const { E::LANES > 1 } {
+            // Entries lie row by row.
+            let (mut begin, end) = (0, entries.as_ref().len());
+            while begin < end {
+                let row = M::STRUCTURE.hessian.at(begin).0;
+                let last = (begin..end).find(|&entry| M::STRUCTURE.hessian.at(entry).0 != row);
+                let of_row = begin..last.unwrap_or(end);
+                begin = of_row.end;
+                each_tile::<A, _, 8>(0, M::Shape::NW, &mut Product::<M, E> { of_row, entries, dxi, product });
             }
-        };
-        for (entry, &value) in self.entries.as_ref().iter().enumerate() {
+            return;
+        }
+        for (entry, &[value]) in entries.as_ref().iter().enumerate() {
             if let Some((row, column)) = directions::<M>(entry) {
-                add_row(row, value, column);
+                add_row::<A, M, E>(product, row, value, column, dxi);
                 if row != column {
-                    add_row(column, value, row);
+                    add_row::<A, M, E>(product, column, value, row, dxi);
                 }
             }
         }
     }
 
     /// `sum += Dᵀ product`, upper triangle.
-    fn project(&mut self, curved: &ArrayW<M, bool>, dxi: &ArrayX<M, ArrayW<M, T>>) {
+    fn project [M: Ode, E: Lanes] [M, E] <A>(
+        product: &'k ArrayW<M, ArrayW<M, E>>,
+        curved: &'k ArrayW<M, bool>,
+        dxi: &'k ArrayX<M, ArrayW<M, E>>,
+        sum: &'k mut ArrayW<M, ArrayW<M, E>>,
+    ) {
         let (nx, nw) = (M::Shape::NX, M::Shape::NW);
-        for variable in 0..nw {
+        let mut begin = 0;
+        if const { E::LANES > 1 } {
+            for (row, sum) in sum.as_mut().iter_mut().enumerate() {
+                let sum = sum.as_mut();
+                each_tile::<A, _, 8>(row, nw, &mut Projection::<M, E> { row, product, curved, dxi, sum });
+            }
+            begin = nx;
+        }
+        for variable in begin..nw {
             if !curved[variable] {
                 continue;
             }
-            let product = self.product[variable].as_ref();
+            let product = product[variable].as_ref();
             if variable < nx {
                 for (i, &d) in dxi[variable].as_ref().iter().enumerate() {
-                    if d != T::ZERO {
-                        add(d, &product[i..], &mut self.sum[i].as_mut()[i..]);
+                    if !is_zero(d) {
+                        add::<A, E>(d, &product[i..], &mut sum[i].as_mut()[i..]);
                     }
                 }
             } else {
-                add(T::ONE, &product[variable..], &mut self.sum[variable].as_mut()[variable..]);
+                let one = E::from_f64(1.0);
+                add::<A, E>(one, &product[variable..], &mut sum[variable].as_mut()[variable..]);
             }
         }
+    }
+}
+
+/// What the entries of a row add to a [product](multiply), as those of columns too.
+struct Product<'a, M: Ode, E: Lanes> {
+    of_row: Range<usize>,
+    entries: &'a M::Hessian<[E; 1]>,
+    dxi: &'a ArrayX<M, ArrayW<M, E>>,
+    product: &'a mut ArrayW<M, ArrayW<M, E>>,
+}
+
+impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let Self { of_row, entries, dxi, product } = self;
+        let rows = dxi.as_ref();
+        let of = |variable: usize| rows.get(variable).map(|row| row.as_ref());
+        let (row, _) = M::STRUCTURE.hessian.at(of_row.start);
+        let Some(row) = row.checked_sub(M::Shape::NX) else { return };
+        let Some(before) = product.as_ref().get(row) else { return };
+        let mut sum = tiles::load::<E, W>(before.as_ref(), first);
+        for entry in of_row.clone() {
+            let (Some((_, column)), Some(&[value])) = (directions::<M>(entry), entries.as_ref().get(entry))
+            else {
+                continue;
+            };
+            // Variables u and p move only in their own directions.
+            match of(column) {
+                Some(d) => tiles::add::<A, E, W>(&mut sum, value, d, first),
+                None => tiles::add_own(&mut sum, value, first, column),
+            }
+            if row == column {
+                continue;
+            }
+            let Some(other) = product.as_mut().get_mut(column) else { continue };
+            let mut more = tiles::load::<E, W>(other.as_ref(), first);
+            match of(row) {
+                Some(d) => tiles::add::<A, E, W>(&mut more, value, d, first),
+                None => tiles::add_own(&mut more, value, first, row),
+            }
+            tiles::store(&more, other.as_mut(), first);
+        }
+        if let Some(product) = product.as_mut().get_mut(row) {
+            tiles::store(&sum, product.as_mut(), first);
+        }
+    }
+}
+
+/// What states add to a row of the [sum](project).
+struct Projection<'a, M: Ode, E: Lanes> {
+    row: usize,
+    product: &'a ArrayW<M, ArrayW<M, E>>,
+    curved: &'a ArrayW<M, bool>,
+    dxi: &'a ArrayX<M, ArrayW<M, E>>,
+    sum: &'a mut [E],
+}
+
+impl<M: Ode, E: Lanes> AtColumns for Projection<'_, M, E> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = tiles::load::<E, W>(self.sum, first);
+        let curved = self.product.as_ref().iter().zip(self.curved.as_ref());
+        for ((product, &curved), dxi) in curved.zip(self.dxi.as_ref()) {
+            let d = dxi[self.row];
+            if curved && !is_zero(d) {
+                tiles::add::<A, E, W>(&mut sum, d, product.as_ref(), first);
+            }
+        }
+        tiles::store(&sum, self.sum, first);
+    }
+}
+
+/// Adds a row of `D` to one of the product: variables `u` and `p` move only in their own
+/// directions.
+#[inline(always)]
+fn add_row<A: Arithmetic, M: Ode, E: Lanes>(
+    product: &mut ArrayW<M, ArrayW<M, E>>,
+    row: usize,
+    value: E,
+    column: usize,
+    dxi: &ArrayX<M, ArrayW<M, E>>,
+) {
+    let Some(sum) = product.as_mut().get_mut(row) else { return };
+    if let (true, Some(dxi)) = (column < M::Shape::NX, dxi.as_ref().get(column)) {
+        add::<A, E>(value, dxi.as_ref(), sum.as_mut());
+    } else if let Some(sum) = sum.as_mut().get_mut(column) {
+        *sum = *sum + value;
     }
 }

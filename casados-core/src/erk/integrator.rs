@@ -1,22 +1,20 @@
 //! An explicit integrator: how it is made, what is set, simulation. Its derivatives are in
 //! `sensitivities`.
 
-use super::adjoint::Sweep;
-use super::hessian::Curvature;
-use super::step::{Base, Counts, Grid, Record, Scheme};
+use super::engine::Engine;
+use super::scheme::Grid;
 use crate::error::{Argument, Error};
 use crate::integrator::Integrator as _;
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
 use crate::memory::{Fallback, Inline, Memory};
-use crate::model::{ArrayK, ArrayW, Ode, VectorP, VectorU, VectorX};
+use crate::model::{Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
-use crate::result::{Adjoint, ForwardAdjoint, Hessian, Nominal};
+use crate::result::Nominal;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::{Custom, Method, Tableau};
-use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
 /// An explicit Runge-Kutta integrator of model `M` with method `B`, which has `S` stages.
@@ -29,42 +27,11 @@ use core::marker::PhantomData;
 /// let step = erk.forward(&x0, &u, 0.05)?;
 /// ```
 pub struct Integrator<M: Ode, B, const S: usize, T: Real, W: Memory> {
-    pub(super) scheme: Scheme<M, T, S>,
+    pub(super) engine: Engine<M, T, S, W>,
     pub(super) options: Options,
     pub(super) start: T,
     pub(super) parameters_set: bool,
-    pub(super) counts: Counts,
-    pub(super) base: W::Nominal<Base<M, T, S>>,
-    pub(super) adjoint: W::Nominal<AdjointMemory<M, T, S>>,
-    pub(super) trajectory: W::Tape<Record<M, T, S>>,
-    pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,
-    pub(super) hessian: W::Hessian<HessianMemory<M, T>>,
-    pub(super) multipliers: W::HessianTape<[ArrayK<M, T>; S]>,
     method: PhantomData<fn() -> B>,
-}
-
-/// Memory of the adjoint of one seed.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub(super) struct AdjointMemory<M: Ode, T: Real, const S: usize> {
-    pub(super) sweep: Sweep<M, T, [T; 1], S>,
-    pub(super) result: Adjoint<M, T>,
-}
-
-/// Memory of as many directions or seeds as there are directions `w`.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub(super) struct ForwardMemory<M: Ode, T: Real, const S: usize> {
-    pub(super) sweep: Sweep<M, T, ArrayW<M, T>, S>,
-    pub(super) result: ForwardAdjoint<M, T>,
-}
-
-/// Memory of the second order, besides that of the first.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub(super) struct HessianMemory<M: Ode, T: Real> {
-    pub(super) curvature: Curvature<M, T>,
-    pub(super) result: Hessian<M, T>,
 }
 
 #[cfg(feature = "alloc")]
@@ -125,28 +92,14 @@ where
 #[cfg(feature = "alloc")]
 impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
     fn clone(&self) -> Self {
-        let mut base: <Heap as Memory>::Nominal<Base<M, T, S>> = Default::default();
-        let set = self.base.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
+        let mut engine: Engine<M, T, S, Heap> = Engine::of(self.engine.scheme.clone());
+        let set = self.engine.base.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
         let mut parameters_set = M::Shape::NP == 0;
-        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut base)) {
+        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut engine.base)) {
             to.point.v = from.point.v;
             parameters_set = true;
         }
-        let Scheme { a, b, c, rows, curved } = self.scheme;
-        Self {
-            scheme: Scheme { a, b, c, rows, curved },
-            options: self.options,
-            start: self.start,
-            parameters_set,
-            counts: Counts::default(),
-            base,
-            adjoint: Default::default(),
-            trajectory: Default::default(),
-            forward: Default::default(),
-            hessian: Default::default(),
-            multipliers: Default::default(),
-            method: PhantomData,
-        }
+        Self { engine, options: self.options, start: self.start, parameters_set, method: PhantomData }
     }
 }
 
@@ -161,7 +114,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();
 
-    fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
+    pub(crate) fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         options.check()?;
         if let Some(stage) = tableau.first_implicit_stage() {
             return Err(Error::NotExplicit { stage });
@@ -174,17 +127,10 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             });
         }
         Ok(Self {
-            scheme: Scheme::new(tableau),
+            engine: Engine::new(tableau),
             options,
             start: T::ZERO,
             parameters_set: M::Shape::NP == 0,
-            counts: Counts::default(),
-            base: Default::default(),
-            adjoint: Default::default(),
-            trajectory: Default::default(),
-            forward: Default::default(),
-            hessian: Default::default(),
-            multipliers: Default::default(),
             method: PhantomData,
         })
     }
@@ -198,12 +144,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// What the last call did.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
-        Statistics {
-            steps: self.counts.steps,
-            residuals: self.counts.residuals,
-            jacobians: self.counts.jacobians,
-            ..Statistics::default()
-        }
+        self.engine.statistics()
     }
 
     /// The parameters of all later calls.
@@ -212,9 +153,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// [`Error::NonFiniteInput`]; the parameters are as before.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         finite::<M, T>(p.as_slice(), Argument::P)?;
-        let base = W::nominal(&mut self.base)?;
+        let base = W::nominal(&mut self.engine.base)?;
         let first = 2 * M::Shape::NX + M::Shape::NU;
-        base.point.v.as_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
+        base.point.variables_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
         self.parameters_set = true;
         Ok(())
     }
@@ -240,18 +181,16 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
 
     /// Checks the input, and goes to the start of the interval.
     pub(super) fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Grid<T>, Error> {
-        let base = W::nominal(&mut self.base)?;
-        base.point.counts = Counts::default();
-        self.counts = Counts::default();
+        let [state, variables] = self.engine.begin()?;
         if !self.parameters_set {
             return Err(Error::ParametersNotSet);
         }
         finite::<M, T>(x0.as_slice(), Argument::X0)?;
         finite::<M, T>(u.as_slice(), Argument::U)?;
         finite::<M, T>(&[h], Argument::H)?;
-        base.x.as_mut().copy_from_slice(x0.as_slice());
+        state.copy_from_slice(x0.as_slice());
         let first = 2 * M::Shape::NX;
-        base.point.v.as_mut()[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
+        variables[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
         let Options { steps, compensated, .. } = self.options;
         Ok(Grid { start: self.start, h: h / T::from_whole(steps), steps, compensated })
     }
@@ -265,8 +204,4 @@ pub(super) fn finite<M: Ode, T: Real>(values: &[T], argument: Argument) -> Resul
             Err(Error::NonFiniteInput { argument, index, name, value })
         }
     }
-}
-
-pub(super) fn write_state<M: Ode, T: Real, const S: usize>(base: &Base<M, T, S>, result: &mut Nominal<M, T>) {
-    result.x.as_mut_slice().copy_from_slice(base.x.as_ref());
 }

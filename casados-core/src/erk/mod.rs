@@ -11,16 +11,28 @@
 mod adjoint;
 mod along;
 mod calls;
+mod doubt;
+mod engine;
 mod forward;
 mod hessian;
 mod integrator;
+#[cfg(feature = "alloc")]
+mod panels;
+mod scheme;
 mod sensitivities;
 mod step;
+mod sweeps;
+mod tiles;
 
 pub use integrator::Integrator;
-// What steps of variable size are made of too.
+// What steps of variable size are made of too, and batches.
 #[cfg(feature = "alloc")]
-pub(crate) use step::{Grid, Point, Record, Scheme};
+pub(crate) use scheme::{Grid, Scheme};
+#[cfg(feature = "alloc")]
+pub(crate) use step::{Point, Record};
+// What computes a batch.
+#[cfg(feature = "alloc")]
+pub(crate) use {along::Nothing, engine::Engine, panels::Panels};
 
 use crate::memory::Memory;
 use crate::model::Ode;
@@ -70,6 +82,8 @@ impl<const S: usize> Explicit for Custom<S> {
 /// | [`hessian`](Integrator::hessian), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients with second derivatives, or with first ones |
 /// | [`with`](Integrator::with) | integrals along the way |
 /// | [`statistics`](Integrator::statistics) | what the last call did |
+///
+/// Many intervals at once, side by side in registers: [`Batch`](crate::Batch).
 ///
 /// By default, one step in each interval: [`Options`](crate::Options), of which `newton` and
 /// `start` are not read. Units are those of the model; results have its dimensions.

@@ -1,94 +1,34 @@
 //! One step of an explicit method: the stages one after the other, and the end.
 
+use super::along::Beside;
+use super::doubt::{Doubt, ONE_BY_ONE};
+use super::scheme::{Grid, Scheme, is_zero};
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch, dot_compensated, moved};
-use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
-use crate::quadrature::{Along, Integrand};
+use crate::linalg::{Arithmetic, beside, dispatch, dot_compensated, kernels, moved};
+use crate::model::{ArrayK, ArrayV, ArrayX, Ode};
 use crate::result::Nominal;
-use crate::scalar::Real;
-use crate::scalar::lanes::REGISTERS;
-use crate::shape::{Array, Shape};
-use crate::tableau::Tableau;
+use crate::scalar::{Lanes, Strided};
+use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// Which state an equation determines: `ẋ_state = factor · f` where `f` is its residual at `ẋ = 0`.
-#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-pub(crate) struct Row<T> {
-    pub state: usize,
-    pub factor: T,
-}
-
-/// What is the same in every call: the method in the number type, and the form of the model.
-pub(crate) struct Scheme<M: Ode, T: Real, const S: usize> {
-    pub a: [[T; S]; S],
-    pub b: [T; S],
-    pub c: [T; S],
-    /// Of each equation.
-    pub rows: ArrayK<M, Row<T>>,
-    /// Of each direction `w`: whether the model has a second derivative with respect to its
-    /// variable.
-    pub curved: ArrayW<M, bool>,
-}
-
-impl<M: Ode, T: Real, const S: usize> Scheme<M, T, S> {
-    pub fn new(tableau: &Tableau<S>) -> Self {
-        let mut rows = ArrayK::<M, Row<T>>::from_fn(|_| Row { state: 0, factor: T::ZERO });
-        for (state, &(row, coefficient)) in M::ROWS.iter().enumerate() {
-            if let Some(row) = rows.as_mut().get_mut(row as usize) {
-                *row = Row { state, factor: T::from_f64(-1.0 / coefficient) };
-            }
-        }
-        let mut curved = ArrayW::<M, bool>::from_fn(|_| false);
-        for entry in 0..M::STRUCTURE.hessian.len() {
-            let directions = directions::<M>(entry).map(|(row, column)| [row, column]);
-            for direction in directions.into_iter().flatten() {
-                if let Some(curved) = curved.as_mut().get_mut(direction) {
-                    *curved = true;
-                }
-            }
-        }
-        Self {
-            a: tableau.a().map(|row| row.map(T::from_f64)),
-            b: tableau.b().map(T::from_f64),
-            c: tableau.c().map(T::from_f64),
-            rows,
-            curved,
-        }
-    }
-}
-
-/// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the
-/// variables and the directions. `None` for an entry of `ẋ`, which occurs linearly.
-pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
-    let (row, column) = M::STRUCTURE.hessian.at(entry);
-    Some((row.checked_sub(M::Shape::NX)?, column.checked_sub(M::Shape::NX)?))
-}
-
-/// Equal steps from `start`.
-#[derive(Clone, Copy)]
-pub(crate) struct Grid<T> {
-    pub start: T,
-    /// Of one step.
-    pub h: T,
-    pub steps: usize,
-    /// Whether sums over the steps are compensated.
-    pub compensated: bool,
-}
+/// A number, or a register of several, as it lies in the arrays of the model.
+pub(crate) type Own<E> = Strided<E, 1>;
 
 /// One step: its start and the derivatives at its stages.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Record<M: Ode, T: Real, const S: usize> {
-    pub x: ArrayX<M, T>,
-    pub k: [ArrayX<M, T>; S],
+pub(crate) struct Record<M: Ode, E: Lanes, const S: usize> {
+    pub x: ArrayX<M, E>,
+    pub k: [ArrayX<M, E>; S],
 }
 
 /// Variables and residual of the model at one stage. `ẋ` is zero, always.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Point<M: Ode, T: Real> {
-    pub v: ArrayV<M, T>,
-    pub f: ArrayK<M, T>,
+pub(crate) struct Point<M: Ode, E: Lanes> {
+    pub v: ArrayV<M, [E; 1]>,
+    pub f: ArrayK<M, [E; 1]>,
+    pub doubt: Doubt<E>,
     pub counts: Counts,
 }
 
@@ -100,107 +40,199 @@ pub(crate) struct Counts {
     pub jacobians: usize,
 }
 
-impl<M: Ode, T: Real> Point<M, T> {
+impl<M: Ode, E: Lanes> Point<M, E> {
+    /// The variables.
+    pub fn variables(&self) -> &[E] {
+        self.v.as_ref().as_flattened()
+    }
+
+    /// The variables.
+    pub fn variables_mut(&mut self) -> &mut [E] {
+        self.v.as_mut().as_flattened_mut()
+    }
+
     /// Goes to stage `i`: `ξ_i = x_n + h Σ_{j<i} a_ij k_j` at `t_n + c_i h`.
     pub fn go<const S: usize>(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        record: &Record<M, T, S>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        record: &Record<M, E, S>,
         at: Place,
     ) -> Result<(), Error> {
-        let nx = M::Shape::NX;
-        let (Some(a), Some(&c)) = (scheme.a.get(at.stage), scheme.c.get(at.stage)) else { return Ok(()) };
-        let state = &mut self.v.as_mut()[nx..2 * nx];
-        state.fill(T::ZERO);
-        for (&a, k) in a.iter().take(at.stage).zip(&record.k) {
-            if a != T::ZERO {
-                add(a, k.as_ref(), state);
-            }
+        let error = |index| Error::Overflow { step: at.step, index };
+        if let Some(index) = place(scheme, grid, record, at, &mut self.v) {
+            return Err(error(index));
         }
-        for (index, (xi, &x)) in state.iter_mut().zip(record.x.as_ref()).enumerate() {
-            *xi = x + grid.h * *xi;
-            if ONE_BY_ONE && !xi.is_finite() {
-                return Err(Error::Overflow { step: at.step, index });
-            }
+        if const { ONE_BY_ONE && E::LANES == 1 } {
+            return Ok(());
         }
-        if !ONE_BY_ONE && let Some(index) = not_finite(state) {
-            return Err(Error::Overflow { step: at.step, index });
-        }
-        let time = T::from_whole(at.step) + c;
-        self.v[M::Shape::NV - 1] = grid.start + grid.h * time;
-        Ok(())
+        let state = &self.v.as_ref()[M::Shape::NX..2 * M::Shape::NX];
+        self.doubt.check(state.as_flattened(), |index, _| error(index))
     }
 
     /// `k = g` at this point.
     pub fn derivative<const S: usize>(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        k: &mut ArrayX<M, T>,
+        scheme: &Scheme<M, E, S>,
+        k: &mut ArrayX<M, E>,
         at: Place,
     ) -> Result<(), Error> {
         self.counts.residuals += 1;
-        M::residual::<T>(&self.v, &mut self.f);
-        check(self.f.as_ref(), Quantity::Residual, at, |equation| equation)?;
-        self.assign(scheme, k);
+        M::residual::<Own<E>>(&self.v, &mut self.f);
+        self.check_residual(at)?;
+        assign(scheme, &self.f, k);
         Ok(())
     }
 
     /// `k = g` at this point, and the Jacobian of the residual.
     pub fn derivative_jacobian<const S: usize>(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        k: &mut ArrayX<M, T>,
-        jacobian: &mut M::Jacobian<T>,
+        scheme: &Scheme<M, E, S>,
+        k: &mut ArrayX<M, E>,
+        jacobian: &mut M::Jacobian<[E; 1]>,
         at: Place,
     ) -> Result<(), Error> {
         self.jacobian(jacobian, at)?;
-        self.assign(scheme, k);
+        assign(scheme, &self.f, k);
         Ok(())
     }
 
     /// The residual and its Jacobian at this point.
-    pub fn jacobian(&mut self, jacobian: &mut M::Jacobian<T>, at: Place) -> Result<(), Error> {
+    pub fn jacobian(&mut self, jacobian: &mut M::Jacobian<[E; 1]>, at: Place) -> Result<(), Error> {
         self.counts.jacobians += 1;
-        M::residual_jacobian::<T>(&self.v, &mut self.f, jacobian);
-        check(self.f.as_ref(), Quantity::Residual, at, |equation| equation)?;
-        check(jacobian.as_ref(), Quantity::Jacobian, at, |entry| M::STRUCTURE.jacobian.at(entry).0)
+        M::residual_jacobian::<Own<E>>(&self.v, &mut self.f, jacobian);
+        self.check_residual(at)?;
+        self.check(jacobian.as_ref().as_flattened(), Quantity::Jacobian, at, |entry| {
+            M::STRUCTURE.jacobian.at(entry).0
+        })
     }
 
-    /// The variables to where an integrand takes them from.
-    pub fn show(&self, integrand: &mut dyn Integrand<M, T>) {
-        for (to, from) in integrand.point().0.iter_mut().zip(self.v.as_ref()) {
-            *to = *from;
+    fn check_residual(&mut self, at: Place) -> Result<(), Error> {
+        let Self { f, doubt, .. } = self;
+        check(doubt, f.as_ref().as_flattened(), Quantity::Residual, at, |equation| equation)
+    }
+
+    /// A value of the model that is not finite is an error, or doubted.
+    pub fn check(
+        &mut self,
+        values: &[E],
+        quantity: Quantity,
+        at: Place,
+        equation: impl FnOnce(usize) -> usize,
+    ) -> Result<(), Error> {
+        check(&mut self.doubt, values, quantity, at, equation)
+    }
+}
+
+fn check<E: Lanes>(
+    doubt: &mut Doubt<E>,
+    values: &[E],
+    quantity: Quantity,
+    at: Place,
+    equation: impl FnOnce(usize) -> usize,
+) -> Result<(), Error> {
+    doubt.check(values, |index, value| Error::NonFiniteModel {
+        quantity,
+        equation: equation(index),
+        value,
+        at,
+    })
+}
+
+kernels! { by beside;
+    /// The state of a stage and its time. The first state that is not finite, where they are looked
+    /// at one by one.
+    fn place [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        grid: &'k Grid<E>,
+        record: &'k Record<M, E, S>,
+        at: Place,
+        v: &'k mut ArrayV<M, [E; 1]>,
+    ) -> Option<usize> {
+        let nx = M::Shape::NX;
+        let v = v.as_mut().as_flattened_mut();
+        let (a, c) = (scheme.a.get(at.stage)?, scheme.c.get(at.stage)?);
+        let state = &mut v[nx..2 * nx];
+        state.fill(E::zeroed());
+        for (&a, k) in a.iter().take(at.stage).zip(&record.k) {
+            if !is_zero(a) {
+                add::<A, E>(a, k.as_ref(), state);
+            }
         }
+        for (index, (xi, &x)) in state.iter_mut().zip(record.x.as_ref()).enumerate() {
+            *xi = A::add(x, grid.h, *xi);
+            if const { ONE_BY_ONE && E::LANES == 1 } && !E::all(xi.is_finite()) {
+                return Some(index);
+            }
+        }
+        let time = E::from_whole(at.step) + *c;
+        v[M::Shape::NV - 1] = A::add(grid.start, grid.h, time);
+        None
     }
 
-    fn assign<const S: usize>(&self, scheme: &Scheme<M, T, S>, k: &mut ArrayX<M, T>) {
-        for (row, &f) in scheme.rows.as_ref().iter().zip(self.f.as_ref()) {
+    /// What the equations say of the derivatives.
+    fn assign [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        f: &'k ArrayK<M, [E; 1]>,
+        k: &'k mut ArrayX<M, E>,
+    ) {
+        for (row, &[f]) in scheme.rows.as_ref().iter().zip(f.as_ref()) {
             if let Some(k) = k.as_mut().get_mut(row.state) {
                 *k = row.factor * f;
             }
         }
     }
+
+    /// `x_{n+1} = x_n + h Σ_i b_i k_i`
+    fn advance [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        h: &'k E,
+        record: &'k Record<M, E, S>,
+        end: &'k mut ArrayX<M, E>,
+    ) {
+        end.as_mut().fill(E::zeroed());
+        for (&b, k) in scheme.b.iter().zip(&record.k) {
+            add::<A, E>(b, k.as_ref(), end.as_mut());
+        }
+        for (end, &x) in end.as_mut().iter_mut().zip(record.x.as_ref()) {
+            *end = A::add(x, *h, *end);
+        }
+    }
 }
 
-impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
+kernels! { by dispatch;
+    /// `end + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+    fn advance_compensated [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        h: &'k E,
+        record: &'k Record<M, E, S>,
+        end: &'k mut [E],
+        rest: &'k mut [E],
+    ) {
+        let x = record.x.as_ref().iter();
+        for (index, ((end, rest), &x)) in end.iter_mut().zip(rest).zip(x).enumerate() {
+            let slopes = record.k.iter().filter_map(|k| k.as_ref().get(index));
+            let slope = dot_compensated::<A, E>(scheme.b.iter().zip(slopes));
+            [*end, *rest] = moved::<A, E>([x, *rest], *h, slope);
+        }
+    }
+}
+
+impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
     /// All stages of the step.
     pub fn stages(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        point: &mut Point<M, T>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        point: &mut Point<M, E>,
         step: usize,
-        along: &mut Along<'_, '_, M, T>,
+        along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, self, at)?;
             point.derivative(scheme, &mut self.k[stage], at)?;
-            if let Some(integrand) = along {
-                point.show(&mut **integrand);
-                integrand.value(grid.h * scheme.b[stage], at)?;
-            }
+            along.value(point.variables(), [grid.h, scheme.b[stage]], at)?;
         }
         Ok(())
     }
@@ -209,86 +241,54 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
     /// compensated.
     pub fn end(
         &self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
         step: usize,
-        end: &mut ArrayX<M, T>,
-        rest: Option<&mut ArrayX<M, T>>,
+        end: &mut ArrayX<M, E>,
+        rest: Option<&mut ArrayX<M, E>>,
+        doubt: &mut Doubt<E>,
     ) -> Result<(), Error> {
         match rest {
-            None => {
-                end.as_mut().fill(T::ZERO);
-                for (&b, k) in scheme.b.iter().zip(&self.k) {
-                    add(b, k.as_ref(), end.as_mut());
-                }
-                for (end, &x) in end.as_mut().iter_mut().zip(self.x.as_ref()) {
-                    *end = x + grid.h * *end;
-                }
-            }
+            None => advance(scheme, &grid.h, self, end),
             Some(rest) => {
                 if step == 0 {
-                    rest.as_mut().fill(T::ZERO);
+                    rest.as_mut().fill(E::zeroed());
                 }
-                let (end, rest) = (end.as_mut(), rest.as_mut());
-                dispatch(EndCompensated { end, rest, record: self, b: &scheme.b, h: grid.h });
+                advance_compensated(scheme, &grid.h, self, end.as_mut(), rest.as_mut());
             }
         }
-        match not_finite(end.as_ref()) {
-            Some(index) => Err(Error::Overflow { step, index }),
-            None => Ok(()),
-        }
-    }
-}
-
-/// `end + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
-struct EndCompensated<'a, M: Ode, T: Real, const S: usize> {
-    end: &'a mut [T],
-    rest: &'a mut [T],
-    record: &'a Record<M, T, S>,
-    b: &'a [T; S],
-    h: T,
-}
-
-impl<M: Ode, T: Real, const S: usize> Kernel for EndCompensated<'_, M, T, S> {
-    type Number = T;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { end, rest, record, b, h } = self;
-        let x = record.x.as_ref().iter();
-        for (index, ((end, rest), &x)) in end.iter_mut().zip(rest).zip(x).enumerate() {
-            let slopes = record.k.iter().filter_map(|k| k.as_ref().get(index));
-            [*end, *rest] = moved::<A, T>([x, *rest], h, dot_compensated::<A, T>(b.iter().zip(slopes)));
-        }
+        doubt.check(end.as_ref(), |index, _| Error::Overflow { step, index })
     }
 }
 
 /// What every call needs.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Base<M: Ode, T: Real, const S: usize> {
-    pub point: Point<M, T>,
-    pub record: Record<M, T, S>,
+pub(crate) struct Base<M: Ode, E: Lanes, const S: usize> {
+    pub point: Point<M, E>,
+    pub record: Record<M, E, S>,
     /// The state at the end of the step.
-    pub x: ArrayX<M, T>,
+    pub x: ArrayX<M, E>,
     /// What was rounded off from it, if sums are compensated.
-    pub rest: ArrayX<M, T>,
-    pub result: Nominal<M, T>,
+    pub rest: ArrayX<M, E>,
+    pub result: Nominal<M, E>,
 }
 
-impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
+impl<M: Ode, E: Lanes, const S: usize> Base<M, E, S> {
     /// All steps, from `x` to `x`, with an integrand or without.
     pub fn run(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        along: &mut Along<'_, '_, M, T>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
+        let Self { point, record, x, rest, .. } = self;
         for step in 0..grid.steps {
-            self.record.x = self.x;
-            self.record.stages(scheme, grid, &mut self.point, step, along)?;
-            self.record.end(scheme, grid, step, &mut self.x, grid.compensated.then_some(&mut self.rest))?;
-            self.point.counts.steps += 1;
+            record.x = *x;
+            record.stages(scheme, grid, point, step, along)?;
+            let rest = grid.compensated.then_some(&mut *rest);
+            record.end(scheme, grid, step, x, rest, &mut point.doubt)?;
+            point.counts.steps += 1;
         }
         Ok(())
     }
@@ -296,16 +296,18 @@ impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
     /// All steps, from `x` to `x`, each of them kept; with an integrand or without.
     pub fn record(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        records: &mut [Record<M, T, S>],
-        along: &mut Along<'_, '_, M, T>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        records: &mut [Record<M, E, S>],
+        along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
+        let Self { point, x, rest, .. } = self;
         for (step, record) in records.iter_mut().enumerate() {
-            record.x = self.x;
-            record.stages(scheme, grid, &mut self.point, step, along)?;
-            record.end(scheme, grid, step, &mut self.x, grid.compensated.then_some(&mut self.rest))?;
-            self.point.counts.steps += 1;
+            record.x = *x;
+            record.stages(scheme, grid, point, step, along)?;
+            let rest = grid.compensated.then_some(&mut *rest);
+            record.end(scheme, grid, step, x, rest, &mut point.doubt)?;
+            point.counts.steps += 1;
         }
         Ok(())
     }
@@ -313,33 +315,8 @@ impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
 
 /// `sum += a y`
 #[inline(always)]
-pub(super) fn add<T: Real>(a: T, y: &[T], sum: &mut [T]) {
+pub(super) fn add<A: Arithmetic, E: Lanes>(a: E, y: &[E], sum: &mut [E]) {
     for (sum, &y) in sum.iter_mut().zip(y) {
-        *sum = *sum + a * y;
-    }
-}
-
-/// Whether numbers are looked at one by one. Where registers take several of them all are, without
-/// a branch for each.
-const ONE_BY_ONE: bool = !REGISTERS;
-
-/// The first value that is infinite or NaN.
-#[inline(always)]
-fn not_finite<T: Real>(values: &[T]) -> Option<usize> {
-    if !ONE_BY_ONE && are_finite(values) { None } else { values.iter().position(|value| !value.is_finite()) }
-}
-
-/// The first value that is not finite is an error.
-pub(super) fn check<T: Real>(
-    values: &[T],
-    quantity: Quantity,
-    at: Place,
-    equation: impl FnOnce(usize) -> usize,
-) -> Result<(), Error> {
-    match not_finite(values) {
-        None => Ok(()),
-        Some(i) => {
-            Err(Error::NonFiniteModel { quantity, equation: equation(i), value: values[i].to_f64(), at })
-        }
+        *sum = A::add(*sum, a, y);
     }
 }

@@ -26,7 +26,7 @@ mod transformed;
 pub(crate) use block::{Packet, coupling, subtract, subtract_diagonal, subtract_transposed};
 pub(crate) use kernel::{
     arithmetic::{Arithmetic, Block},
-    dispatch::{Kernel, dispatch, kernels},
+    dispatch::{Kernel, beside, dispatch, kernels},
     double_double::{dot_compensated, moved, two_product},
     prefetch::Ahead,
     unroll::{AtRow, each_row, is_long, is_short},

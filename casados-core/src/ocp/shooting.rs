@@ -1,6 +1,6 @@
 //! A batch as dynamics: all intervals in one call.
 
-use super::begin::{Begin, at};
+use super::begin::at;
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
 use super::inside::Inside;
@@ -8,7 +8,7 @@ use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
 use super::single::{names, origin};
-use crate::batch::{BatchError, Integrator, Intervals};
+use crate::batch::{BatchError, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -35,38 +35,38 @@ use alloc::vec::Vec;
 /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
-    batch: Integrator<M, B, S, T>,
-    x: Vec<VectorX<M, T>>,
-    u: Vec<VectorU<M, T>>,
-    p: Vec<VectorP<M, T>>,
-    h: Vec<T>,
-    t: Vec<T>,
-    lambda: Vec<VectorX<M, T>>,
-    nu: Vec<VectorZ<M, T>>,
-    nominal: Vec<Nominal<M, T>>,
-    forward: Vec<Forward<M, T>>,
-    hessian: Vec<Hessian<M, T>>,
-    adjoint: Vec<Adjoint<M, T>>,
+pub struct Shooting<I: Single> {
+    batch: Integrator<I>,
+    x: Vec<VectorX<I::Model, I::Number>>,
+    u: Vec<VectorU<I::Model, I::Number>>,
+    p: Vec<VectorP<I::Model, I::Number>>,
+    h: Vec<I::Number>,
+    t: Vec<I::Number>,
+    lambda: Vec<VectorX<I::Model, I::Number>>,
+    nu: Vec<VectorZ<I::Model, I::Number>>,
+    nominal: Vec<Nominal<I::Model, I::Number>>,
+    forward: Vec<Forward<I::Model, I::Number>>,
+    hessian: Vec<Hessian<I::Model, I::Number>>,
+    adjoint: Vec<Adjoint<I::Model, I::Number>>,
 }
 
-impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Shooting<M, B, S, T> {
+impl<I: Single> core::fmt::Debug for Shooting<I> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Shooting").field("batch", &self.batch).finish_non_exhaustive()
     }
 }
 
 /// A batch with the same options, and memory of its own.
-impl<M: Dae, B, const S: usize, T: Real> Clone for Shooting<M, B, S, T> {
+impl<I: Single> Clone for Shooting<I> {
     fn clone(&self) -> Self {
         Self::new(self.batch.clone())
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
+impl<I: Single> Shooting<I> {
     /// Memory for the intervals is allocated by the first call of its kind.
     #[must_use]
-    pub fn new(batch: Integrator<M, B, S, T>) -> Self {
+    pub fn new(batch: Integrator<I>) -> Self {
         Self {
             batch,
             x: Vec::new(),
@@ -84,13 +84,13 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
     }
 
     /// The batch.
-    pub fn batch(&mut self) -> &mut Integrator<M, B, S, T> {
+    pub fn batch(&mut self) -> &mut Integrator<I> {
         &mut self.batch
     }
 
     /// Copies the intervals to where the batch takes them from, and their multipliers if they are
     /// asked for.
-    fn take(&mut self, nodes: &Nodes<'_, T>, multipliers: bool) -> Result<(), OcpError> {
+    fn take(&mut self, nodes: &Nodes<'_, I::Number>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
         reserve(&mut self.x, n)?;
         reserve(&mut self.u, n)?;
@@ -102,7 +102,7 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
         for interval in nodes.iter() {
             self.x.push(vector(interval.x));
             self.u.push(vector(interval.u));
-            if <M::Shape as Shape>::NP > 0 {
+            if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
                 self.p.push(vector(interval.p));
             }
             self.h.push(interval.h);
@@ -145,11 +145,11 @@ fn failed(error: BatchError) -> OcpError {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
-    type Shape = M::Shape;
-    const NAMES: Names = names::<M>();
+impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
+    type Shape = <I::Model as Dae>::Shape;
+    const NAMES: Names = names::<I::Model>();
     const ALGEBRAIC: bool = true;
-    const ORIGIN: Origin = origin::<M>();
+    const ORIGIN: Origin = origin::<I::Model>();
 
     #[cfg(feature = "casadi")]
     fn keep_stages(&mut self, solved: bool) -> bool {
@@ -192,7 +192,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> Adjoints<T> for Shooting<M, B, S, T> {
+impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
     fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, true)?;
         places(&mut self.adjoint, nodes.len())?;
@@ -206,7 +206,7 @@ impl<M: Dae, B, const S: usize, T: Real> Adjoints<T> for Shooting<M, B, S, T> {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Shooting<M, B, S, T> {
+impl<I: Single<Number = T> + Inside<T>, T: Real> SecondOrder<T> for Shooting<I> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, true)?;
         places(&mut self.hessian, nodes.len())?;

@@ -17,6 +17,11 @@ pub trait Arithmetic {
     const WIDE: bool = false;
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
+    /// `t + a b`
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn add<E: Field>(t: E, a: E, b: E) -> E {
+        if Self::FUSED { Self::subtract(t, -a, b) } else { t + a * b }
+    }
     /// `target − left · right`
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_blocks<E: Field, const S: usize>(
@@ -65,10 +70,8 @@ pub trait Arithmetic {
 }
 
 /// Rounded twice.
-#[cfg(any(test, not(target_arch = "aarch64")))]
 pub struct Separate;
 
-#[cfg(any(test, not(target_arch = "aarch64")))]
 impl Arithmetic for Separate {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {

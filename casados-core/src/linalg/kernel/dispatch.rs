@@ -8,7 +8,6 @@
 use super::arithmetic::Arithmetic;
 #[cfg(target_arch = "aarch64")]
 use super::arithmetic::Fused;
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 use super::arithmetic::Separate;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level};
@@ -30,9 +29,10 @@ pub trait Kernel {
 }
 
 /// Functions that are kernels: `fn name [generics] [their names] <A>(arguments) { … }`, with the
-/// lifetime `'k`, numbers `E` and the arithmetic `A`.
+/// lifetime `'k`, numbers `E` and the arithmetic `A`. What runs them is [`dispatch`], or said
+/// before them: `by run;`.
 macro_rules! kernels {
-    ($(
+    (by $run:path; $(
         $(#[$meta:meta])*
         $visibility:vis fn $name:ident [$($generics:tt)*] [$($names:tt)*] <$arithmetic:ident>(
             $($argument:ident: $type:ty),* $(,)?
@@ -53,13 +53,21 @@ macro_rules! kernels {
                     $body
                 }
             }
-            $crate::linalg::dispatch(Call::<'k, $($names)*> { $($argument),* })
+            $run(Call::<'k, $($names)*> { $($argument),* })
         }
     )* };
     (@output $output:ty) => { $output };
     (@output) => { () };
+    ($($kernels:tt)*) => { $crate::linalg::kernels!(by $crate::linalg::dispatch; $($kernels)*); };
 }
 pub(crate) use kernels;
+
+/// Runs a kernel on registers as [`dispatch`] does, and one on single numbers as all code around it
+/// is compiled: where that is more than kernels could save.
+#[inline(always)]
+pub fn beside<K: Kernel>(kernel: K) -> K::Output {
+    if const { align_of::<K::Number>() < 32 } { kernel.run::<Separate>() } else { dispatch(kernel) }
+}
 
 /// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
 /// side by side.
@@ -71,8 +79,7 @@ pub(crate) use kernels;
 #[allow(unsafe_code)]
 mod compiled {
     pub mod base {
-        use super::super::Kernel;
-        use crate::linalg::kernel::arithmetic::Separate;
+        use super::super::{Kernel, Separate};
 
         // Never inlined beside others, so that callers are small. Where it is the only one, the
         // optimiser is to see from outside that nothing in it panics.

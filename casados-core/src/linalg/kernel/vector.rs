@@ -1,6 +1,6 @@
 //! The inner loops.
 
-use crate::scalar::{Field, Real};
+use crate::scalar::{Field, Lanes};
 
 /// `y += a x`
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -21,10 +21,10 @@ pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
 /// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD
 /// loop.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(crate) fn are_finite<T: Real>(values: &[T]) -> bool {
-    let mut finite = true;
+pub(crate) fn are_finite<E: Lanes>(values: &[E]) -> bool {
+    let mut finite = E::le(E::zeroed(), E::zeroed());
     for value in values {
-        finite &= value.is_finite();
+        finite = E::and(finite, value.is_finite());
     }
-    finite
+    E::all(finite)
 }

@@ -3,41 +3,42 @@
 //! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy
 //! their equations; lanes never mix, so that one that fails takes nobody with it.
 
-use super::intervals::Interval;
-use super::lanes::{MOST_LANES, Unpack, Verdict, pack, yes};
+use crate::batch::intervals::Interval;
+use crate::batch::lanes::{MOST_LANES, Unpack, Verdict, pack, yes};
+use crate::batch::single::{self, gather};
 use crate::error::Error;
 use crate::irk::{
-    AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess, Linearization,
-    StageEquations, Step, StepOf, Work, multiply,
+    self, AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess,
+    Linearization, StageEquations, Step, StepOf, Work, multiply,
 };
 use crate::linalg::dispatch;
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayX, Dae, VectorZ};
 use crate::options::{Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use crate::scalar::Lanes;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::scalar::{Lanes, Real};
+use crate::shape::{Matrix, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::Tableau;
+use core::slice::{from_mut, from_ref};
 
 type Place<V> = <Heap as Memory>::Nominal<V>;
 type Places<V> = <Heap as Memory>::Tape<V>;
-
-/// The stages of all steps of an interval.
-pub type Record<'a, M, T, const S: usize> = &'a [ArrayK<M, [T; S]>];
 
 /// A group of intervals, and the memory that it needs.
 pub struct Group<M: Dae, E: Lanes, const S: usize> {
     options: Options,
     coefficients: Coefficients<E, S>,
-    pub statistics: Statistics,
+    statistics: Statistics,
     work: Place<Work<M, E, S>>,
     steps: Places<Step<M, E, S>>,
     /// Whether start values were given.
     given: bool,
     /// The warm start, or solutions.
     record: Places<Step<M, E, S>>,
-    pub solved: bool,
+    /// Whether all lanes have stages of earlier calls, and whether those are solutions.
+    warm: bool,
+    solved: bool,
     lambda: Place<ArrayX<M, E>>,
     /// Weights of the algebraic states at the start, and whether there are any.
     nu: Place<VectorZ<M, E>>,
@@ -60,12 +61,12 @@ struct Pass<'a, M: Dae, E: Lanes, const S: usize> {
 
 /// Opens what every pass needs.
 macro_rules! pass {
-    ($group:ident, $warm:ident) => {{
+    ($group:ident) => {{
         $group.statistics = Statistics::default();
         let count = $group.options.steps;
         let from = match $group.options.start {
             _ if $group.solved => InitialGuess::Solution(Heap::tape(&mut $group.record, count)?),
-            Start::Warm if $warm => InitialGuess::Previous(Heap::tape(&mut $group.record, count)?),
+            Start::Warm if $group.warm => InitialGuess::Previous(Heap::tape(&mut $group.record, count)?),
             Start::Zero => InitialGuess::Zero,
             _ if $group.given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
@@ -81,117 +82,8 @@ macro_rules! pass {
     }};
 }
 impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
-    pub fn new(options: &Options, tableau: &Tableau<S>) -> Self {
-        Self {
-            options: *options,
-            coefficients: Coefficients::new(*tableau, true),
-            statistics: Statistics::default(),
-            work: Default::default(),
-            steps: Default::default(),
-            given: false,
-            record: Default::default(),
-            solved: false,
-            lambda: Default::default(),
-            nu: Default::default(),
-            weighted: false,
-            forward: Default::default(),
-            adjoint: Default::default(),
-            hessian: Default::default(),
-            tape: Default::default(),
-        }
-    }
-
-    /// Puts an interval into each lane; `given` are start values for Newton's method, and `records`
-    /// the stages of earlier solutions, if all lanes have them.
-    pub fn place<T: Plain>(
-        &mut self,
-        intervals: &[&Interval<'_, M, T>],
-        given: Option<[&[T]; 2]>,
-        records: Option<&[Record<'_, M, T, S>]>,
-    ) -> Result<(), Error>
-    where
-        E::Cell: AsMut<[T]>,
-    {
-        let count = self.options.steps;
-        let work = Heap::nominal(&mut self.work)?;
-        work.prepare();
-        let mut from: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
-        macro_rules! pack {
-            ($to:expr, |$interval:ident| $slice:expr) => {
-                let to: &mut [E] = $to;
-                if !to.is_empty() {
-                    for (from, $interval) in from.iter_mut().zip(intervals) {
-                        *from = $slice;
-                    }
-                    pack(&from, to);
-                }
-            };
-        }
-        pack!(work.x.as_mut(), |interval| interval.x0.as_slice());
-        pack!(work.inputs.u.as_mut_slice(), |interval| interval.u);
-        pack!(work.inputs.p.as_mut_slice(), |interval| interval.p);
-        pack!(core::slice::from_mut(&mut work.inputs.time.interval), |interval| core::slice::from_ref(
-            &interval.h
-        ));
-        pack!(core::slice::from_mut(&mut work.inputs.time.start), |interval| core::slice::from_ref(
-            &interval.t0
-        ));
-        let time = &mut work.inputs.time;
-        time.step = time.interval / E::from_f64(count as f64);
-        self.given = given.is_some();
-        let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
-        for (given, to) in given.iter().flatten().zip([xdot, z]) {
-            pack(&[*given; MOST_LANES], to);
-        }
-        pack!(Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
-        // All of them have some, or none.
-        self.weighted = intervals.iter().all(|interval| !interval.nu.is_empty());
-        if self.weighted {
-            pack!(Heap::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
-        }
-        Heap::tape(&mut self.steps, count)?;
-        let Some(records) = records else { return Ok(()) };
-        for (n, step) in Heap::tape(&mut self.record, count)?.iter_mut().enumerate() {
-            for (from, record) in from.iter_mut().zip(records) {
-                *from = record.get(n).map_or(&[], |y| y.as_ref().as_flattened());
-            }
-            pack(&from, step.y.as_mut().as_flattened_mut());
-        }
-        Ok(())
-    }
-
-    /// The stages of a lane in the last pass.
-    pub fn record<T: Plain>(&mut self, lane: usize, record: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error>
-    where
-        E::Cell: AsRef<[T]>,
-    {
-        for (y, step) in record.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
-            let mut to: [&mut [T]; MOST_LANES] = Default::default();
-            if let Some(to) = to.get_mut(lane) {
-                *to = y.as_mut().as_flattened_mut();
-            }
-            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
-        }
-        Ok(())
-    }
-
-    pub fn solve(&mut self, warm: bool) -> Verdict<'_, E, Nominal<M, E>> {
-        let mut pass = pass!(self, warm);
-        let good = pass.run(&mut [], |_, _, _, _, _| yes::<E>());
-        Ok((good, &pass.work.result))
-    }
-
-    pub fn forward(&mut self, warm: bool) -> Verdict<'_, E, Forward<M, E>> {
-        let (good, result) = self.differentiate(warm, false)?;
-        Ok((good, &result.forward))
-    }
-
-    pub fn forward_adjoint(&mut self, warm: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
-        self.differentiate(warm, true)
-    }
-
-    fn differentiate(&mut self, warm: bool, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
-        let mut pass = pass!(self, warm);
+    fn differentiate(&mut self, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+        let mut pass = pass!(self);
         let ForwardMemory { result, pass: forward, .. } = Heap::forward(&mut self.forward)?;
         let count = pass.steps.len();
         let good = pass.run(&mut [], |pass, n, step, exact, _| {
@@ -211,9 +103,102 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         }
         Ok((good, result))
     }
+}
 
-    pub fn adjoint(&mut self, warm: bool) -> Verdict<'_, E, Adjoint<M, E>> {
-        let mut pass = pass!(self, warm);
+impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize>
+    single::Group<irk::Integrator<M, B, S, T, Heap>, E> for Group<M, E, S>
+{
+    fn new(options: &Options, tableau: &Tableau<S>) -> Self {
+        Self {
+            options: *options,
+            coefficients: Coefficients::new(*tableau, true),
+            statistics: Statistics::default(),
+            work: Default::default(),
+            steps: Default::default(),
+            given: false,
+            record: Default::default(),
+            warm: false,
+            solved: false,
+            lambda: Default::default(),
+            nu: Default::default(),
+            weighted: false,
+            forward: Default::default(),
+            adjoint: Default::default(),
+            hessian: Default::default(),
+            tape: Default::default(),
+        }
+    }
+
+    fn place(
+        &mut self,
+        intervals: &[&Interval<'_, M, T>],
+        given: Option<[&[T]; 2]>,
+        stages: Option<&[&[ArrayK<M, [T; S]>]; MOST_LANES]>,
+        solved: bool,
+    ) -> Result<(), Error> {
+        let count = self.options.steps;
+        let work = Heap::nominal(&mut self.work)?;
+        work.prepare();
+        let time = &mut work.inputs.time;
+        gather(intervals, work.x.as_mut(), |interval| interval.x0.as_slice());
+        gather(intervals, work.inputs.u.as_mut_slice(), |interval| interval.u);
+        gather(intervals, work.inputs.p.as_mut_slice(), |interval| interval.p);
+        gather(intervals, from_mut(&mut time.interval), |interval| from_ref(&interval.h));
+        gather(intervals, from_mut(&mut time.start), |interval| from_ref(&interval.t0));
+        time.step = time.interval / E::from_f64(count as f64);
+        self.given = given.is_some();
+        let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
+        for (given, to) in given.iter().flatten().zip([xdot, z]) {
+            pack(&[*given; MOST_LANES], to);
+        }
+        gather(intervals, Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
+        // All of them have some, or none.
+        self.weighted = intervals.iter().all(|interval| !interval.nu.is_empty());
+        if self.weighted {
+            gather(intervals, Heap::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
+        }
+        Heap::tape(&mut self.steps, count)?;
+        (self.warm, self.solved) = (stages.is_some(), stages.is_some() && solved);
+        let Some(stages) = stages else { return Ok(()) };
+        for (n, step) in Heap::tape(&mut self.record, count)?.iter_mut().enumerate() {
+            let from = stages.map(|stages| stages.get(n).map_or(&[][..], |y| y.as_ref().as_flattened()));
+            pack(&from, step.y.as_mut().as_flattened_mut());
+        }
+        Ok(())
+    }
+
+    fn stages(&mut self, lane: usize, stages: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        for (y, step) in stages.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
+            let mut to: [&mut [T]; MOST_LANES] = Default::default();
+            if let Some(to) = to.get_mut(lane) {
+                *to = y.as_mut().as_flattened_mut();
+            }
+            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
+        }
+        Ok(())
+    }
+
+    fn work(&self) -> Statistics {
+        self.statistics
+    }
+
+    fn solve(&mut self) -> Verdict<'_, E, Nominal<M, E>> {
+        let mut pass = pass!(self);
+        let good = pass.run(&mut [], |_, _, _, _, _| yes::<E>());
+        Ok((good, &pass.work.result))
+    }
+
+    fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
+        let (good, result) = self.differentiate(false)?;
+        Ok((good, &result.forward))
+    }
+
+    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+        self.differentiate(true)
+    }
+
+    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
+        let mut pass = pass!(self);
         let adjoint = Heap::nominal(&mut self.adjoint)?;
         let lambda = Heap::nominal(&mut self.lambda)?;
         let count = pass.steps.len();
@@ -237,8 +222,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         Ok((good, &adjoint.result))
     }
 
-    pub fn hessian(&mut self, warm: bool) -> Verdict<'_, E, Hessian<M, E>> {
-        let mut pass = pass!(self, warm);
+    fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
+        let mut pass = pass!(self);
         let forward = &mut Heap::forward(&mut self.forward)?.pass;
         let HessianMemory { result, pass: hessian } = Heap::hessian(&mut self.hessian)?;
         let lambda = Heap::nominal(&mut self.lambda)?;

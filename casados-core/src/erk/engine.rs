@@ -1,0 +1,320 @@
+//! What computes: with single numbers one interval, with registers several of them side by side.
+
+use super::adjoint::{Multipliers, Sweep, Way};
+use super::along::{Beside, Nothing};
+use super::doubt::Doubt;
+use super::forward::{Variation, write};
+use super::hessian::Curvature;
+use super::scheme::{Grid, Scheme};
+use super::step::{Base, Counts, Record};
+use super::sweeps::Sweeps;
+use crate::error::Error;
+use crate::linalg::{beside, kernels};
+use crate::memory::{Memory, WithForward, WithHessian};
+use crate::model::{ArrayW, ArrayX, Ode};
+use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
+use crate::scalar::{Field, Lanes};
+use crate::shape::{Array, Matrix, Shape};
+use crate::statistics::Statistics;
+use crate::tableau::Tableau;
+use bytemuck::Zeroable;
+
+/// What a call answers, and the lanes for which it is good: those all of whose values were finite.
+pub(crate) type Verdict<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
+
+/// The base of a call with derivatives, and where these are.
+type Differentiated<'a, M, E, const S: usize> = (&'a mut Base<M, E, S>, &'a mut ForwardMemory<M, E, S>);
+
+/// The method, and the memory of its calls.
+pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
+    pub(super) scheme: Scheme<M, E, S>,
+    pub(super) counts: Counts,
+    pub(super) base: W::Nominal<Base<M, E, S>>,
+    pub(super) adjoint: W::Nominal<AdjointMemory<M, E, S>>,
+    pub(super) trajectory: W::Tape<Record<M, E, S>>,
+    pub(super) forward: W::Forward<ForwardMemory<M, E, S>>,
+    pub(super) hessian: W::Hessian<HessianMemory<M, E>>,
+    pub(super) multipliers: W::HessianTape<Multipliers<M, E, S>>,
+}
+
+/// Memory of the adjoint of one seed.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct AdjointMemory<M: Ode, E: Lanes, const S: usize> {
+    pub(super) sweep: Sweep<M, E, [E; 1], S>,
+    pub(super) result: Adjoint<M, E>,
+}
+
+/// Memory of as many directions or seeds as there are directions `w`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct ForwardMemory<M: Ode, E: Lanes, const S: usize> {
+    pub(super) sweep: Sweep<M, E, ArrayW<M, E>, S>,
+    pub(super) result: ForwardAdjoint<M, E>,
+}
+
+/// Memory of the second order, besides that of the first.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct HessianMemory<M: Ode, E: Lanes> {
+    pub(super) curvature: Curvature<M, E>,
+    pub(super) result: Hessian<M, E>,
+}
+
+impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
+    pub fn new(tableau: &Tableau<S>) -> Self {
+        Self::of(Scheme::new(tableau))
+    }
+
+    /// With memory that is empty until the first call.
+    pub(super) fn of(scheme: Scheme<M, E, S>) -> Self {
+        Self {
+            scheme,
+            counts: Counts::default(),
+            base: Default::default(),
+            adjoint: Default::default(),
+            trajectory: Default::default(),
+            forward: Default::default(),
+            hessian: Default::default(),
+            multipliers: Default::default(),
+        }
+    }
+
+    /// Before a call: the state at the start, and the variables of the model.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn begin(&mut self) -> Result<[&mut [E]; 2], Error> {
+        let Base { point, x, .. } = W::nominal(&mut self.base)?;
+        self.counts = Counts::default();
+        point.counts = Counts::default();
+        point.doubt.forget();
+        Ok([x.as_mut(), point.variables_mut()])
+    }
+
+    /// What the last call did.
+    pub fn statistics(&self) -> Statistics {
+        let Counts { steps, residuals, jacobians } = self.counts;
+        Statistics { steps, residuals, jacobians, ..Statistics::default() }
+    }
+
+    pub fn solve(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Verdict<'_, E, Nominal<M, E>> {
+        along.begin();
+        let base = W::nominal(&mut self.base)?;
+        let run = base.run(&self.scheme, grid, along);
+        self.counts = base.point.counts;
+        run?;
+        along.finish()?;
+        let Base { point, x, result, .. } = base;
+        result.x.as_mut_slice().copy_from_slice(x.as_ref());
+        Ok((point.doubt.none(), result))
+    }
+
+    pub fn forward(
+        &mut self,
+        grid: &Grid<E>,
+        sweeps: &mut impl Sweeps<M, E, S>,
+        along: &mut impl Beside<M, E>,
+    ) -> Verdict<'_, E, Forward<M, E>>
+    where
+        W: WithForward,
+    {
+        let (base, memory) = self.differentiate(grid, sweeps, along)?;
+        Ok((base.point.doubt.none(), &memory.result.forward))
+    }
+
+    pub fn forward_adjoint(
+        &mut self,
+        grid: &Grid<E>,
+        lambda: &[E],
+        sweeps: &mut impl Sweeps<M, E, S>,
+    ) -> Verdict<'_, E, ForwardAdjoint<M, E>>
+    where
+        W: WithForward,
+    {
+        let (base, ForwardMemory { sweep, result }) = self.differentiate(grid, sweeps, &mut Nothing)?;
+        // With the Jacobian at hand the gradient is a product.
+        let Sweep { forward, lambda: gradient, .. } = sweep;
+        weigh::<M, E, _>(&forward.dx, lambda, &mut *gradient);
+        let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &mut *result;
+        let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
+        write_gradient(gradient.as_ref(), to, grid.steps - 1, &mut base.point.doubt)?;
+        Ok((base.point.doubt.none(), result))
+    }
+
+    /// The derivatives, where they belong.
+    fn differentiate(
+        &mut self,
+        grid: &Grid<E>,
+        sweeps: &mut impl Sweeps<M, E, S>,
+        along: &mut impl Beside<M, E>,
+    ) -> Result<Differentiated<'_, M, E, S>, Error>
+    where
+        W: WithForward,
+    {
+        along.begin();
+        let base = W::nominal(&mut self.base)?;
+        let memory = W::forward(&mut self.forward)?;
+        let (ForwardMemory { sweep, result }, scheme) = (&mut *memory, &self.scheme);
+        let run = sweeps.run(scheme, grid, base, &mut sweep.forward, along.is_any(), |point, dxi, at| {
+            along.forward(point.variables(), dxi, [grid.h, scheme.b[at.stage]], false, at)
+        });
+        self.counts = base.point.counts;
+        run?;
+        along.finish()?;
+        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
+        Ok((base, memory))
+    }
+
+    pub fn adjoint(
+        &mut self,
+        grid: &Grid<E>,
+        lambda: &[E],
+        along: &mut impl Beside<M, E>,
+    ) -> Verdict<'_, E, Adjoint<M, E>> {
+        along.begin();
+        let base = W::nominal(&mut self.base)?;
+        let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
+        let records = W::tape(&mut self.trajectory, grid.steps)?;
+        sweep.seed(1, |x, _| lambda[x]);
+        let way = Way { scheme: &self.scheme, grid, columns: 1 };
+        let run = base
+            .record(&self.scheme, grid, records, along)
+            .and_then(|()| sweep.run(way, &mut base.point, records, None, along));
+        self.counts = base.point.counts;
+        run?;
+        along.finish()?;
+        let Adjoint { nominal, grad_x0, grad_u, grad_p } = &mut *result;
+        let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.doubt)?;
+        write_state(base, nominal);
+        Ok((base.point.doubt.none(), result))
+    }
+
+    pub fn hessian(
+        &mut self,
+        grid: &Grid<E>,
+        lambda: &[E],
+        sweeps: &mut impl Sweeps<M, E, S>,
+        along: &mut impl Beside<M, E>,
+    ) -> Verdict<'_, E, Hessian<M, E>>
+    where
+        W: WithHessian,
+    {
+        along.begin();
+        let base = W::nominal(&mut self.base)?;
+        let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;
+        let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
+        let HessianMemory { curvature, result } = W::hessian(&mut self.hessian)?;
+        let records = W::tape(&mut self.trajectory, grid.steps)?;
+        let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
+        let scheme = &self.scheme;
+
+        // The adjoint first: then the forward sweep meets each stage with its multipliers known,
+        // and no derivative of a stage has to be kept.
+        let start = base.x;
+        sweep.seed(1, |x, _| lambda[x]);
+        curvature.start();
+        let mut run = || {
+            base.record(scheme, grid, records, &mut Nothing)?;
+            let way = Way { scheme, grid, columns: 1 };
+            sweep.run(way, &mut base.point, records, Some(multipliers), along)?;
+            base.x = start;
+            base.point.counts.steps = 0;
+            sweeps.run(scheme, grid, base, variation, true, |point, dxi, at| {
+                let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
+                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
+                along.forward(point.variables(), dxi, [grid.h, b], true, at)?;
+                curvature.add(scheme, point, mu, dxi, at)
+            })
+        };
+        let run = run();
+        self.counts = base.point.counts;
+        run?;
+        along.finish()?;
+
+        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut result.first;
+        write_forward(grid, base, variation, forward)?;
+        let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.doubt)?;
+        if let Some(second) = along.second() {
+            curvature.add_lower(second);
+        }
+        write_hessian(curvature, result, &mut base.point.doubt)?;
+        Ok((base.point.doubt.none(), result))
+    }
+}
+
+kernels! { by beside;
+    /// The gradient `λᵀ dx`, of each direction in the first column.
+    fn weigh [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
+        dx: &'k ArrayX<M, ArrayW<M, E>>,
+        lambda: &'k [E],
+        gradient: &'k mut ArrayW<M, R>,
+    ) {
+        for (w, gradient) in gradient.as_mut().iter_mut().enumerate() {
+            let mut sum = E::zeroed();
+            for (row, &lambda) in dx.as_ref().iter().zip(lambda) {
+                sum = A::add(sum, lambda, row[w]);
+            }
+            gradient.as_mut()[0] = sum;
+        }
+    }
+}
+
+pub(super) fn write_state<M: Ode, E: Lanes, const S: usize>(
+    base: &Base<M, E, S>,
+    result: &mut Nominal<M, E>,
+) {
+    result.x.as_mut_slice().copy_from_slice(base.x.as_ref());
+}
+
+fn write_forward<M: Ode, E: Lanes, const S: usize>(
+    grid: &Grid<E>,
+    base: &mut Base<M, E, S>,
+    variation: &Variation<M, E, ArrayW<M, E>, S>,
+    result: &mut Forward<M, E>,
+) -> Result<(), Error> {
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    let (dx, step, doubt) = (variation.dx.as_ref(), grid.steps - 1, &mut base.point.doubt);
+    write(dx, 0..nx, &mut result.dx_dx0, 0, step, doubt)?;
+    write(dx, nx..nx + nu, &mut result.dx_du, 0, step, doubt)?;
+    write(dx, nx + nu..nw, &mut result.dx_dp, 0, step, doubt)?;
+    write_state(base, &mut result.nominal);
+    Ok(())
+}
+
+/// The first column of rows to the parts of a gradient.
+fn write_gradient<E: Lanes, R: Array<E>>(
+    rows: &[R],
+    parts: [&mut [E]; 3],
+    step: usize,
+    doubt: &mut Doubt<E>,
+) -> Result<(), Error> {
+    let mut begin = 0;
+    for part in parts {
+        for (to, row) in part.iter_mut().zip(rows.iter().skip(begin)) {
+            *to = row.as_ref()[0];
+        }
+        doubt.check(part, |index, _| Error::Overflow { step, index: begin + index })?;
+        begin += part.len();
+    }
+    Ok(())
+}
+
+fn write_hessian<M: Ode, E: Lanes>(
+    curvature: &mut Curvature<M, E>,
+    result: &mut Hessian<M, E>,
+    doubt: &mut Doubt<E>,
+) -> Result<(), Error> {
+    curvature.mirror();
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    let rows = curvature.sum.as_ref();
+    let (x, u, p) = (0..nx, nx..nx + nu, nx + nu..nw);
+    write(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0, doubt)?;
+    write(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0, doubt)?;
+    write(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0, doubt)?;
+    write(&rows[x], p.clone(), &mut result.h_xp, 0, 0, doubt)?;
+    write(&rows[u], p.clone(), &mut result.h_up, 0, 0, doubt)?;
+    write(&rows[p.clone()], p, &mut result.h_pp, 0, 0, doubt)
+}

@@ -1,0 +1,129 @@
+//! Derivatives of groups, a few columns at a time.
+//!
+//! Columns of a group are as many times longer as it has lanes, and those of all stages leave the
+//! nearest cache. So stages are linearised first, all those of a step; then a few columns go
+//! through all of them.
+
+use super::forward::{Directions, Unit, Variation, begin};
+use super::scheme::{Grid, Scheme};
+use super::step::{Base, Own, Point};
+use super::sweeps::Sweeps;
+use crate::error::{Error, Place};
+use crate::linalg::{beside, kernels};
+use crate::model::{ArrayW, ArrayX, Ode};
+use crate::scalar::Lanes;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+/// So many columns have as many products under way as a processor can have.
+const COLUMNS: usize = 4;
+
+/// A few columns at a time.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(crate) struct Panels<M: Ode, E: Lanes, const S: usize> {
+    /// Of each stage of a step.
+    jacobians: [M::Jacobian<[E; 1]>; S],
+    panel: Variation<M, E, [E; COLUMNS], S>,
+}
+
+/// Some of the unit vectors.
+#[derive(Clone, Copy)]
+struct Part {
+    first: usize,
+    columns: usize,
+}
+
+impl<M: Ode, E: Lanes> Directions<M, E> for Part {
+    #[inline(always)]
+    fn columns(self) -> usize {
+        self.columns
+    }
+    #[inline(always)]
+    fn add(self, i: usize, coefficient: E, row: &mut [E]) {
+        if let Some(element) = i.checked_sub(self.first).and_then(|i| row.get_mut(i)) {
+            *element = *element + coefficient;
+        }
+    }
+}
+
+impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Panels<M, E, S> {
+    fn run(
+        &mut self,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        base: &mut Base<M, E, S>,
+        variation: &mut Variation<M, E, ArrayW<M, E>, S>,
+        is_seen: bool,
+        mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, ArrayW<M, E>>, Place) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let Self { jacobians, panel } = self;
+        for jacobian in &mut *jacobians {
+            M::jacobian_constants::<Own<E>>(jacobian);
+        }
+        begin::<M, E, _, _>(E::from_f64(1.0), &mut variation.dx, Unit);
+        // The `dξ_i` that are seen are in the places of `dk_i`.
+        let Variation { dx, dk: seen, .. } = variation;
+        for step in 0..grid.steps {
+            let Base { point, record, x, rest, .. } = &mut *base;
+            let at = |stage| Place { step, stage, iteration: 0 };
+            record.x = *x;
+            for (stage, jacobian) in jacobians.iter_mut().enumerate() {
+                point.go(scheme, grid, record, at(stage))?;
+                point.derivative_jacobian(scheme, &mut record.k[stage], jacobian, at(stage))?;
+            }
+            for first in (0..M::Shape::NW).step_by(COLUMNS) {
+                let part = Part { first, columns: COLUMNS.min(M::Shape::NW - first) };
+                take::<M, E>(dx, part, &mut panel.dx);
+                for (stage, jacobian) in jacobians.iter().enumerate() {
+                    panel.stage_state(scheme, &grid.h, stage, part);
+                    if is_seen {
+                        put::<M, E>(&panel.dxi, part, &mut seen[stage]);
+                    }
+                    panel.stage_derivative(scheme, jacobian, stage, part);
+                }
+                panel.end(scheme, &grid.h, part);
+                put::<M, E>(&panel.dx, part, dx);
+            }
+            for (stage, dxi) in seen.iter().enumerate().filter(|_| is_seen) {
+                point.go(scheme, grid, record, at(stage))?;
+                at_stage(point, dxi, at(stage))?;
+            }
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
+            point.counts.steps += 1;
+        }
+        Ok(())
+    }
+}
+
+kernels! { by beside;
+    /// Some columns.
+    fn take [M: Ode, E: Lanes] [M, E] <A>(
+        rows: &'k ArrayX<M, ArrayW<M, E>>,
+        part: Part,
+        panel: &'k mut ArrayX<M, [E; COLUMNS]>,
+    ) {
+        for (to, from) in panel.as_mut().iter_mut().zip(rows.as_ref()) {
+            for (i, to) in to.iter_mut().enumerate().take(part.columns) {
+                if let Some(from) = from.as_ref().get(part.first + i) {
+                    *to = *from;
+                }
+            }
+        }
+    }
+
+    /// Some columns, back to where they belong.
+    fn put [M: Ode, E: Lanes] [M, E] <A>(
+        panel: &'k ArrayX<M, [E; COLUMNS]>,
+        part: Part,
+        rows: &'k mut ArrayX<M, ArrayW<M, E>>,
+    ) {
+        for (from, to) in panel.as_ref().iter().zip(rows.as_mut()) {
+            for (i, from) in from.iter().enumerate().take(part.columns) {
+                if let Some(to) = to.as_mut().get_mut(part.first + i) {
+                    *to = *from;
+                }
+            }
+        }
+    }
+}
