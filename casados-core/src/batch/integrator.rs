@@ -153,7 +153,6 @@ impl<I: Single> Integrator<I> {
     /// From now on all calls remember their stages. With `solved` those of the following calls are
     /// those of the last one, where it was successful: they are at the same inputs, and only
     /// differentiate.
-    #[cfg(feature = "casadi")]
     pub(crate) fn keep_stages(&mut self, solved: bool) {
         (self.keeps, self.solved) = (true, solved);
     }

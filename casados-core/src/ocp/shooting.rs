@@ -48,6 +48,8 @@ pub struct Shooting<I: Single> {
     forward: Vec<Forward<I::Model, I::Number>>,
     hessian: Vec<Hessian<I::Model, I::Number>>,
     adjoint: Vec<Adjoint<I::Model, I::Number>>,
+    /// Whether the batch has the stages of all intervals that are here.
+    solved: bool,
 }
 
 impl<I: Single> core::fmt::Debug for Shooting<I> {
@@ -80,33 +82,39 @@ impl<I: Single> Shooting<I> {
             forward: Vec::new(),
             hessian: Vec::new(),
             adjoint: Vec::new(),
+            solved: false,
         }
     }
 
     /// The batch.
     pub fn batch(&mut self) -> &mut Integrator<I> {
+        // Whoever has it may use it for something else.
+        self.solved = false;
         &mut self.batch
     }
 
     /// Copies the intervals to where the batch takes them from, and their multipliers if they are
-    /// asked for.
+    /// asked for. Where they are those of the last call, the batch has their stages.
     fn take(&mut self, nodes: &Nodes<'_, I::Number>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
-        reserve(&mut self.x, n)?;
-        reserve(&mut self.u, n)?;
-        reserve(&mut self.p, n)?;
-        reserve(&mut self.h, n)?;
-        reserve(&mut self.t, n)?;
+        let mut same = core::mem::take(&mut self.solved) && self.x.len() == n;
+        if !same {
+            reserve(&mut self.x, n)?;
+            reserve(&mut self.u, n)?;
+            reserve(&mut self.p, n)?;
+            reserve(&mut self.h, n)?;
+            reserve(&mut self.t, n)?;
+        }
         reserve(&mut self.lambda, n)?;
         reserve(&mut self.nu, n)?;
-        for interval in nodes.iter() {
-            self.x.push(vector(interval.x));
-            self.u.push(vector(interval.u));
+        for (k, interval) in nodes.iter().enumerate() {
+            same &= put(&mut self.x, k, vector(interval.x), |x| x.as_slice() == interval.x);
+            same &= put(&mut self.u, k, vector(interval.u), |u| u.as_slice() == interval.u);
             if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
-                self.p.push(vector(interval.p));
+                same &= put(&mut self.p, k, vector(interval.p), |p| p.as_slice() == interval.p);
             }
-            self.h.push(interval.h);
-            self.t.push(interval.t);
+            same &= put(&mut self.h, k, interval.h, |&h| h == interval.h);
+            same &= put(&mut self.t, k, interval.t, |&t| t == interval.t);
             if multipliers {
                 self.lambda.push(vector(interval.multipliers));
             }
@@ -114,7 +122,24 @@ impl<I: Single> Shooting<I> {
                 self.nu.push(vector(interval.nu));
             }
         }
+        // Lifted stages go on where they are.
+        self.batch.keep_stages(same && self.batch.options().newton.fixed_iterations.is_none());
         Ok(())
+    }
+}
+
+/// Writes an element, or adds it at the end; whether it was there already.
+fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -> bool {
+    match list.get_mut(k) {
+        Some(element) => {
+            let same = is_same(element);
+            *element = value;
+            same
+        }
+        None => {
+            list.push(value);
+            false
+        }
     }
 }
 
@@ -151,9 +176,9 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
     const ALGEBRAIC: bool = true;
     const ORIGIN: Origin = origin::<I::Model>();
 
+    /// They are in any case, and found where the point is the same.
     #[cfg(feature = "casadi")]
-    fn keep_stages(&mut self, solved: bool) -> bool {
-        self.batch.keep_stages(solved);
+    fn keep_stages(&mut self, _solved: bool) -> bool {
         true
     }
 
@@ -162,6 +187,8 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
         places(&mut self.nominal, nodes.len())?;
         let Self { batch, x, u, p, h, t, nominal, .. } = self;
         batch.solve(&Intervals { x0: x, u, p, h, t0: t }, nominal).map_err(failed)?;
+        self.solved = true;
+        let nominal = &self.nominal;
         for (k, result) in nominal.iter().enumerate() {
             sink(k, &result.into());
         }
@@ -185,6 +212,8 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
         places(&mut self.forward, nodes.len())?;
         let Self { batch, x, u, p, h, t, forward, .. } = self;
         batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
+        self.solved = true;
+        let forward = &self.forward;
         for (k, result) in forward.iter().enumerate() {
             sink(k, &result.into());
         }
@@ -198,6 +227,8 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
         places(&mut self.adjoint, nodes.len())?;
         let Self { batch, x, u, p, h, t, lambda, adjoint, .. } = self;
         batch.adjoint(&Intervals { x0: x, u, p, h, t0: t }, lambda, adjoint).map_err(failed)?;
+        self.solved = true;
+        let adjoint = &self.adjoint;
         for (k, result) in adjoint.iter().enumerate() {
             let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
             sink(k, &step(result.x.as_slice(), gradients));
@@ -217,6 +248,8 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> SecondOrder<T> for Shooting<I> 
             false => batch.hessian_with_z0(&intervals, lambda, nu, hessian),
         };
         outcome.map_err(failed)?;
+        self.solved = true;
+        let hessian = &self.hessian;
         for (k, result) in hessian.iter().enumerate() {
             sink(k, &result.into());
         }

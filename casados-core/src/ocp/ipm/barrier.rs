@@ -1,7 +1,9 @@
 //! How the barrier parameter changes.
 
+use super::IpmOptions;
+use super::state::State;
 use crate::qp::Residuals;
-use crate::qp::interior::Sides;
+use crate::qp::interior::{Iterate, Sides, set};
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.
@@ -10,19 +12,22 @@ use crate::scalar::{Real, Scalar};
 /// use casados::ocp::{Barrier, IpmOptions};
 ///
 /// let mut options = IpmOptions::new::<f64>();
-/// assert_eq!(options.barrier, Barrier::Monotone);
-/// options.barrier = Barrier::Adaptive;
+/// assert_eq!(options.barrier, Barrier::Adaptive);
+/// options.barrier = Barrier::Monotone;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Barrier {
     /// It shrinks where the barrier problem is solved well enough: Wächter and Biegler (2006), with
     /// proofs of convergence.
-    #[default]
     Monotone,
-    /// It follows the products of slacks and multipliers from iteration to iteration (the rule of
-    /// LOQO), while residuals shrink; where they do not, it is monotone until they do. J. Nocedal,
-    /// A. Wächter, R. A. Waltz, SIAM J. Optim. 19 (2009).
+    /// It follows a step without barrier, as far as that gets, which is also corrected for the
+    /// products of its changes (S. Mehrotra, SIAM J. Optim. 2, 1992), while residuals shrink and
+    /// the reduced Hessian is positive definite; where they do not or it is not, it is monotone
+    /// until they do and it is. It is monotone for good where no step is short enough, and where
+    /// [`final_mu`](super::IpmOptions::final_mu) is not zero. J. Nocedal, A. Wächter, R. A. Waltz,
+    /// SIAM J. Optim. 19 (2009).
+    #[default]
     Adaptive,
 }
 
@@ -30,60 +35,85 @@ pub enum Barrier {
 const REMEMBERED: usize = 4;
 /// `κ`: an error is to be below this part of the largest of them.
 const PROGRESS: f64 = 0.9999;
-/// A monotone phase begins at this part of the mean product.
-const BEGIN: f64 = 0.8;
+/// So many steps without regularisation, one after the other, end a monotone phase.
+const CONVEX: usize = 3;
+/// A monotone phase does not begin with less than this, or the mean product if that is less.
+const BEGIN: f64 = 0.1;
 
-/// What an adaptive barrier parameter remembers.
-#[derive(Clone, Copy, Debug, Default)]
+/// What an adaptive barrier parameter follows.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
     errors: [f64; REMEMBERED],
     count: usize,
-    /// Whether the phase is a monotone one.
-    monotone: bool,
+    /// Whether it may follow steps at all.
+    adapts: bool,
+    /// Whether it does.
+    free: bool,
+    /// Steps without regularisation, one after the other.
+    convex: usize,
 }
 
 impl Progress {
-    /// The next `μ`, from the error of the problem itself, and slacks and multipliers.
-    pub fn next<T: Real>(
-        &mut self,
-        mu: f64,
-        error: impl Fn(f64) -> f64,
-        [slacks, multipliers]: [&[T]; 2],
-        tolerance: f64,
-    ) -> f64 {
-        let (now, least) = (error(0.0), tolerance / 10.0);
+    /// Of a run that begins.
+    pub fn new(barrier: Barrier) -> Self {
+        let adapts = barrier == Barrier::Adaptive;
+        Self { errors: [0.0; REMEMBERED], count: 0, adapts, free: adapts, convex: 0 }
+    }
+
+    /// Whether it may follow steps.
+    pub fn adapts(&self) -> bool {
+        self.adapts
+    }
+
+    /// Whether the next step says what `μ` is.
+    pub fn is_free(&self) -> bool {
+        self.free
+    }
+
+    /// The next `μ` unless a step says what it is, from the error of the barrier problem as a
+    /// function of `μ`, and the mean product of slacks and multipliers.
+    pub fn next(&mut self, mu: f64, error: impl Fn(f64) -> f64, mean: f64, tolerance: f64) -> f64 {
+        let now = error(0.0);
         let largest = self.errors.iter().take(self.count).fold(0.0, |m: f64, &e| m.max(e));
-        let (mean, spread) = centrality(slacks, multipliers);
-        if self.count < REMEMBERED || now <= PROGRESS * largest {
+        let shrinks = self.count < REMEMBERED || now <= PROGRESS * largest;
+        if shrinks && (self.free || self.adapts && self.convex >= CONVEX) {
             if let Some(error) = self.errors.get_mut(self.count % REMEMBERED) {
                 *error = now;
             }
             self.count += 1;
-            self.monotone = false;
-            return (loqo(spread) * mean).max(least);
+            self.free = true;
+            return mu;
         }
-        if self.monotone {
-            return shrink(mu, error, tolerance);
+        if self.free {
+            self.free = false;
+            return begin(mu, mean);
         }
-        self.monotone = true;
-        (BEGIN * mean).max(least)
+        shrink(mu, error, tolerance)
+    }
+
+    /// Counts a step; `μ` if it needed a regularisation and said what `μ` is.
+    pub fn count(&mut self, regularised: bool, mu: f64, mean: f64) -> Option<f64> {
+        self.convex = if regularised { 0 } else { self.convex + 1 };
+        let ends = regularised && self.free;
+        self.free &= !regularised;
+        ends.then(|| begin(mu, mean))
     }
 }
 
-/// The mean of the products of slacks and multipliers, and the least one as a part of it.
-fn centrality<T: Real>(slacks: &[T], multipliers: &[T]) -> (f64, f64) {
-    let products = || slacks.iter().zip(multipliers).map(|(s, l)| s.to_f64() * l.to_f64());
-    let count = slacks.len().max(1) as f64;
-    let mean = products().fold(0.0, |sum, product| sum + product) / count;
-    let least = products().fold(f64::INFINITY, f64::min);
-    (mean, if mean > 0.0 { (least / mean).clamp(0.0, 1.0) } else { 1.0 })
+/// `μ` of a monotone phase that begins.
+fn begin(mu: f64, mean: f64) -> f64 {
+    mu.max(mean.min(BEGIN))
 }
 
-/// `σ` of the rule of LOQO: small where all products are alike (R. J. Vanderbei, D. F. Shanno,
-/// Comput. Optim. Appl. 13, 1999).
-fn loqo(spread: f64) -> f64 {
-    let factor = if spread > 0.0 { (0.05 * (1.0 - spread) / spread).min(2.0) } else { 2.0 };
-    0.1 * factor * factor * factor
+/// The mean of the products of slacks and multipliers.
+pub(super) fn mean<T: Real>(sides: &Sides<'_, T>) -> f64 {
+    let products = sides.slack.iter().zip(&*sides.multiplier).map(|(s, l)| s.to_f64() * l.to_f64());
+    products.fold(0.0, |sum, product| sum + product) / sides.slack.len().max(1) as f64
+}
+
+/// The least `μ`.
+pub(super) fn least(tolerance: f64) -> f64 {
+    tolerance / 10.0
 }
 
 /// `κ_ε`: a barrier problem is solved well enough where its error is below this times `μ`.
@@ -120,7 +150,7 @@ fn larger(a: f64, b: f64) -> f64 {
 
 /// The next `μ` where the error is small enough for it.
 pub(super) fn shrink(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64 {
-    let (mut mu, least) = (mu, tolerance / 10.0);
+    let (mut mu, least) = (mu, least(tolerance));
     while mu > least && error(mu) <= ENOUGH * mu {
         mu = (LINEAR * mu).min(Scalar::powf(mu, SUPERLINEAR)).max(least);
     }
@@ -130,4 +160,47 @@ pub(super) fn shrink(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64
 /// `τ`: slacks and multipliers keep `1 − τ` of what they have.
 pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
     (1.0 - mu).max(0.99)
+}
+
+/// The next barrier parameter; another one has another filter.
+pub(super) fn update<T: Real>(
+    state: &mut State<'_>,
+    iterate: &Iterate<'_, T>,
+    residuals: &Residuals,
+    options: &IpmOptions,
+) {
+    let Sides { slack, multiplier, .. } = &iterate.sides;
+    let error = |mu| error(residuals, farthest(slack, multiplier, mu));
+    let before = state.mu;
+    state.mu = state.progress.next(before, error, mean(&iterate.sides), options.least_error());
+    if state.mu != before {
+        state.filter.clear();
+    }
+}
+
+/// `κ_Σ`: multipliers stay within this factor of `μ / s`.
+const MULTIPLIERS: f64 = 1e10;
+
+/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
+/// what its violation costs.
+pub(super) fn keep_near_centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
+    let count = sides.counts.sides();
+    for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
+        let centre = mu / slack.to_f64();
+        let clamped = multiplier.to_f64().clamp(centre / MULTIPLIERS, centre * MULTIPLIERS);
+        *multiplier = T::from_f64(clamped);
+    }
+    let costs = sides.linear.iter().zip(&*sides.quadratic);
+    for (j, (&side, (&linear, &quadratic))) in sides.soft.iter().zip(costs).enumerate() {
+        let (side, other) = (side as usize, count + j);
+        let (Some(&violation), Some(&multiplier)) = (sides.slack.get(other), sides.multiplier.get(side))
+        else {
+            return;
+        };
+        let force = linear + quadratic * violation;
+        let most = force - T::from_f64(1e-3) * force.min(T::from_f64(mu) / violation);
+        let multiplier = multiplier.min(most);
+        set(sides.multiplier, side, multiplier);
+        set(sides.multiplier, other, force - multiplier);
+    }
 }

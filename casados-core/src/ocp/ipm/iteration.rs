@@ -1,13 +1,14 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
-use super::barrier::{self, Barrier};
+use super::barrier;
 use super::lengths::Lengths;
 use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
-use super::newton::{attach, attach_to_new, dynamics_after, evaluate};
+use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
+use super::predictor::{self, needs_equal_steps};
 use super::state::{MARGIN, State};
 use super::work::Work;
-use super::{Ipm, IpmOptions, elastic};
+use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::Exact;
 use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
@@ -17,14 +18,13 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::log::{Iteration, Status};
 use crate::ocp::problem::Formulation;
 use crate::ocp::watch::Watch;
-use crate::qp::interior::{Iterate, Sides, set};
-use crate::qp::{QpError, Residuals, StageDims, Store};
+use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// `κ_Σ`: multipliers stay within this factor of `μ / s`.
-const MULTIPLIERS: f64 = 1e10;
 /// Variables that are larger have no end.
 const UNBOUNDED: f64 = 1e12;
+/// A step lets the violation grow to this multiple of it, to one, or to what it was at the start.
+const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
@@ -46,6 +46,8 @@ struct Direction {
     dual: f64,
     /// It moves nothing but rounding errors.
     tiny: bool,
+    /// Whether it has the changes of products.
+    is_corrected: bool,
 }
 
 impl<T, D, M, I> Ipm<T, D, M, I>
@@ -68,7 +70,7 @@ where
     {
         let mut watch = Watch::start();
         self.linearise(ocp, capacity, state)?;
-        let here = self.assess(ocp, capacity, state, row)?;
+        self.assess(ocp, capacity, state, row)?;
         row.times.linearise = watch.lap();
         if (state.over)() {
             return Ok(Some(Status::OutOfTime));
@@ -78,7 +80,11 @@ where
             Next::NewPenalties => return Ok(None),
             Next::End(status) => return Ok(Some(status)),
         }
-        let direction = match self.direction(ocp, capacity, state, here, row) {
+        let direction = self.direction(ocp, state, row).and_then(|is_corrected| {
+            let here = self.here(ocp, capacity, state)?;
+            self.along(ocp, capacity, state, here, is_corrected)
+        });
+        let mut direction = match direction {
             Ok(direction) => direction,
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
@@ -87,28 +93,25 @@ where
         if (state.over)() {
             return Ok(Some(Status::OutOfTime));
         }
-        let Self { options, trial, best, numbers, indices, work, .. } = self;
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
-        let accepted = if direction.tiny {
-            Some(Accepted { alpha: direction.primal, corrected: false })
-        } else {
-            let lengths = state.lengths;
-            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
-            let Direction { expected, primal, tau, .. } = &direction;
-            let found = room.search(ocp, state, expected, *primal, *tau)?;
-            if matches!(found, Found::OutOfTime) {
-                return Ok(Some(Status::OutOfTime));
-            }
-            found.accepted()
+        let accepted = match self.search(ocp, capacity, state, &mut direction)? {
+            Found::OutOfTime => return Ok(Some(Status::OutOfTime)),
+            found => found.accepted(),
         };
         row.times.search = watch.lap();
         let Some(accepted) = accepted else {
-            if state.elastic.is_some() || !options.elastic {
+            if state.progress.adapts() {
+                // From the best point on, as carefully as may be.
+                ocp.recall(&self.best);
+                state.begin_monotone(self.options.start_mu);
+                return Ok(None);
+            }
+            if state.elastic.is_some() || !self.options.elastic {
                 return Ok(Some(Status::NoProgress));
             }
             // Where no step made progress is no place to begin.
-            ocp.recall(best);
-            elastic::soften(ocp, state, work.penalties, options.elastic_penalty);
+            ocp.recall(&self.best);
+            let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+            elastic::soften(ocp, state, work.penalties, self.options.elastic_penalty);
             return Ok(None);
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
@@ -128,7 +131,9 @@ where
         P::Dynamics: SecondOrder<T>,
     {
         if !state.has_slacks {
-            ocp.linearise(EXACT)?;
+            if !core::mem::take(&mut state.is_linearised) {
+                ocp.linearise(EXACT)?;
+            }
             self.begin(ocp, capacity, state)?;
         }
         self.curve(ocp, capacity, state)?;
@@ -140,17 +145,15 @@ where
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, barrier function and violation, and the best
-    /// iterate.
+    /// Residuals and barrier parameter at the iterate, and the best iterate.
     fn assess<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
         state: &mut State<'_>,
         row: &mut Iteration,
-    ) -> Result<Measure, OcpError> {
+    ) -> Result<(), OcpError> {
         let (mut residuals, objective) = ocp.residuals();
-        let plain = ocp.objective.to_f64();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         evaluate(&mut iterate, &mut solution.view_mut());
@@ -158,21 +161,7 @@ where
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        update_barrier(state, &iterate, &residuals, &self.options);
-        let mut here = measure::here(&iterate, plain, state.mu);
-        if P::Dynamics::LIFTED {
-            // The QP has the ends of intervals where the next step would lead to.
-            let lengths = state.lengths;
-            let Self { trial, numbers, indices, work, .. } = self;
-            let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
-            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
-            here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
-        }
-        if !state.has_filter {
-            state.small_violation = 1e-4 * here.violation.max(1.0);
-            state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
-            state.has_filter = true;
-        }
+        barrier::update(state, &iterate, &residuals, &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
@@ -185,7 +174,7 @@ where
         }
         let acceptable = size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
-        Ok(here)
+        Ok(())
     }
 
     /// What follows the residuals of an iteration.
@@ -215,41 +204,132 @@ where
         Next::Direction
     }
 
-    /// The search direction.
+    /// The search direction, and the barrier parameter if that follows it; whether it is corrected.
     ///
     /// # Errors
     /// Those of the recursion, where no regularisation helps.
     fn direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<bool, QpError> {
+        let least = barrier::least(self.options.least_error());
+        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let probes = state.progress.is_free();
+        let aim = if probes { 0.0 } else { state.mu };
+        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim))?;
+        row.regularisation = state.delta;
+        let mean = barrier::mean(&iterate.sides);
+        let monotone = state.progress.count(state.delta > 0.0, state.mu, mean);
+        let mut is_corrected = false;
+        if let Some(mu) = monotone {
+            state.mu = mu;
+            again(&mut iterate, T::from_f64(mu), false)?;
+        } else if probes {
+            state.mu = predictor::probe(&iterate.sides, least);
+            is_corrected = predictor::correct(&mut iterate, state.mu)?;
+        }
+        if probes {
+            state.filter.clear();
+        }
+        row.barrier = state.mu;
+        Ok(is_corrected)
+    }
+
+    /// Barrier function and violation at the iterate.
+    ///
+    /// # Errors
+    /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
+    fn here<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
         state: &mut State<'_>,
+    ) -> Result<Measure, QpError> {
+        let lengths = state.lengths;
+        let Self { trial, numbers, indices, work, .. } = self;
+        let plain = ocp.objective.to_f64();
+        let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
+        let mut here = measure::here(&iterate, plain, state.mu);
+        if P::Dynamics::LIFTED {
+            // The QP has the ends of intervals where the next step would lead to.
+            let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
+            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
+            here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
+        }
+        if !state.has_filter {
+            state.first_violation = here.violation;
+            state.small_violation = 1e-4 * here.violation.max(1.0);
+            state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
+            state.has_filter = true;
+        }
+        Ok(here)
+    }
+
+    /// What is to be expected along the search direction, and how far it may be gone.
+    ///
+    /// # Errors
+    /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
+    fn along<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &State<'_>,
         here: Measure,
-        row: &mut Iteration,
+        is_corrected: bool,
     ) -> Result<Direction, QpError> {
         let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
-        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let mu = T::from_f64(state.mu);
-        state.delta = state.regularisation.direction(&mut iterate, mu)?;
-        row.regularisation = state.delta;
-        let slope = measure::slope(&iterate, state.mu, work.scratch);
+        let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let expected = Expected {
             here,
-            slope,
+            slope: measure::slope(&iterate, state.mu, work.scratch),
             small_violation: state.small_violation,
+            most: (GROWTH * here.violation).max(state.first_violation.max(1.0)),
             mu: state.mu,
             delta: state.delta,
         };
         let tau = barrier::fraction_to_boundary(state.mu);
-        let sides = &iterate.sides;
-        let mut primal = longest(sides.slack, sides.slack_step, tau);
-        let mut dual = longest(sides.multiplier, sides.multiplier_step, tau);
-        if needs_equal_steps(sides) {
-            (primal, dual) = (primal.min(dual), primal.min(dual));
-        }
+        let (primal, dual) = predictor::lengths(&iterate.sides, tau);
         let is_tiny = |(&d, &v): (&T, &T)| d.abs().to_f64() <= 10.0 * T::EPSILON * (1.0 + v.abs().to_f64());
         let tiny = here.violation <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);
-        Ok(Direction { expected, tau, primal, dual, tiny })
+        Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
+    }
+
+    /// How far the search direction is gone. A corrected one is gone as far as it may be, or
+    /// not at all: then the direction is that without the correction.
+    fn search<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        direction: &mut Direction,
+    ) -> Result<Found, OcpError> {
+        if direction.tiny {
+            return Ok(Found::Step(Accepted { alpha: direction.primal, corrected: false }));
+        }
+        let lengths = state.lengths;
+        macro_rules! room {
+            ($work:ident) => {{
+                let Self { trial, numbers, indices, work, .. } = &mut *self;
+                $work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
+                Room { lengths: &lengths, numbers, indices, trial, work: &mut $work }
+            }};
+        }
+        let mut work;
+        if direction.is_corrected {
+            let Direction { expected, primal, .. } = direction;
+            if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
+                return Ok(Found::Step(Accepted { alpha: *primal, corrected: false }));
+            }
+            let here = direction.expected.here;
+            let mut iterate = attach(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
+            again(&mut iterate, T::from_f64(state.mu), false)?;
+            *direction = self.along(ocp, capacity, state, here, false)?;
+            self.expand(ocp, state)?;
+        }
+        let Direction { expected, primal, tau, .. } = direction;
+        room!(work).search(ocp, state, expected, *primal, *tau)
     }
 
     /// Goes the step that was accepted.
@@ -282,60 +362,11 @@ where
             *of_hessian = *of_hessian + part * (multiplier + step - *of_hessian);
         }
         iterate.go(part, T::from_f64(dual));
-        keep_near_centre(&mut iterate.sides, state.mu);
+        barrier::keep_near_centre(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
         ocp.problem.parts().dynamics.move_stages(StageAction::Go(part));
         // The line search ends where it accepts a point; a tiny step has none.
         ocp.has_algebraic = !direction.tiny;
         Ok(())
     }
-}
-
-/// The next barrier parameter; another one has another filter.
-fn update_barrier<T: Real>(
-    state: &mut State<'_>,
-    iterate: &Iterate<'_, T>,
-    residuals: &Residuals,
-    options: &IpmOptions,
-) {
-    let Sides { slack, multiplier, .. } = &iterate.sides;
-    let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
-    let before = state.mu;
-    let tolerance = options.tolerance.max(10.0 * options.final_mu);
-    state.mu = match options.barrier {
-        Barrier::Monotone => barrier::shrink(before, error, tolerance),
-        Barrier::Adaptive => state.progress.next(before, error, [slack, multiplier], tolerance),
-    };
-    if state.mu != before {
-        state.filter.clear();
-    }
-}
-
-/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
-/// what its violation costs.
-fn keep_near_centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
-    let count = sides.counts.sides();
-    for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
-        let centre = mu / slack.to_f64();
-        let clamped = multiplier.to_f64().clamp(centre / MULTIPLIERS, centre * MULTIPLIERS);
-        *multiplier = T::from_f64(clamped);
-    }
-    let costs = sides.linear.iter().zip(&*sides.quadratic);
-    for (j, (&side, (&linear, &quadratic))) in sides.soft.iter().zip(costs).enumerate() {
-        let (side, other) = (side as usize, count + j);
-        let (Some(&violation), Some(&multiplier)) = (sides.slack.get(other), sides.multiplier.get(side))
-        else {
-            return;
-        };
-        let force = linear + quadratic * violation;
-        let most = force - T::from_f64(1e-3) * force.min(T::from_f64(mu) / violation);
-        let multiplier = multiplier.min(most);
-        set(sides.multiplier, side, multiplier);
-        set(sides.multiplier, other, force - multiplier);
-    }
-}
-
-/// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
-fn needs_equal_steps<T: Real>(sides: &Sides<'_, T>) -> bool {
-    sides.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }

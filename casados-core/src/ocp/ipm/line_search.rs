@@ -31,6 +31,8 @@ pub(super) struct Expected {
     pub slope: f64,
     /// `θ_min`: below this violation the barrier function may decide.
     pub small_violation: f64,
+    /// No step leaves more violation.
+    pub most: f64,
     pub mu: f64,
     /// `δ_w`
     pub delta: f64,
@@ -63,7 +65,7 @@ impl Expected {
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
         // What rounding leaves of a difference of barrier functions.
         let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
-        if !there.is_finite() || !filter.admits(there, noise) {
+        if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {
             return false;
         }
         if self.decides(alpha) {
@@ -118,6 +120,17 @@ where
     N: Store<T>,
     I: Store<u32>,
 {
+    /// Whether the filter accepts a step of this length; a point without a value is not accepted.
+    pub fn accepts<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        filter: &mut Filter,
+        expected: &Expected,
+        alpha: f64,
+    ) -> bool {
+        self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
+    }
+
     /// Halves the step until the filter accepts it.
     ///
     /// # Errors

@@ -10,7 +10,7 @@
 //! | `start`, `multipliers` | the first point and its multipliers |
 //! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
-//! | `barrier` | how `μ` shrinks |
+//! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
 //! | `elastic` | penalties where no step makes progress |
 //! | `lifted` | stages that are variables go with the iterate |
 //!
@@ -32,6 +32,7 @@ mod memory;
 mod multipliers;
 mod newton;
 mod options;
+mod predictor;
 mod run;
 mod start;
 mod state;

@@ -112,6 +112,40 @@ impl<T: Real> Registers<T> for Step<'_, '_, T> {
     }
 }
 
+/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
+/// that are there.
+///
+/// # Errors
+/// Those of the recursion.
+pub(super) fn again<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, corrected: bool) -> Result<(), QpError> {
+    let mut result = Ok(());
+    T::compiled::<AgainCompiled>(Again { iterate, mu, corrected, result: &mut result });
+    result
+}
+
+struct Again<'r, 'a, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    mu: T,
+    corrected: bool,
+    result: &'r mut Result<(), QpError>,
+}
+
+compiled!(/// See [`Again`].
+AgainCompiled: Again<'r, 'a, T>);
+
+impl<T: Real> Registers<T> for Again<'_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, mu, corrected, result } = self;
+        if corrected {
+            iterate.sides.correct(mu);
+        } else {
+            iterate.sides.aim(mu);
+        }
+        *result = iterate.newton::<E>(false);
+    }
+}
+
 /// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
 /// back bit by bit.
 pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Work<'_, T>, delta: T) {

@@ -15,7 +15,7 @@ use crate::scalar::Real;
 /// use casados::ocp::{Barrier, IpmOptions};
 ///
 /// let options = IpmOptions { tolerance: 1e-10, ..IpmOptions::new::<f64>() };
-/// assert_eq!((options.barrier, options.max_iterations), (Barrier::Monotone, 200));
+/// assert_eq!((options.barrier, options.max_iterations), (Barrier::Adaptive, 200));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
@@ -34,7 +34,7 @@ pub struct IpmOptions {
     /// The last one: what is solved is the barrier problem with this `μ`, whose solutions are
     /// smooth functions of the data. Default 0, the problem itself.
     pub final_mu: f64,
-    /// What it follows. Default [`Barrier::Monotone`].
+    /// What it follows. Default [`Barrier::Adaptive`].
     pub barrier: Barrier,
     /// Bounds are left by this at the start, relative to their size and to the room between them;
     /// at most 0.5. Default 1e-2.
@@ -63,13 +63,18 @@ impl IpmOptions {
             max_iterations: 200,
             start_mu: 0.1,
             final_mu: 0.0,
-            barrier: Barrier::Monotone,
+            barrier: Barrier::Adaptive,
             bound_push: 1e-2,
             warm_start: false,
             warm_push: 1e-6,
             elastic: true,
             elastic_penalty: 1e2,
         }
+    }
+
+    /// The tolerance, or what the last barrier parameter leaves.
+    pub(super) fn least_error(&self) -> f64 {
+        self.tolerance.max(10.0 * self.final_mu)
     }
 
     /// Finds values that no run can have.

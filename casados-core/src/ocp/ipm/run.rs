@@ -1,7 +1,7 @@
 //! The iterations.
 
 use super::Ipm;
-use super::barrier::Progress;
+use super::barrier::{Barrier, Progress};
 use super::direction::Regularisation;
 use super::lengths::Lengths;
 use super::start::push_inside;
@@ -109,20 +109,27 @@ where
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise_guess(Exact { convexification: Convexification::None }, &mut self.trial)?;
-        let (lengths, capacity) = self.prepare(ocp)?;
+        let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State {
             over,
             lengths,
             mu: self.options.start_mu,
-            progress: Progress::default(),
+            // Products that do not vanish leave nothing to correct.
+            progress: Progress::new(if self.options.final_mu > 0.0 {
+                Barrier::Monotone
+            } else {
+                self.options.barrier
+            }),
             filter: Filter::new(MARGIN, f64::INFINITY),
             small_violation: f64::INFINITY,
+            first_violation: f64::INFINITY,
             regularisation: Regularisation::default(),
             delta: 0.0,
             elastic: None,
             stationary_violation: f64::INFINITY,
             acceptable: 0,
             has_slacks: false,
+            is_linearised,
             has_filter: false,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
@@ -170,11 +177,11 @@ where
     }
 
     /// Memory for all that may come, a point inside of the bounds, and what is remembered of the
-    /// problem.
+    /// problem; whether the point is still the one that the problem was linearised at.
     fn prepare<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-    ) -> Result<(Lengths, Lengths), OcpError> {
+    ) -> Result<(Lengths, Lengths, bool), OcpError> {
         let lengths = Lengths::of(ocp.qp());
         let capacity = lengths.all_soft(ocp.qp());
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
@@ -182,10 +189,12 @@ where
         self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
+        self.trial.copy_from(iterate);
         push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
         ocp.join_controls();
+        let stays = self.trial.vectors().0 == ocp.iterate.vectors().0;
         let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);
-        Ok((lengths, capacity))
+        Ok((lengths, capacity, stays))
     }
 }

@@ -1,6 +1,6 @@
 //! What a run remembers.
 
-use super::barrier::Progress;
+use super::barrier::{Barrier, Progress};
 use super::direction::Regularisation;
 use super::lengths::Lengths;
 use crate::ocp::filter::Filter;
@@ -16,11 +16,13 @@ pub(super) struct State<'c> {
     pub lengths: Lengths,
     /// The barrier parameter.
     pub mu: f64,
-    /// What an adaptive one remembers.
+    /// What an adaptive one follows.
     pub progress: Progress,
     pub filter: Filter,
     /// `θ_min`: below this violation the barrier function may decide.
     pub small_violation: f64,
+    /// The violation that the filter began with.
+    pub first_violation: f64,
     pub regularisation: Regularisation,
     /// `δ_w` of the step.
     pub delta: f64,
@@ -32,10 +34,22 @@ pub(super) struct State<'c> {
     pub acceptable: usize,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
     pub has_slacks: bool,
+    /// Whether the QP is that at the iterate, with whatever multipliers.
+    pub is_linearised: bool,
     /// Whether the filter has the bound of violations that belongs to these slacks.
     pub has_filter: bool,
     /// The largest residual of the best iterate.
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
+}
+
+impl State<'_> {
+    /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
+    pub fn begin_monotone(&mut self, mu: f64) {
+        self.progress = Progress::new(Barrier::Monotone);
+        self.mu = mu;
+        self.regularisation = Regularisation::default();
+        (self.has_slacks, self.has_filter) = (false, false);
+    }
 }
