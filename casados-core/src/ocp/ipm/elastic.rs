@@ -6,7 +6,7 @@ use super::lengths::Lengths;
 use super::state::State;
 use crate::ocp::elastic::Worst;
 use crate::ocp::instance::Ocp;
-use crate::ocp::log::Status;
+use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
 use crate::qp::StageDims;
 use crate::scalar::Real;

@@ -13,9 +13,10 @@ use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::Filter;
 use crate::ocp::instance::Ocp;
+use crate::ocp::log::Iteration;
 #[cfg(feature = "alloc")]
 use crate::ocp::log::reserve;
-use crate::ocp::log::{Iteration, Outcome, Status};
+use crate::ocp::outcome::{Outcome, Status};
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;

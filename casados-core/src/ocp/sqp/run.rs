@@ -10,9 +10,10 @@ use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
+use crate::ocp::log::Iteration;
 #[cfg(feature = "alloc")]
 use crate::ocp::log::reserve;
-use crate::ocp::log::{Iteration, Outcome, Status};
+use crate::ocp::outcome::{Outcome, Status};
 use crate::ocp::problem::Formulation;
 use crate::ocp::watch::Watch;
 use crate::qp::{QpError, QpSolver, StageDims};
