@@ -4,7 +4,7 @@ use super::growth::{Growth, Precision};
 use super::report::{label, origin};
 use super::rows::Measured;
 use super::{Failure, Results};
-use casados::plot::{Figure, Panel, Curve};
+use casados::plot::{Curve, Figure, Panel};
 use casados_benches::case::Mode;
 use std::path::Path;
 
