@@ -91,7 +91,10 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
                 multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
                 // `∇(μᵀ f)` by reverse mode.
                 M::adjoint::<Own<E>>(&point.v, &mu, gradient);
-                point.check(gradient.as_ref().as_flattened(), Quantity::Adjoint, at, |variable| variable)?;
+                // By `ẋ` it is a multiple of `μ_i`, and nobody's.
+                let nx = M::Shape::NX;
+                let used = gradient.as_ref().as_flattened().get(nx..).unwrap_or_default();
+                point.check(used, Quantity::Adjoint, at, |variable| nx + variable)?;
                 along.adjoint(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
                 if let Some(xibar) = dk.get_mut(stage) {
                     keep::<M, E, R>(&*gradient, xibar, lambda);

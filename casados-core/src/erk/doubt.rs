@@ -43,9 +43,10 @@ impl<E: Lanes> Doubt<E> {
         if !ONE_BY_ONE && are_finite(values) {
             return Ok(());
         }
-        match values.iter().enumerate().find(|(_, value)| !E::all(value.is_finite())) {
+        match values.iter().position(|value| !E::all(value.is_finite())) {
             None => Ok(()),
-            Some((index, value)) => {
+            Some(index) => {
+                let value = values[index];
                 let mut cell: E::Cell = Zeroable::zeroed();
                 value.store(&mut cell);
                 Err(error(index, E::lane(&cell, 0)))

@@ -196,39 +196,25 @@ kernels! { by beside;
         directions: D,
         dk: &'k mut ArrayX<M, R>,
     ) {
-        let (nx, columns) = (M::Shape::NX, directions.columns());
-        let mut begin = M::STRUCTURE.blocks[1];
-        if const { E::LANES > 1 } {
-            // Entries by states lie row by row.
-            for (equation, row) in scheme.rows.as_ref().iter().enumerate() {
-                let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
-                let end = M::STRUCTURE.blocks[2];
-                let entries = begin..(begin..end).find(is_other).unwrap_or(end);
-                begin = entries.end;
-                let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
-                let (factor, dk) = (row.factor, dk.as_mut());
-                each_tile::<A, _, 4>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
-            }
-        } else {
+        let columns = directions.columns();
+        if const { E::LANES == 1 } {
             for row in dk.as_mut() {
                 row.as_mut()[..columns].fill(E::zeroed());
             }
+            return add_entries::<A, M, E, R, D, S>(M::STRUCTURE.blocks[1], scheme, jacobian, dxi, directions, dk);
         }
-        for entry in begin..M::STRUCTURE.blocks[5] {
-            let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-            let (Some(&[value]), Some(row)) =
-                (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
-            else {
-                continue;
-            };
-            let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
-            let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
-            if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
-                add::<A, E>(coefficient, dxi.as_ref(), sum);
-            } else {
-                directions.add(w, coefficient, sum);
-            }
+        // Entries by states lie row by row.
+        let mut begin = M::STRUCTURE.blocks[1];
+        for (equation, row) in scheme.rows.as_ref().iter().enumerate() {
+            let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
+            let end = M::STRUCTURE.blocks[2];
+            let entries = begin..(begin..end).find(is_other).unwrap_or(end);
+            begin = entries.end;
+            let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
+            let (factor, dk) = (row.factor, dk.as_mut());
+            each_tile::<A, _, 4>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
         }
+        add_entries::<A, M, E, R, D, S>(begin, scheme, jacobian, dxi, directions, dk);
     }
 
     /// `sum = start + h Σ_j weights_j rates_j`, row by row.
@@ -241,22 +227,12 @@ kernels! { by beside;
         sum: &'k mut ArrayX<M, R>,
     ) {
         let columns = directions.columns();
+        if const { E::LANES == 1 } {
+            return combine_numbers::<A, M, E, R>(start, *h, weights, rates, columns, sum);
+        }
         for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
-            let sum = &mut sum.as_mut()[..columns];
-            if const { E::LANES > 1 } {
-                let start = start.as_ref();
-                each_tile::<A, _, 4>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
-                continue;
-            }
-            sum.fill(E::zeroed());
-            for (&weight, rate) in weights.iter().zip(rates) {
-                if !is_zero(weight) {
-                    add::<A, E>(weight, rate[row].as_ref(), sum);
-                }
-            }
-            for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
-                *sum = A::add(start, *h, *sum);
-            }
+            let (sum, start) = (&mut sum.as_mut()[..columns], start.as_ref());
+            each_tile::<A, _, 4>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
         }
     }
 
@@ -276,6 +252,57 @@ kernels! { by beside;
             }
         }
         doubt.keep(finite);
+    }
+}
+
+/// `dk_i += …` of the entries of the Jacobian from one on.
+#[inline(always)]
+fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>, const S: usize>(
+    first: usize,
+    scheme: &Scheme<M, E, S>,
+    jacobian: &M::Jacobian<[E; 1]>,
+    dxi: &ArrayX<M, R>,
+    directions: D,
+    dk: &mut ArrayX<M, R>,
+) {
+    let (nx, columns) = (M::Shape::NX, directions.columns());
+    for entry in first..M::STRUCTURE.blocks[5] {
+        let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
+        let (Some(&[value]), Some(row)) = (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
+        else {
+            continue;
+        };
+        let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
+        let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
+        if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
+            add::<A, E>(coefficient, dxi.as_ref(), sum);
+        } else {
+            directions.add(w, coefficient, sum);
+        }
+    }
+}
+
+/// The same of single numbers: compiled once for the stages and the end.
+#[inline]
+fn combine_numbers<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>>(
+    start: &ArrayX<M, R>,
+    h: E,
+    weights: &[E],
+    rates: &[ArrayX<M, R>],
+    columns: usize,
+    sum: &mut ArrayX<M, R>,
+) {
+    for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
+        let sum = &mut sum.as_mut()[..columns];
+        sum.fill(E::zeroed());
+        for (&weight, rate) in weights.iter().zip(rates) {
+            if !is_zero(weight) {
+                add::<A, E>(weight, rate[row].as_ref(), sum);
+            }
+        }
+        for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
+            *sum = A::add(start, h, *sum);
+        }
     }
 }
 
