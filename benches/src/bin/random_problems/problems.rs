@@ -128,17 +128,7 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
             ];
             (vec![r.one_of(&[0.0, 1.0]), 0.0], p, t)
         }
-        "kinked" => {
-            let mut p = vec![
-                r.power(-1.0, 2.0),
-                r.one_of(&[0.0, 0.01, 0.4]),
-                r.power(-0.3, 0.7),
-                r.between(0.0, 6.0),
-            ];
-            let kind = r.one_of(&[0.0, 1.0, 2.0]);
-            p.extend((0..3).map(|k| if f64::from(k) == kind { 1.0 } else { 0.0 }));
-            (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(3.0, 25.0))
-        }
+        "kinked" => kinked(r),
         "contact" => {
             let p = vec![r.between(1.0, 10.0), r.power(1.0, 4.0), r.one_of(&[0.0, 1.0, 10.0])];
             (vec![r.between(0.1, 1.0), 0.0], p, r.between(0.5, 4.0))
@@ -154,6 +144,15 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
         }
     };
     Problem { family, x0, p, t }
+}
+
+/// One of `max(0, sin)`, its square and its cube.
+fn kinked(r: &mut Random) -> (Vec<f64>, Vec<f64>, f64) {
+    let mut p =
+        vec![r.power(-1.0, 2.0), r.one_of(&[0.0, 0.01, 0.4]), r.power(-0.3, 0.7), r.between(0.0, 6.0)];
+    let kind = r.one_of(&[0.0, 1.0, 2.0]);
+    p.extend((0..3).map(|k| if f64::from(k) == kind { 1.0 } else { 0.0 }));
+    (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(3.0, 25.0))
 }
 
 fn springs(r: &mut Random, rough: f64) -> (Vec<f64>, Vec<f64>, f64) {
