@@ -96,6 +96,49 @@ impl Trend {
     }
 }
 
+/// Refusals of rough steps from one point. The error of a jump falls with the step size at least;
+/// what does not fall are rounding errors, which are rough too.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Roughness {
+    /// The length and the error of the step that was refused last.
+    last: Option<(f64, f64)>,
+    /// How often the error did not fall.
+    kept: usize,
+    /// Errors up to this are of rounding, as far as the run has seen.
+    noise: f64,
+}
+
+impl Roughness {
+    /// So often an error may stay: a jump is elsewhere in the next step.
+    const KEPT: usize = 3;
+
+    /// Whether an error may be that of a jump.
+    pub fn may_be(&self, error: f64) -> bool {
+        error > self.noise
+    }
+
+    /// A rough step with this error: whether it is to be refused.
+    pub fn refuses(&mut self, h: f64, error: f64) -> bool {
+        if let Some((step, before)) = self.last
+            && error >= before * Scalar::sqrt(h / step)
+        {
+            self.kept += 1;
+        }
+        if self.kept >= Self::KEPT {
+            self.noise = 2.0 * error;
+            self.accepted();
+            return false;
+        }
+        self.last = Some((h, error));
+        true
+    }
+
+    /// A step was accepted.
+    pub fn accepted(&mut self) {
+        (self.last, self.kept) = (None, 0);
+    }
+}
+
 /// Where steps are refused by much again and again the solution is not smooth: methods have no
 /// higher order than their estimates there.
 #[derive(Clone, Copy, Debug, Default)]

@@ -6,6 +6,9 @@ use crate::adaptive::stages::Convergence;
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
 const ROUGH_OVER_ERROR: f64 = 8.0;
+/// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
+/// times as large, of `f64` with relative tolerances of 3e-11 and more.
+const ABOVE_NOISE: f64 = 1e4;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
@@ -151,16 +154,18 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
         let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *finer / ROUGH_OVER_ERROR;
-        if error * counted >= 1.0 {
+        let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
+        if is_above_rounding && error * counted >= 1.0 && walk.roughness.may_be(error) {
             let growth = walk.trend.growth(size, error, order);
             let rough = stages.roughness(&start, growth, &mut self.statistics.residuals)? * counted;
-            if rough >= 1.0 {
+            if rough >= 1.0 && walk.roughness.refuses(size, error) {
                 // A derivative that jumps leaves an error like the fourth power of the step size,
                 // or a lower one.
                 return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));
             }
         }
         walk.trend.accepted(size, error, order, *noise);
+        walk.roughness.accepted();
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{IMPLICIT, Predictive, Refusals, Trend};
+use crate::adaptive::control::{IMPLICIT, Predictive, Refusals, Roughness, Trend};
 use crate::adaptive::stages::Convergence;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -91,6 +91,7 @@ pub(super) struct Walk<T> {
     pub controller: Predictive,
     pub refusals: Refusals,
     pub trend: Trend,
+    pub roughness: Roughness,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
@@ -124,6 +125,7 @@ impl<T: Real> Walk<T> {
             controller: Predictive::default(),
             refusals: Refusals::default(),
             trend: Trend::default(),
+            roughness: Roughness::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
