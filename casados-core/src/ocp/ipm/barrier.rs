@@ -1,9 +1,7 @@
 //! How the barrier parameter changes.
 
-use super::IpmOptions;
-use super::state::State;
 use crate::qp::Residuals;
-use crate::qp::interior::{Iterate, Sides, set};
+use crate::qp::interior::{Sides, set};
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.
@@ -160,22 +158,6 @@ pub(super) fn shrink(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64
 /// `τ`: slacks and multipliers keep `1 − τ` of what they have.
 pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
     (1.0 - mu).max(0.99)
-}
-
-/// The next barrier parameter; another one has another filter.
-pub(super) fn update<T: Real>(
-    state: &mut State<'_>,
-    iterate: &Iterate<'_, T>,
-    residuals: &Residuals,
-    options: &IpmOptions,
-) {
-    let Sides { slack, multiplier, .. } = &iterate.sides;
-    let error = |mu| error(residuals, farthest(slack, multiplier, mu));
-    let before = state.mu;
-    state.mu = state.progress.next(before, error, mean(&iterate.sides), options.least_error());
-    if state.mu != before {
-        state.filter.clear();
-    }
 }
 
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.

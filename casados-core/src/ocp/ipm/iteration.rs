@@ -162,7 +162,7 @@ where
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        barrier::update(state, &iterate, &residuals, &self.options);
+        state.update_barrier(&iterate, &residuals, &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());

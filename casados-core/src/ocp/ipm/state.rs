@@ -1,10 +1,14 @@
 //! What a run remembers.
 
-use super::barrier::{Barrier, Progress};
+use super::IpmOptions;
+use super::barrier::{self, Barrier, Progress};
 use super::direction::Regularisation;
 use super::lengths::Lengths;
 use crate::ocp::filter::Filter;
 use crate::ocp::log::Iteration;
+use crate::qp::Residuals;
+use crate::qp::interior::{Iterate, Sides};
+use crate::scalar::Real;
 
 /// `γ_φ`
 pub(super) const MARGIN: f64 = 1e-8;
@@ -45,6 +49,23 @@ pub(super) struct State<'c> {
 }
 
 impl State<'_> {
+    /// The next barrier parameter; another one has another filter.
+    pub fn update_barrier<T: Real>(
+        &mut self,
+        iterate: &Iterate<'_, T>,
+        residuals: &Residuals,
+        options: &IpmOptions,
+    ) {
+        let Sides { slack, multiplier, .. } = &iterate.sides;
+        let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
+        let mean = barrier::mean(&iterate.sides);
+        let mu = self.progress.next(self.mu, error, mean, options.least_error());
+        if mu != self.mu {
+            self.mu = mu;
+            self.filter.clear();
+        }
+    }
+
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
     pub fn begin_monotone(&mut self, mu: f64) {
         self.progress = Progress::new(Barrier::Monotone);
