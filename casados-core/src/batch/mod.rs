@@ -47,7 +47,7 @@ use crate::tableau::{
 /// `Batch<Model, Gauss<4>>`, or `Batch<Model, Rk4>` of an explicit model.
 ///
 /// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, which [`Intervals`] lists; each is
-/// integrated as [`Irk`](crate::Irk) does, or [`Erk`](crate::Erk) of an explicit method, side by
+/// integrated as [`Irk`] does, or [`Erk`] of an explicit method, side by
 /// side in registers and, with the feature `parallel`, over threads. Results are written into the
 /// caller's slice, an element for each.
 ///
