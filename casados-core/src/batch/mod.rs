@@ -126,7 +126,9 @@ pub type Batch<M, B, T = f64> = Integrator<<B as Batched<M, T>>::Single>;
 ///     Ok(ends.map(|end| end.x[0]))
 /// }
 /// let (options, exact) = (Options::default(), [0.5, 1.0, 1.5]);
-/// for ends in [ends::<Rk4>(Batch::new(options)?)?, ends::<Gauss<2>>(Batch::new(options)?)?] {
+/// let explicit = ends::<Rk4>(Batch::<Cart, Rk4>::new(options)?)?;
+/// let implicit = ends::<Gauss<2>>(Batch::<Cart, Gauss<2>>::new(options)?)?;
+/// for ends in [explicit, implicit] {
 ///     assert!(ends.iter().zip(exact).all(|(end, exact)| (end - exact).abs() < 1e-14));
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
