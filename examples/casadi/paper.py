@@ -4,7 +4,8 @@
 To be run by a Python that has casadi, matplotlib and numpy. acados takes part if
 `ACADOS_SOURCE_DIR` is set. A whole run takes half an hour with the libraries. What was run is
 remembered in target/paper/, so that a run that was interrupted goes on where it was, and only what
-has changed is run again.
+has changed is run again. With --libraries the libraries are built and nothing is run: for a machine
+that is to be quiet later.
 """
 
 import argparse
@@ -31,6 +32,7 @@ def arguments():
     parser.add_argument("--masses", default="3,4,5,6,7", help="sizes of the chain")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin nothing after this time")
     parser.add_argument("--again", action="store_true", help="forget what was run")
+    parser.add_argument("--libraries", action="store_true", help="build the libraries alone")
     parser.add_argument("--page", action="store_true", help="write the page from what was run alone")
     return parser.parse_args()
 
@@ -109,14 +111,18 @@ def main():
         common.cargo("nothing")
         results.all |= {"machine": page.machine(), "date": f"{datetime.date.today():%B %Y}"}
         for name, features, runs in experiments(given):
-            for action in [lambda: results.build(name, features), *[lambda k=k, run=run: results.run(name, k, run) for k, run in runs.items()]]:
+            actions = [lambda name=name, features=features: results.build(name, features)]
+            if not given.libraries:
+                actions += [lambda k=k, run=run, name=name: results.run(name, k, run) for k, run in runs.items()]
+            for action in actions:
                 if time.monotonic() - begin > given.seconds:
                     print("time is up: run it again to go on")
                     return
                 action()
                 results.write()
-    page.write(results.all, target)
-    print(f"written: {target}")
+    if not given.libraries:
+        page.write(results.all, target)
+        print(f"written: {target}")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 //! What functions of integrators want, and how results become their outputs.
 
-use super::cache::{Answer, equal};
+use super::cache::{Answer, Part, equal};
 use super::function::{Call, Port, Signature};
 use super::second::Blocks;
 use super::signature::{self, Output, Run, Source};
@@ -78,31 +78,67 @@ impl Wanted {
     }
 }
 
-/// The outputs that are wanted.
-pub fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
-    for (index, Output { source, runs, .. }) in outputs.iter().enumerate() {
-        let Some(to) = call.output(index) else { continue };
-        let part = match source {
-            Source::Value => &answer.value,
-            Source::Jacobian => &answer.jacobian,
-            Source::Gradient => &answer.gradient,
-            Source::Hessian => &answer.hessian,
-            Source::Zero => continue,
+/// The numbers that outputs are made of: of each source as blocks that count as one behind the
+/// other. What is not there is empty.
+#[derive(Clone, Copy, Default)]
+pub struct Numbers<'a> {
+    pub value: [&'a [f64]; 1],
+    pub jacobian: [&'a [f64]; 3],
+    pub gradient: [&'a [f64]; 3],
+    pub hessian: [&'a [f64]; 6],
+}
+
+impl<'a> Numbers<'a> {
+    /// Those of an answer.
+    pub fn of<T>(answer: &'a Answer<T>) -> Self {
+        let of = |part: &'a Part| part.get().map_or(&[][..], |values| values);
+        Self {
+            value: [of(&answer.value)],
+            jacobian: [of(&answer.jacobian), &[], &[]],
+            gradient: [of(&answer.gradient), &[], &[]],
+            hessian: [of(&answer.hessian), &[], &[], &[], &[], &[]],
+        }
+    }
+
+    /// The block that has this place of a source, and the place where the block begins.
+    fn block(&self, source: Source, place: usize) -> (&'a [f64], usize) {
+        let blocks = match source {
+            Source::Value => &self.value[..],
+            Source::Jacobian => &self.jacobian,
+            Source::Gradient => &self.gradient,
+            Source::Hessian => &self.hessian,
+            Source::Zero => &[],
         };
-        if let Some(from) = part.get() {
-            let mut rest = to;
-            for &Run { first, stride, count } in runs {
-                let (to, behind) = rest.split_at_mut(count.min(rest.len()));
-                rest = behind;
-                let from = from.get(first..=first + stride * (count - 1)).unwrap_or_default();
-                if stride == 1 && from.len() == to.len() {
-                    to.copy_from_slice(from);
-                } else if from.is_empty() {
-                    to.fill(f64::NAN);
-                } else {
-                    let from = from.iter().step_by(stride);
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-                }
+        let mut begin = 0;
+        for block in blocks {
+            if place < begin + block.len() {
+                return (block, begin);
+            }
+            begin += block.len();
+        }
+        (&[], begin)
+    }
+}
+
+/// The outputs that are wanted. Each has its numbers in one block.
+pub fn write(numbers: &Numbers<'_>, outputs: &[Output], call: &mut dyn Call) {
+    for (index, Output { source, runs, .. }) in outputs.iter().enumerate() {
+        let Some(run) = runs.first() else { continue };
+        let Some(to) = call.output(index) else { continue };
+        let (block, begin) = numbers.block(*source, run.first);
+        let mut rest = to;
+        for &Run { first, stride, count } in runs {
+            let (to, behind) = rest.split_at_mut(count.min(rest.len()));
+            rest = behind;
+            let range = first.wrapping_sub(begin)..=(first + stride * (count - 1)).wrapping_sub(begin);
+            let from = block.get(range).unwrap_or_default();
+            if stride == 1 && from.len() == to.len() {
+                to.copy_from_slice(from);
+            } else if from.is_empty() {
+                to.fill(f64::NAN);
+            } else {
+                let from = from.iter().step_by(stride);
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
         }
     }
@@ -116,12 +152,22 @@ fn join(parts: [&[f64]; 3], to: &mut [f64]) {
 
 /// Over `(x₀, u, p)`.
 pub fn gradient<M: Dae>(result: &Adjoint<M>, to: &mut [f64]) {
-    join([result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()], to);
+    join(of_adjoint(result), to);
 }
 
 /// Over `(x₀, u, p)`.
 pub fn gradient_of<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    join([result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()], to);
+    join(of_gradient(result), to);
+}
+
+/// The blocks of `∇(λᵀx)`.
+pub fn of_adjoint<M: Dae>(result: &Adjoint<M>) -> [&[f64]; 3] {
+    [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()]
+}
+
+/// The blocks of `∇(λᵀx)`.
+pub fn of_gradient<M: Dae>(result: &Hessian<M>) -> [&[f64]; 3] {
+    [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()]
 }
 
 /// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
@@ -143,22 +189,30 @@ pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &m
 
 /// The rows of the states in a matrix of `ny` rows.
 pub fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
-    let blocks = [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()];
-    rows(blocks, M::Shape::NX, 0, ny, to);
+    rows(of_jacobian(result), M::Shape::NX, 0, ny, to);
 }
 
-/// The blocks, one behind the other.
-pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    let blocks = [
+/// The blocks of `∂x/∂(x₀, u, p)`.
+pub fn of_jacobian<M: Dae>(result: &Forward<M>) -> [&[f64]; 3] {
+    [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()]
+}
+
+/// The blocks of `∇²(λᵀx)`.
+pub fn of_hessian<M: Dae>(result: &Hessian<M>) -> [&[f64]; 6] {
+    [
         result.h_xx.as_slice(),
         result.h_xu.as_slice(),
         result.h_uu.as_slice(),
         result.h_xp.as_slice(),
         result.h_up.as_slice(),
         result.h_pp.as_slice(),
-    ];
+    ]
+}
+
+/// The blocks, one behind the other.
+pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
     let mut rest = to;
-    for block in blocks {
+    for block in of_hessian(result) {
         let (to, behind) = rest.split_at_mut(block.len());
         to.copy_from_slice(block);
         rest = behind;

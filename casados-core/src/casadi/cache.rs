@@ -136,10 +136,10 @@ struct Entry<T> {
 
 /// Derivatives that were computed, whether they were kept or not.
 #[derive(Clone, Copy, Debug, Default)]
-struct Given {
-    jacobian: bool,
+pub struct Given {
+    pub jacobian: bool,
     /// The key of the multipliers of those of second order.
-    second: Option<u64>,
+    pub second: Option<u64>,
 }
 
 impl<T: Default> Cache<T> {
@@ -175,8 +175,8 @@ impl<T: Default> Cache<T> {
     }
 
     /// Takes what is to be kept about these inputs, and leaves some other memory in its place. The
-    /// oldest inputs are forgotten if there is no place.
-    pub fn store(&mut self, key: u64, inputs: &[f64], answer: &mut Answer<T>) {
+    /// oldest inputs are forgotten if there is no place. `given` is what was asked for.
+    pub fn store(&mut self, key: u64, inputs: &[f64], answer: &mut Answer<T>, given: Given) {
         if self.capacity == 0 {
             return;
         }
@@ -205,10 +205,8 @@ impl<T: Default> Cache<T> {
         if self.derivatives {
             entry.answer.take(answer);
         } else {
-            entry.given.jacobian |= answer.jacobian.valid;
-            if let Some(lambda) = answer.lambda.get() {
-                entry.given.second = Some(self::key(lambda));
-            }
+            entry.given.jacobian |= given.jacobian;
+            entry.given.second = given.second.or(entry.given.second);
             entry.answer.take_stages(answer);
         }
         self.places.insert(key, place);

@@ -2,9 +2,9 @@
 //! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{
-    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, second, write,
+    Numbers, Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, second, write,
 };
-use super::cache::{Answer, Cache, key};
+use super::cache::{Answer, Cache, Given, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integrators::Settings;
@@ -207,15 +207,15 @@ impl<B: Horizon> Client for Horizons<B> {
             if let Some(answer) =
                 cache.find(key, &worker.inputs).filter(|answer| wanted.is_in(answer, &worker.lambda))
             {
-                write(answer, outputs, call);
+                write(&Numbers::of(answer), outputs, call);
                 return Ok(());
             }
         }
         worker.answer.clear();
         self.compute(worker, wanted)?;
-        write(&worker.answer, outputs, call);
+        write(&Numbers::of(&worker.answer), outputs, call);
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.store(key, &worker.inputs, &mut worker.answer);
+        cache.store(key, &worker.inputs, &mut worker.answer, Given::default());
         Ok(())
     }
 

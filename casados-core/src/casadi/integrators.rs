@@ -4,10 +4,8 @@
 //! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
 
 use super::algebraic::{self, Sizes};
-use super::blocks::{
-    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, second, write,
-};
-use super::cache::{Answer, Cache, Part, key};
+use super::blocks::{self, Numbers, Wanted, jacobian, read_inputs, read_multipliers, rows, second, write};
+use super::cache::{self, Answer, Cache, Given, Part, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
@@ -129,7 +127,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         worker.keeps = cache.keeps_derivatives();
         let Some(answer) = cache.find(key, &worker.inputs) else { return false };
         if wanted.is_in(answer, &worker.lambda) {
-            write(answer, outputs, call);
+            write(&Numbers::of(answer), outputs, call);
             return true;
         }
         if let Some(tape) = answer.tape.get() {
@@ -141,22 +139,34 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         false
     }
 
-    /// Computes what is wanted, from stages that are known if there are any.
-    fn compute(&self, worker: &mut Worker<I, Q>, wanted: &Wanted) -> Result<(), Failure> {
+    /// Parameters, and stages that are known; without any the next call is one more integration.
+    fn begin(&self, integrator: &mut I, p: &[f64], tape: Option<&I::Tape>) -> Result<(), Failure> {
+        if !p.is_empty() {
+            integrator.parameters(&vector(p))?;
+        }
+        match tape {
+            Some(tape) => Ok(integrator.restore(tape)?),
+            None => {
+                self.integrations.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            }
+        }
+    }
+
+    /// Computes what is wanted, from stages that are known if there are any, and writes it.
+    fn compute(
+        &self,
+        worker: &mut Worker<I, Q>,
+        wanted: &Wanted,
+        outputs: &[Output],
+        call: &mut dyn Call,
+    ) -> Result<(), Failure> {
         let Worker { integrator, integrals, inputs, lambda, answer, keeps, zeta } = worker;
         let sizes @ Sizes { nx, nz, ny, .. } = Self::sizes(&self.settings);
         let (x0, rest) = inputs.split_at(nx);
         let (u, p) = rest.split_at(Self::NU);
         let point = Point { x0: vector(x0), u: vector(u), h: self.settings.interval };
-        if !p.is_empty() {
-            integrator.parameters(&vector(p))?;
-        }
-        match answer.tape.get() {
-            Some(tape) => integrator.restore(tape)?,
-            None => {
-                self.integrations.fetch_add(1, Ordering::Relaxed);
-            }
-        }
+        self.begin(integrator, p, answer.tape.get())?;
         let (of_states, rest) = lambda.split_at(nx);
         let (nu, of_integrals) = rest.split_at(nz);
         let mut seed: VectorX<I::Model, f64> = vector(of_states);
@@ -172,18 +182,31 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
                 integrator.restore(tape)?;
             }
         }
-        let asked = Asked { point: &point, seed: &seed, wanted: *wanted, keeps: *keeps || algebraic, sizes };
-        asked.of(integrator, Q::along(integrals, of_integrals), answer)?;
+        // With algebraic states and integrals outputs have more than the integrator's own results.
+        let whole = !algebraic && Q::COUNT == 0;
+        let asked = Asked {
+            point: &point,
+            seed: &seed,
+            wanted: *wanted,
+            copies: *keeps || !whole,
+            keeps: *keeps || algebraic,
+            sizes,
+            outputs: if whole { outputs } else { &[] },
+        };
+        asked.of(integrator, Q::along(integrals, of_integrals), answer, call)?;
         keep(integrator, &mut answer.tape)?;
         if adjoint {
             answer.lambda.set(ny).copy_from_slice(lambda);
+        }
+        answer.algebraic = [algebraic; 2];
+        if whole {
+            return Ok(());
         }
         let values = answer.value.open();
         values[nx + nz..].copy_from_slice(Q::value(integrals));
         if answer.jacobian.get().is_some() {
             rows(Q::jacobian(integrals), Q::COUNT, nx + nz, ny, answer.jacobian.open());
         }
-        answer.algebraic = [algebraic; 2];
         if algebraic {
             if !adjoint {
                 let end = Point { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };
@@ -201,6 +224,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
                 algebraic::add_to_hessian(sizes, second::<I::Model>(), zeta, jacobian, answer.hessian.open());
             }
         }
+        write(&Numbers::of(answer), outputs, call);
         Ok(())
     }
 
@@ -225,40 +249,55 @@ struct Asked<'a, M: Dae> {
     point: &'a Point<M>,
     seed: &'a VectorX<M, f64>,
     wanted: Wanted,
-    /// Whether the Jacobian is needed where it is computed for the Hessian.
+    /// Whether derivatives are to be in the answer.
+    copies: bool,
+    /// Whether the Jacobian is, too, where it is computed for the Hessian.
     keeps: bool,
     sizes: Sizes,
+    /// The outputs that the results are written to.
+    outputs: &'a [Output],
 }
 
 impl<M: Dae> Asked<'_, M> {
-    /// Writes the answer: the rows of the states, and what there is of gradient and Hessian.
+    /// Writes outputs, and the answer: values, and derivatives if they are to be there.
     fn of<I: Interval<Model = M>>(
         &self,
         integrator: &mut I,
         along: Along<'_, M>,
         answer: &mut Answer<I::Tape>,
+        call: &mut dyn Call,
     ) -> Result<(), Failure> {
-        let Self { point, seed, wanted, keeps, sizes: Sizes { nx, nw, ny, .. } } = *self;
-        let values = answer.value.set(ny);
+        let Self { point, seed, wanted, copies, keeps, sizes, outputs } = *self;
+        let Sizes { nx, nw, ny, .. } = sizes;
+        let mut numbers = Numbers::default();
         if wanted.hessian {
             let result = integrator.curvature(point, seed, along)?;
-            values[..nx].copy_from_slice(result.x.as_slice());
-            if wanted.jacobian || keeps {
+            if keeps || copies && wanted.jacobian {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
-            gradient_of(result, answer.gradient.set(nw));
-            hessian(result, answer.hessian.set(second::<M>().len()));
+            if copies {
+                blocks::gradient_of(result, answer.gradient.set(nw));
+                blocks::hessian(result, answer.hessian.set(second::<M>().len()));
+            }
+            (numbers.gradient, numbers.hessian) = (blocks::of_gradient(result), blocks::of_hessian(result));
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], blocks::of_jacobian(result));
         } else if wanted.gradient {
             let result = integrator.gradient(point, seed, along)?;
-            values[..nx].copy_from_slice(result.x.as_slice());
-            gradient(result, answer.gradient.set(nw));
+            if copies {
+                blocks::gradient(result, answer.gradient.set(nw));
+            }
+            (numbers.value, numbers.gradient) = ([result.x.as_slice()], blocks::of_adjoint(result));
         } else if wanted.jacobian {
             let result = integrator.jacobian(point, along)?;
-            values[..nx].copy_from_slice(result.x.as_slice());
-            jacobian(result, ny, answer.jacobian.set(ny * nw));
+            if copies {
+                jacobian(result, ny, answer.jacobian.set(ny * nw));
+            }
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], blocks::of_jacobian(result));
         } else {
-            values[..nx].copy_from_slice(integrator.value(point, along)?.x.as_slice());
+            numbers.value = [integrator.value(point, along)?.x.as_slice()];
         }
+        answer.value.set(ny)[..nx].copy_from_slice(numbers.value[0]);
+        write(&numbers, outputs, call);
         Ok(())
     }
 }
@@ -332,10 +371,11 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             return Ok(());
         }
         // Stages that were not taken by a call that was refused are not those of the next one.
-        self.compute(worker, &wanted).inspect_err(|_| worker.integrator.forget())?;
-        write(&worker.answer, outputs, call);
+        self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.forget())?;
+        let adjoint = wanted.gradient || wanted.hessian;
+        let given = Given { jacobian: wanted.jacobian, second: adjoint.then(|| cache::key(&worker.lambda)) };
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.store(key, &worker.inputs, &mut worker.answer);
+        cache.store(key, &worker.inputs, &mut worker.answer, given);
         Ok(())
     }
 

@@ -6,9 +6,10 @@ import os
 import subprocess
 import sys
 
+import callbacks
 import casadi as ca
 import numpy as np
-from common import FOLDER, ROOT, Ipopt, data, environment, library, own, race, whole
+from common import FOLDER, ROOT, Ipopt, data, environment, expression, library, own, race, whole
 from models import chain
 
 N, TS, TOLERANCE = 40, 0.2, 1e-6
@@ -126,7 +127,14 @@ def acados(problem, stages, steps):
     return {key: answer[name] for key, name in keys.items()} | {"complete": True}
 
 
-def calls(masses, setting, count=5000):
+def acados_callbacks(problem, stages, steps):
+    """acados' integrator in IPOPT, with Python in between."""
+    name = f"chain_{problem.masses}_s{stages}n{steps}_callback"
+    engine = callbacks.Acados(name, chain(problem.nx), TS, stages, steps, str(FOLDER / "acados"))
+    return problem.shooting(one_by_one(callbacks.integrator(engine, problem.nx, 3)))
+
+
+def calls(masses, setting, count=20000):
     """The shortest times in nanoseconds of calls of Rust, exported ones, and ones that are known."""
     overhead, times = ctypes.CDLL(library(f"chain_{masses}_{setting}")).overhead, {}
     for mode, name in enumerate(["values", "Jacobian", "Hessian"]):
@@ -156,6 +164,9 @@ def runners(masses, setting):
         "casados, whole problem": lambda: whole(path, TOLERANCE),
         "casados, horizon": lambda: problem.shooting(lambda x, u: chains(x, u, ca.MX(0, N))),
         "casados, intervals": lambda: problem.shooting(single(external("chain"))),
+        "casados, call-backs": lambda: problem.shooting(
+            one_by_one(callbacks.integrator(callbacks.Exported("chain", path), problem.nx, 3))
+        ),
         "CasADi collocation": lambda: problem.shooting(theirs(collocation)),
         "direct collocation": lambda: problem.collocation(stages, steps),
         "casados SQP, exact": lambda: lambda: own(path, 0),
@@ -164,10 +175,12 @@ def runners(masses, setting):
     }
     if "ACADOS_SOURCE_DIR" in os.environ:
         makers["acados SQP, Gauss-Newton"] = lambda: lambda: acados(problem, stages, steps)
+        makers["acados, call-backs"] = lambda: acados_callbacks(problem, stages, steps)
     if setting == "s2n1":
         # What has nothing to do with stages and steps of the implicit method.
         rk = lambda: problem.integrator("rk", number_of_finite_elements=4)
         makers |= {
+            "casados RK4, whole problem": lambda: expression(path, "explicit", TOLERANCE),
             "casados RK4": lambda: problem.shooting(single(external("chain_rk4"))),
             "CasADi RK4": lambda: problem.shooting(theirs(rk())),
             "CasADi CVODES": lambda: problem.shooting(theirs(problem.integrator("cvodes", **adaptive)), few),

@@ -112,6 +112,14 @@ def whole(path, tolerance, **more):
     return Ipopt(path, given, tolerance, **more)
 
 
+def expression(path, name, tolerance, **more):
+    """A problem of this name that a library has, besides the one that `nlpsol` finds by itself."""
+    problem = ca.external(name, path)
+    x = ca.MX.sym("x", problem.size_in(0))
+    f, g = problem(x, ca.MX(0, 1))
+    return Ipopt({"x": x, "f": f, "g": g}, ca.external(f"{name}_bounds", path)(), tolerance, **more)
+
+
 @contextlib.contextmanager
 def environment(numbers):
     """Numbers for the library, which reads them when it makes a problem."""

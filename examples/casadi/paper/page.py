@@ -179,13 +179,14 @@ problem; the share of functions is what they measure themselves. Ratios of numbe
 what holds elsewhere.
 
 Functions of IPOPT are `nlp_f`, `nlp_g` and their derivatives; the rest is IPOPT and MUMPS, with the
-order by minimum degree and no scaling, the same for all. Three forms of casados are in IPOPT:
+order by minimum degree and no scaling, the same for all. Four forms of casados are in IPOPT:
 
 | | |
 | --- | --- |
 | whole problem | `nlpsol("s", "ipopt", "lib.so")`: costs, constraints and dynamics in the library |
 | horizon | costs and constraints by CasADi, all 40 intervals by one call of `export_horizon!` |
-| intervals | the same with 40 calls of `export!`, what the paper does |
+| intervals | the same with 40 calls of `export!`, by which CasADi calls the library |
+| call-backs | the same with Python in between, what the paper does with acados' integrators |
 
 Libraries were measured one after the other, and what has not changed since an earlier run was not
 run again. Sizes of the chain without a column were not run.

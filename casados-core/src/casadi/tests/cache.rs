@@ -1,6 +1,6 @@
 //! What is remembered, and what is forgotten.
 
-use crate::casadi::cache::{Answer, Cache, key};
+use crate::casadi::cache::{Answer, Cache, Given, key};
 use alloc::vec;
 
 fn known(value: f64) -> Answer<()> {
@@ -10,7 +10,14 @@ fn known(value: f64) -> Answer<()> {
 }
 
 fn store(cache: &mut Cache<()>, input: f64, answer: &mut Answer<()>) {
-    cache.store(key(&[input]), &[input], answer);
+    store_as(cache, key(&[input]), input, answer);
+}
+
+/// Stores what was asked for, with the derivatives that there are.
+fn store_as(cache: &mut Cache<()>, key: u64, input: f64, answer: &mut Answer<()>) {
+    let second = answer.lambda.get().map(|lambda| self::key(lambda));
+    let given = Given { jacobian: answer.jacobian.get().is_some(), second };
+    cache.store(key, &[input], answer, given);
 }
 
 fn find(cache: &Cache<()>, input: f64) -> Option<&Answer<()>> {
@@ -41,12 +48,12 @@ fn the_oldest_inputs_are_forgotten() {
 #[test]
 fn equal_keys_are_no_equal_inputs() {
     let mut cache = Cache::new(2, true);
-    cache.store(7, &[1.0], &mut known(10.0));
-    cache.store(7, &[2.0], &mut known(20.0));
+    store_as(&mut cache, 7, 1.0, &mut known(10.0));
+    store_as(&mut cache, 7, 2.0, &mut known(20.0));
     assert!(cache.find(7, &[1.0]).is_none());
     assert_eq!(cache.find(7, &[2.0]).unwrap().value.get().unwrap(), &[20.0]);
-    cache.store(8, &[3.0], &mut known(30.0));
-    cache.store(9, &[4.0], &mut known(40.0));
+    store_as(&mut cache, 8, 3.0, &mut known(30.0));
+    store_as(&mut cache, 9, 4.0, &mut known(40.0));
     assert!(cache.find(7, &[2.0]).is_none() && cache.find(8, &[3.0]).is_some());
 }
 

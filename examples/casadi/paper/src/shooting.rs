@@ -53,19 +53,35 @@ casados::casadi::export_horizon! {
     chains = Batch<Chain<NX>, Gauss<STAGES>>, interval = SECONDS, intervals = INTERVALS, options = options()
 }
 casados::casadi::export_problem! { program }
+#[cfg(not(feature = "order-8"))]
+casados::casadi::export_problem! { explicit = explicit }
 
 fn program() -> Result<impl Program + 'static, Box<dyn Error>> {
     formulate()
 }
 
-/// Back to rest from a disturbance; the environment has both states.
 fn formulate()
 -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>> + Send + use<>>, Box<dyn Error>> {
+    back_to_rest(Shooting::new(Batch::<Chain<NX>, Gauss<STAGES>>::new(options())?))
+}
+
+#[cfg(not(feature = "order-8"))]
+fn explicit() -> Result<impl Program + 'static, Box<dyn Error>> {
+    let options = Options { steps: 4, ..Default::default() };
+    back_to_rest(Shooting::new(Batch::<Chain<NX>, Rk4>::new(options)?))
+}
+
+/// Back to rest from a disturbance; the environment has both states.
+fn back_to_rest<D>(
+    dynamics: D,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>> + Send + use<D>>, Box<dyn Error>>
+where
+    D: SecondOrder<f64, Shape = <Chain<NX> as Dae>::Shape> + Send,
+{
     let numbers = numbers()?;
     let (rest, start) = numbers.split_at_checked(NX).ok_or("two states are to be given")?;
-    let batch = Batch::<Chain<NX>, Gauss<STAGES>>::new(options())?;
     let weights = chain_problem::weights::<NX>();
-    let mut ocp = Problem::new(Shooting::new(batch))
+    let mut ocp = Problem::new(dynamics)
         .running_cost((
             LeastSquaresCost::<State<NX>>::diagonal(&weights),
             LeastSquaresCost::<Control<NX>>::diagonal(&[0.02; 3]),
