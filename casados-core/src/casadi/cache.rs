@@ -180,21 +180,22 @@ impl<T: Default> Cache<T> {
         if self.capacity == 0 {
             return;
         }
-        let place = match self.places.get(&key) {
-            Some(&place) => place,
+        // An entry of another key has other inputs. These are not read: their memory is far away.
+        let (place, same) = match self.places.get(&key) {
+            Some(&place) => (place, self.entry(key, inputs).is_some()),
             None if self.entries.len() < self.capacity => {
                 let (answer, given) = (Answer::default(), Given::default());
                 self.entries.push(Entry { key, inputs: inputs.to_vec(), answer, given });
-                self.entries.len() - 1
+                (self.entries.len() - 1, true)
             }
             None => {
                 let oldest = self.oldest;
                 self.oldest = (oldest + 1) % self.capacity;
-                oldest
+                (oldest, false)
             }
         };
         let Some(entry) = self.entries.get_mut(place) else { return };
-        if !equal(&entry.inputs, inputs) {
+        if !same {
             if entry.key != key {
                 self.places.remove(&entry.key);
             }

@@ -200,7 +200,8 @@ CHAIN = """
 Gauss-Legendre methods, but for RK4 with four steps in an interval and for CVODES and IDAS with a
 tolerance of 1e-8. An iteration with a star is one of three, after which IPOPT was stopped. The
 solvers of casados and acados are others than IPOPT: their iterations are their own. With `direct
-collocation` stages are variables, of which MUMPS has many.
+collocation` stages are variables, of which MUMPS has many. The whole problem with RK4 is a second
+one of the same library, which CasADi takes as an expression.
 """
 
 AGREE = """
@@ -250,13 +251,15 @@ CALLS = """
 
 A call of Rust and one through the functions that CasADi calls, in a loop of Rust by turns, at
 inputs that are new each time; and the exported one again at the same inputs, which the cache knows.
-The shortest of thousands. Of the chain with the largest library that was there.
+The shortest of thousands, each kind with a cache that has seen no other. Of the chain with the
+largest library that was there.
 """
 
 BUILDS = """
 ## Libraries
 
 Each has one model with one method as integrator, horizon and whole problem, and the solvers of
-casados that the tables name; the aircraft is `awe`. Seconds are CPU seconds of a build by one
+casados that the tables name; those with two stages have RK4 as integrator and whole problem, too.
+The aircraft is `awe`. Seconds are CPU seconds of a build by one
 thread, after everything that they share was there.
 """

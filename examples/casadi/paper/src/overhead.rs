@@ -19,6 +19,8 @@ unsafe extern "C" {
         _: *mut f64,
         _: c_int,
     ) -> c_int;
+    safe fn chain_incref();
+    safe fn chain_decref();
     fn chain_checkout() -> c_int;
     fn chain_release(_: c_int);
 }
@@ -49,6 +51,20 @@ pub fn measure<const NX: usize>(
     calls: u32,
     start: &[f64; NX],
     mut bare: impl FnMut(&[f64; NX], &[f64; 3]) -> bool,
+) -> Option<[f64; 3]> {
+    // With the last reference the library forgets everything, and that an earlier measurement asked
+    // for derivatives twice.
+    chain_incref();
+    let shortest = alternate(mode, calls, start, &mut bare);
+    chain_decref();
+    shortest
+}
+
+fn alternate<const NX: usize>(
+    mode: Mode,
+    calls: u32,
+    start: &[f64; NX],
+    bare: &mut impl FnMut(&[f64; NX], &[f64; 3]) -> bool,
 ) -> Option<[f64; 3]> {
     let (function, inputs, seed, outputs) = mode.function();
     let (mut x, u, lambda) = (*start, [0.1, -0.2, 0.3], [1.0; NX]);
