@@ -12,13 +12,15 @@ import numpy as np
 class CallBack(ca.Callback):
     """A function with dense inputs and outputs, that gives functions for derivatives."""
 
+    # CasADi refers to call-backs without keeping them.
+    kept = []
+
     def __init__(self, name, inputs, outputs, evaluate, jacobian=None, reverse=None):
         super().__init__()
         self.names, self.sizes = [list(inputs), list(outputs)], [list(inputs.values()), list(outputs.values())]
         self.evaluate, self.jacobian, self.reverse = evaluate, jacobian, reverse
-        # CasADi refers to functions without keeping them.
-        self.kept = []
         self.construct(name, {})
+        self.kept.append(self)
 
     def get_n_in(self):
         return len(self.names[0])
@@ -45,15 +47,13 @@ class CallBack(ca.Callback):
         return self.jacobian is not None
 
     def get_jacobian(self, name, inames, onames, options):
-        self.kept.append(self.jacobian(name))
-        return self.kept[-1]
+        return self.jacobian(name)
 
     def has_reverse(self, count):
         return self.reverse is not None and count == 1
 
     def get_reverse(self, count, name, inames, onames, options):
-        self.kept.append(self.reverse(name))
-        return self.kept[-1]
+        return self.reverse(name)
 
 
 def integrator(engine, nx, nu):
