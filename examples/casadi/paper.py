@@ -2,7 +2,7 @@
 """Runs the experiments of the paper again, each tool up to five times by turns, and writes docs/paper.md.
 
 To be run by a Python that has casadi, matplotlib and numpy. acados takes part if
-`ACADOS_SOURCE_DIR` is set. A whole run takes half an hour with the libraries. What was run is
+`ACADOS_SOURCE_DIR` is set. A whole run takes three quarters of an hour with the libraries. What was run is
 remembered in target/paper/, so that a run that was interrupted goes on where it was, and only what
 has changed is run again. With --libraries the libraries are built and nothing is run: for a machine
 that is to be quiet later.
