@@ -78,9 +78,9 @@ def run(cpu, program, *arguments):
 def to_copy():
     """The package that a user copies: its filter ends with success if the state is where it says."""
     folder = HERE.parent / "microcontroller"
-    build = ["cargo", "build", "--quiet", "--locked", "--release", "--target-dir", str(TARGETS / "microcontroller")]
+    build = ["cargo", "build", "--quiet", "--locked", "--release", "--target-dir", str(TARGETS)]
     subprocess.run(build, cwd=folder, check=True)
-    print(emulate("cortex-m7", TARGETS / "microcontroller" / TARGET / "release/filter"), end="")
+    print(emulate("cortex-m7", TARGETS / TARGET / "release/filter"), end="")
 
 
 def desk(programs):
