@@ -23,6 +23,7 @@ mod coupling;
 mod curvature;
 mod degenerate;
 mod errors;
+mod estimation;
 mod guesses;
 mod infeasible;
 mod ipm;

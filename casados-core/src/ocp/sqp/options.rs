@@ -19,7 +19,9 @@ pub enum Globalisation {
     /// `ν_i ← max(|λ_i|, ½ (ν_i + |λ_i|), 0.01 max |λ|)` (M. J. D. Powell, "A fast algorithm for
     /// nonlinearly constrained optimization calculations", 1978, and a bound from below). Where the
     /// step is no direction of descent all of them grow until it is. Near a solution full steps are
-    /// what it accepts: the linearisation there is that of the next iteration.
+    /// what it accepts: the linearisation there is that of the next iteration. With the Hessian of
+    /// Gauss and Newton, steps of a quarter or less give way to damped ones while weighted gaps are
+    /// more than what the objective changes by.
     #[default]
     Merit,
     /// As far as objective or violation shrink compared to all iterates before, with second-order

@@ -30,7 +30,8 @@ const ROOM: usize = 64;
 const PASSING: usize = 4;
 
 /// The regularisation of directions, where no step along the one before is short enough.
-const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, 1e2];
+const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
+const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -68,6 +69,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             elastic: false,
             regularisation: 0.0,
             damping: 0.0,
+            passing: false,
             nearest: false,
             penalty: 0.0,
             elastic_steps: 0,
@@ -240,7 +242,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let mut failure = None;
+        // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
+        let damps = !C::EXACT && self.curvature.update().is_none();
         for damping in DAMPING {
+            if damps && damping > 0.0 && damping <= state.damping {
+                continue;
+            }
+            state.passing = damps && damping.max(state.damping) < MOST_DAMPING;
             if damping > 0.0 {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.

@@ -20,6 +20,10 @@ const LEAST: f64 = 1e-2;
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
 const SHARE: f64 = 0.1;
+/// A step of Gauss and Newton that is no longer is refused where gaps and violations count more
+/// than the objective, if damping can be larger: a shorter step shrinks all linear gaps by the same
+/// part, a damped one goes less far in what would have to go farthest.
+const SHORT: f64 = 0.25;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short
@@ -49,8 +53,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !written {
             self.curvature.follow(f64::INFINITY);
         }
+        let passing = state.passing && weighted && line.here.violation > line.slope.abs();
+        let shortest = if passing { 2.0 * SHORT } else { self.options.shortest_step };
         let mut length = 1.0;
-        while length >= self.options.shortest_step {
+        while length >= shortest {
             let Self { options, solution, trial, work, weights, .. } = self;
             let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
             between(&ocp.iterate, solution, length, trial);

@@ -19,6 +19,8 @@ pub(super) struct State<T> {
     pub elastic_steps: usize,
     /// The penalty that violations were found to need; zero at first.
     pub penalty: f64,
+    /// Whether a short step may be refused, because more damping can be tried.
+    pub passing: bool,
     /// The largest residual of the best iterate.
     pub best_residual: f64,
     /// That iterate.
