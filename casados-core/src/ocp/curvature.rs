@@ -81,6 +81,21 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
     }
 }
 
+/// First derivatives, where the Hessian does not matter yet: it is that of [`GaussNewton`], convex
+/// or not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slopes;
+
+impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Slopes {
+    const EXACT: bool = false;
+    fn convexification(&self) -> Convexification {
+        Convexification::None
+    }
+    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.linearise(nodes, sink)
+    }
+}
+
 /// How a Hessian learns from a step `s` and the difference `y` of gradients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]

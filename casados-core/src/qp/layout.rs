@@ -121,6 +121,7 @@ impl Place {
         self.ld * self.pivots
     }
     /// The same parts, behind those of `before`.
+    #[cfg_attr(feature = "std", inline(always))]
     const fn after(mut self, before: &Self) -> Self {
         self.data = before.data + before.data_len();
         self.v = before.v + before.ld;
@@ -130,6 +131,7 @@ impl Place {
         self
     }
     /// The same parts, before those of `after`.
+    #[cfg_attr(feature = "std", inline(always))]
     const fn before(mut self, after: &Self) -> Self {
         self.data = after.data.saturating_sub(self.data_len());
         self.v = after.v.saturating_sub(self.ld);

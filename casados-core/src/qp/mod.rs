@@ -102,7 +102,7 @@ pub(crate) use coupling::{is_marked, marked};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{Places, assign, end, pad, part, part_mut, take_mut};
+pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
 pub(crate) use residuals::bounds as bound_residuals;
 pub(crate) use stage::Arrays;
 pub(crate) use statistics::larger;

@@ -7,8 +7,9 @@
 //! ```
 //!
 //! Times are CPU time of one thread. What is compared takes turns, round by round, and the medians
-//! of the rounds count; IPOPT runs once in each of the first rounds. `--starts 10` takes fewer
-//! random starts than a hundred, `--only starts` (or `times`) a part.
+//! of the rounds count; IPOPT runs once in each of the first rounds. `--only times` (or `horizons`,
+//! `starts`) writes one part and leaves the others; `--starts 10` takes fewer random starts than a
+//! hundred.
 
 #[path = "../../../../examples/models/awe.rs"]
 mod awe;
@@ -296,27 +297,38 @@ fn directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     Ok(plain.map(|iteration| 1e3 * iteration.times.qp).collect())
 }
 
+/// A part of the tables, where it is asked for, to its place.
+fn part(
+    arguments: &[String],
+    name: &str,
+    write: impl FnOnce(&mut String) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let value = |name: &str| value(arguments, name);
+    if value("--only").is_some_and(|only| only != name) {
+        return Ok(());
+    }
+    let mut table = String::new();
+    write(&mut table)?;
+    println!("{table}");
+    match value("--write") {
+        Some(file) => Ok(insert(Path::new(file), &format!("interior point, {name}"), &table)?),
+        None => Ok(()),
+    }
+}
+
+/// What follows an argument.
+fn value<'a>(arguments: &'a [String], name: &str) -> Option<&'a str> {
+    let at = arguments.iter().position(|argument| argument == name)?;
+    arguments.get(at + 1).map(String::as_str)
+}
+
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().collect();
-    let value = |name: &str| arguments.iter().position(|a| a == name).and_then(|i| arguments.get(i + 1));
-    let only = value("--only").map(String::as_str);
-    let count = value("--starts").map_or(Ok(100), |count| count.parse())?;
+    let count = value(&arguments, "--starts").map_or(Ok(100), str::parse)?;
     eprintln!("pinned: {}", pin());
     let mut ipopt = Peer::start("casadi_starts.py", |command| command).ok();
     let orbit = Record::from(load("tests/data/awe/orbit.json")?);
-    let mut table = String::new();
-    if only != Some("starts") {
-        times(&mut table, &orbit, &mut ipopt)?;
-        table.push('\n');
-        scaling(&mut table, &orbit)?;
-        table.push('\n');
-    }
-    if only != Some("times") {
-        starts::random(&mut table, &orbit, &mut ipopt, count)?;
-    }
-    println!("{table}");
-    match value("--write") {
-        Some(file) => Ok(insert(Path::new(file), "interior point", &table)?),
-        None => Ok(()),
-    }
+    part(&arguments, "times", |table| times(table, &orbit, &mut ipopt))?;
+    part(&arguments, "horizons", |table| scaling(table, &orbit))?;
+    part(&arguments, "starts", |table| starts::random(table, &orbit, &mut ipopt, count))
 }

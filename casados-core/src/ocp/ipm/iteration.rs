@@ -10,8 +10,8 @@ use super::state::{MARGIN, State};
 use super::work::Work;
 use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
-use crate::ocp::curvature::Exact;
-use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
+use crate::ocp::curvature::{Exact, Slopes};
+use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction, larger};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
@@ -111,7 +111,7 @@ where
             }
             // Where no step made progress is no place to begin.
             ocp.recall(&self.best);
-            let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+            let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
             elastic::soften(ocp, state, work.penalties, self.options.elastic_penalty);
             return Ok(None);
         };
@@ -133,16 +133,13 @@ where
     {
         if !state.has_slacks {
             if !core::mem::take(&mut state.is_linearised) {
-                ocp.linearise(EXACT)?;
+                ocp.linearise(Slopes)?;
             }
             self.begin(ocp, capacity, state)?;
         }
         self.curve(ocp, capacity, state)?;
         ocp.linearise(EXACT)?;
-        let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        iterate.take_point(&solution.view_mut());
-        iterate.store(&mut solution.view_mut());
+        attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         Ok(())
     }
 
@@ -154,10 +151,15 @@ where
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<(), OcpError> {
-        let (mut residuals, objective) = ocp.residuals();
+        let (plain, [_, of_stages]) = (ocp.objective.to_f64(), ocp.stages.map(|left| left.to_f64()));
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        evaluate(&mut iterate, &mut solution.view_mut());
+        let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
+        iterate.store(&mut solution.view_mut());
+        let objective = plain + penalties;
+        if P::Dynamics::LIFTED {
+            residuals.dynamics = larger(residuals.dynamics, of_stages);
+        }
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
@@ -165,7 +167,7 @@ where
         state.update_barrier(&iterate, &residuals, &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
-        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
         let size = residuals.largest().max(violation);
         if size < state.best_residual || row.iteration == 0 {
@@ -186,7 +188,7 @@ where
         state: &mut State<'_>,
         row: &Iteration,
     ) -> Next {
-        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         if row.residuals.largest() <= self.options.tolerance {
             let end = elastic::verdict(ocp, state, work.penalties, &self.options);
             return end.map_or(Next::NewPenalties, Next::End);
@@ -255,7 +257,7 @@ where
         let mut here = measure::here(&iterate, plain, state.mu);
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
-            let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
+            let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
             let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
             here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
         }
@@ -280,7 +282,7 @@ where
         here: Measure,
         is_corrected: bool,
     ) -> Result<Direction, QpError> {
-        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let expected = Expected {
             here,
@@ -313,7 +315,7 @@ where
         macro_rules! room {
             ($work:ident) => {{
                 let Self { trial, numbers, indices, work, .. } = &mut *self;
-                $work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
+                $work = Work::new(ocp.ends(), capacity, work.as_mut());
                 Room { lengths: &lengths, numbers, indices, trial, work: &mut $work }
             }};
         }
@@ -342,7 +344,7 @@ where
         direction: &Direction,
         accepted: Accepted,
     ) -> Result<(), OcpError> {
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+        let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let Accepted { alpha, corrected } = accepted;

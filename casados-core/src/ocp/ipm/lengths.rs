@@ -1,6 +1,6 @@
 //! How much memory Newton's equations take.
 
-use crate::qp::interior::{Counts, Iterate, Penalties, Reading, count, is_first_fixed};
+use crate::qp::interior::{Counts, Extent, Iterate, Penalties, Reading, count, is_first_fixed};
 use crate::qp::{InteriorPointOptions, QpView};
 use crate::scalar::Real;
 
@@ -10,6 +10,7 @@ pub(super) struct Lengths {
     pub counts: Counts,
     pub fixed: bool,
     pub numbers: usize,
+    pub extent: Extent,
 }
 
 impl Lengths {
@@ -17,13 +18,14 @@ impl Lengths {
     pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
         let reading = reading(qp);
         let counts = count(qp, &reading);
-        Self { counts, fixed: reading.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
+        let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
+        Self { counts, fixed: reading.fixed, numbers, extent }
     }
 
     /// Of the same problem with every bound soft, equations too.
     pub fn all_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
         let counts = all_soft(&self.counts);
-        Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
+        Self { counts, numbers: Iterate::<T>::memory_of(qp, &counts), ..*self }
     }
 }
 

@@ -37,7 +37,7 @@ where
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let mut work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
+        let mut work = Work::new(ends, capacity, self.work.as_mut());
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
@@ -69,7 +69,7 @@ where
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
+        let work = Work::new(ends, capacity, self.work.as_mut());
         assign(work.slacks, iterate.sides.multiplier);
         assign(iterate.sides.multiplier, work.hessian_multipliers);
         iterate.take_point(&view);

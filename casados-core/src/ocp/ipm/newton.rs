@@ -6,7 +6,7 @@
 use super::lengths::{Lengths, reading};
 use super::work::Work;
 use crate::qp::interior::{First, Iterate, Sides};
-use crate::qp::{Places, QpError, QpField, QpView, SolutionView, Store, assign};
+use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// The iterate of Newton's method in its memory, whose contents stay as they were.
@@ -24,7 +24,7 @@ pub(super) fn attach<'a, T: Real>(
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
     sides.compliance = T::from_f64(T::EPSILON).sqrt();
-    Ok(Iterate::new(qp, first, sides, &mut numbers))
+    Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 
 /// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties.
@@ -42,16 +42,23 @@ pub(super) fn attach_to_new<'a, T: Real>(
     Ok(iterate)
 }
 
-/// Evaluates all residuals at a point with its multipliers `π`.
-pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, at: &mut SolutionView<'_, T>) {
+/// Evaluates all residuals at a point with its multipliers `π`: the largest of those of the
+/// problem, and what violations of soft bounds cost.
+pub(super) fn evaluate<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    at: &mut SolutionView<'_, T>,
+) -> (Residuals, f64) {
     iterate.take_point(at);
     iterate.give_initial_state();
-    T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics });
+    let mut found = Default::default();
+    T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics, found: &mut found });
+    found
 }
 
 struct Evaluate<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
+    found: &'s mut (Residuals, f64),
 }
 
 compiled!(/// See [`Evaluate`].
@@ -60,7 +67,10 @@ EvaluateCompiled: Evaluate<'r, 'a, 's, T>);
 impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        self.iterate.evaluate_at::<E>(self.pi);
+        let Self { iterate, pi, found } = self;
+        iterate.evaluate_at::<E>(pi);
+        let penalties = iterate.sides.costs_of_violations().to_f64();
+        *found = (iterate.at_point::<E>().into(), penalties);
     }
 }
 

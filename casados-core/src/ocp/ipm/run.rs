@@ -7,8 +7,7 @@ use super::lengths::Lengths;
 use super::start::push_inside;
 use super::state::{MARGIN, State};
 use super::work::Work;
-use crate::ocp::convexify::Convexification;
-use crate::ocp::curvature::Exact;
+use crate::ocp::curvature::Slopes;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::Filter;
@@ -109,7 +108,7 @@ where
         self.options.check()?;
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        ocp.linearise_guess(Exact { convexification: Convexification::None }, &mut self.trial)?;
+        ocp.linearise_guess(Slopes, &mut self.trial)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State {
             over,
@@ -162,7 +161,7 @@ where
             }
             outcome.iterations += 1;
         };
-        let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.set_penalties(work.penalties, None);
         if outcome.status != Status::Converged && state.best_residual.is_finite() {
             ocp.recall(&self.best);
@@ -194,7 +193,7 @@ where
         push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
         ocp.join_controls();
         let stays = self.trial.vectors().0 == ocp.iterate.vectors().0;
-        let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);
         Ok((lengths, capacity, stays))
     }

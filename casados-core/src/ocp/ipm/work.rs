@@ -2,8 +2,8 @@
 
 use super::lengths::Lengths;
 use crate::ocp::elastic;
-use crate::qp::interior::Counts;
-use crate::qp::{StageDims, end, take_mut};
+use crate::qp::interior::{Counts, Extent};
+use crate::qp::{StageDims, take_mut};
 use crate::scalar::Real;
 
 /// Memory beside that of Newton's equations.
@@ -32,14 +32,13 @@ pub(super) struct Work<'a, T> {
 impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
-        let (pairs, end) = (counts.pairs(), end::<T>(dims));
-        ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
+        let (pairs, Extent { ld, end, .. }) = (counts.pairs(), Extent::of::<T>(dims));
+        ends + 2 * end.row + 4 * pairs + end.dynamics + ld + elastic::memory(dims)
     }
 
     /// In memory of that length, whose contents stay.
-    pub fn new(dims: &[StageDims], ends: usize, capacity: &Lengths, mut memory: &'a mut [T]) -> Self {
-        let pairs = capacity.counts.pairs();
-        let end = end::<T>(dims);
+    pub fn new(ends: usize, capacity: &Lengths, mut memory: &'a mut [T]) -> Self {
+        let (pairs, end) = (capacity.counts.pairs(), capacity.extent.end);
         let rest = &mut memory;
         Self {
             ends: take_mut(rest, ends),
@@ -50,19 +49,8 @@ impl<'a, T: Real> Work<'a, T> {
             multiplier_step: take_mut(rest, pairs),
             pi: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
-            scratch: take_mut(rest, scratch::<T>(dims)),
-            penalties: take_mut(rest, elastic::memory(dims)),
+            scratch: take_mut(rest, capacity.extent.ld),
+            penalties: core::mem::take(rest),
         }
     }
-}
-
-/// How many numbers the largest stage takes.
-const fn scratch<T>(dims: &[StageDims]) -> usize {
-    let (mut largest, mut rest) = (0, dims);
-    while let Some((first, others)) = rest.split_first() {
-        let ld = crate::qp::pad::<T>(first.nx + first.nu);
-        largest = if ld > largest { ld } else { largest };
-        rest = others;
-    }
-    largest
 }

@@ -3,9 +3,9 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
-use super::riccati::{First, Riccati};
+use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
-use crate::qp::layout::{Place, Places, end, take_mut};
+use crate::qp::layout::{Place, Places, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
 
@@ -71,10 +71,11 @@ pub struct Coupling<'a, T> {
 impl<'a, T: Real> Coupling<'a, T> {
     /// How many numbers it takes for so many periodic states and shared controls.
     pub const fn memory(dims: &[StageDims], conditions: usize, shared: usize) -> usize {
-        let (v, nx) = (end::<T>(dims).v, first_nx(dims));
+        let Extent { ld, end, .. } = Extent::of::<T>(dims);
+        let (v, nx) = (end.v, first_nx(dims));
         let count = conditions + shared;
         let n = nx + count;
-        let group = SIDE * Riccati::<T>::widest(dims);
+        let group = SIDE * ld;
         2 * group
             + 2 * conditions
             + 3 * count
@@ -96,7 +97,7 @@ impl<'a, T: Real> Coupling<'a, T> {
     }
 
     /// Of a QP that is coupled, in memory of that length.
-    pub fn new(qp: QpView<'a, T>, first: First, memory: &mut &'a mut [T]) -> Option<Self> {
+    pub fn new(qp: QpView<'a, T>, extent: &Extent, first: First, memory: &mut &'a mut [T]) -> Option<Self> {
         let (periodic, shared) = (qp.periodic(), qp.shared());
         let (conditions, parameters) = (marked(periodic).count(), marked(shared).count());
         let count = conditions + parameters;
@@ -104,7 +105,7 @@ impl<'a, T: Real> Coupling<'a, T> {
             return None;
         }
         let _exists = EXISTS?;
-        let (v, nx) = (end::<T>(qp.dims).v, first_nx(qp.dims));
+        let (v, nx) = (extent.end.v, first_nx(qp.dims));
         let n = nx + count;
         Some(Self {
             _exists,
@@ -120,8 +121,8 @@ impl<'a, T: Real> Coupling<'a, T> {
             gamma: take_mut(memory, nx * count),
             schur: take_mut(memory, count * count),
             linear: take_mut(memory, count),
-            group: take_mut(memory, SIDE * Riccati::<T>::widest(qp.dims)),
-            minus: take_mut(memory, SIDE * Riccati::<T>::widest(qp.dims)),
+            group: take_mut(memory, SIDE * extent.ld),
+            minus: take_mut(memory, SIDE * extent.ld),
             offset: take_mut(memory, count),
             eliminated: take_mut(memory, count * v),
             first: take_mut(memory, nx),

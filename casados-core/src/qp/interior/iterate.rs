@@ -3,7 +3,7 @@
 use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
-use super::riccati::{First, Riccati};
+use super::riccati::{Extent, First, Riccati};
 use super::sides::{Counts, Sides};
 use super::terms::Terms;
 use super::vector::larger;
@@ -104,10 +104,16 @@ impl<'a, T: Real> Iterate<'a, T> {
     }
 
     /// In memory that is zero.
-    pub fn new(qp: QpView<'a, T>, first: First, sides: Sides<'a, T>, numbers: &mut &'a mut [T]) -> Self {
-        let (riccati, initial) = (Riccati::new(qp.dims, numbers), first_nx(qp.dims));
-        let end = riccati.end;
-        let coupling = Coupling::new(qp, first, numbers);
+    pub fn new(
+        qp: QpView<'a, T>,
+        extent: &Extent,
+        first: First,
+        sides: Sides<'a, T>,
+        numbers: &mut &'a mut [T],
+    ) -> Self {
+        let (riccati, initial) = (Riccati::new(extent, numbers), first_nx(qp.dims));
+        let end = extent.end;
+        let coupling = Coupling::new(qp, extent, first, numbers);
         let found = if coupling.is_some() { First::Coupled } else { First::Free };
         let first = if first == First::Fixed { first } else { found };
         Self {
@@ -277,6 +283,13 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
         if let Some(coupling) = self.coupling.as_mut().filter(|_| !controlled) {
             coupling.fold(self.qp, self.stationarity);
+            if self.first == First::Fixed {
+                // What the last state pushes a given first one with belongs to its multiplier, too.
+                for (force, g) in self.initial.iter_mut().zip(&mut *self.stationarity) {
+                    *force = *force + *g;
+                    *g = T::ZERO * *g;
+                }
+            }
         }
         self.terms.forces = largest;
         objective + self.penalties()

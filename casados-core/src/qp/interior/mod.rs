@@ -30,7 +30,7 @@ pub(crate) use kernels::{
 #[cfg(feature = "alloc")]
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
-pub(crate) use riccati::First;
+pub(crate) use riccati::{Extent, First};
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
 pub use store::Store;
 #[cfg(feature = "alloc")]
@@ -189,7 +189,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let mut sides = Sides::new(counts, &mut numbers, &mut indices);
         sides.list(qp, &reading);
         let first = if reading.fixed { First::Fixed } else { First::Free };
-        let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
+        let mut iterate = Iterate::new(qp, &Extent::of::<T>(qp.dims), first, sides, &mut numbers);
         iterate.objective = attempt.penalties == Penalties::Given;
         let limits = Limits::new(&self.options, self.relaxed, attempt.penalties);
         T::compiled::<Runs>(Run {

@@ -226,6 +226,15 @@ impl<T: Real> Sides<'_, T> {
         most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
     }
 
+    /// What violations cost, of distances in `scratch`.
+    pub fn costs_of_violations(&self) -> T {
+        let costs = self.soft.iter().zip(self.linear.iter().zip(&*self.quadratic));
+        costs.fold(T::ZERO, |sum, (&side, (&linear, &quadratic))| {
+            let violation = positive(-at(self.scratch, side));
+            sum + violation * (linear + T::from_f64(0.5) * quadratic * violation)
+        })
+    }
+
     /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances
     /// from them in `scratch`, whatever slacks and violations are.
     pub fn judge(&mut self) -> (T, T) {

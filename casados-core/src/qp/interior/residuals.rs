@@ -31,14 +31,25 @@ impl<T: Real> Iterate<'_, T> {
     /// [`evaluate`](Self::evaluate).
     #[inline(always)]
     pub fn judged<E: Packed<T>>(&mut self) -> Largest<T> {
-        let Largest { stationarity, dynamics, .. } = self.residuals::<E>();
-        let (inequalities, complementarity) = self.sides.judge();
+        let Largest { stationarity, dynamics, inequalities, complementarity } = self.at_point::<E>();
         // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
         // the terms; in another order the sums of values are rounded otherwise.
         let rounding = |terms| T::from_f64(T::EPSILON) * terms;
         Largest {
             stationarity: larger(stationarity, rounding(self.terms.forces)),
             dynamics: larger(dynamics, rounding(self.terms.values)),
+            inequalities,
+            complementarity,
+        }
+    }
+
+    /// As [`judged`](Self::judged), without what rounding may be.
+    #[inline(always)]
+    pub fn at_point<E: Packed<T>>(&mut self) -> Largest<T> {
+        let (inequalities, complementarity) = self.sides.judge();
+        Largest {
+            stationarity: largest_size::<T, E>(self.stationarity),
+            dynamics: self.gaps::<E>(),
             inequalities,
             complementarity,
         }

@@ -62,18 +62,22 @@ pub struct Riccati<'a, T> {
     pub end: Place,
 }
 
-/// The largest dimensions.
-#[derive(Default)]
-struct Largest {
+/// What is known of a horizon once its stages are gone through: the largest dimensions, and the
+/// place behind the last stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
     n: usize,
-    ld: usize,
+    /// The longest column of a stage.
+    pub ld: usize,
     nx: usize,
     next_and_ng: usize,
+    pub end: Place,
 }
 
-impl Largest {
-    const fn of<T>(dims: &[StageDims]) -> Self {
-        let (mut largest, mut rest) = (Self { n: 0, ld: 0, nx: 0, next_and_ng: 0 }, dims);
+impl Extent {
+    pub const fn of<T>(dims: &[StageDims]) -> Self {
+        let end = end::<T>(dims);
+        let (mut largest, mut rest) = (Self { n: 0, ld: 0, nx: 0, next_and_ng: 0, end }, dims);
         while let Some((&first, after)) = rest.split_first() {
             let next = match after.first() {
                 Some(next) => next.nx,
@@ -94,20 +98,15 @@ const fn max(a: usize, b: usize) -> usize {
 }
 
 impl<'a, T: Real> Riccati<'a, T> {
-    /// The longest column of a stage.
-    pub const fn widest(dims: &[StageDims]) -> usize {
-        Largest::of::<T>(dims).ld
-    }
     /// How many numbers it takes.
     pub const fn memory(dims: &[StageDims]) -> usize {
-        let (largest, end) = (Largest::of::<T>(dims), end::<T>(dims));
-        let Largest { n, ld, nx, next_and_ng } = largest;
+        let Extent { n, ld, nx, next_and_ng, end } = Extent::of::<T>(dims);
         let matrices = ld * (n + MORE) + ld * (next_and_ng + MORE) + pad::<T>(nx) * (nx + MORE);
         matrices + end.factor + 3 * end.v + end.dynamics + ld + pad::<T>(next_and_ng)
     }
     /// In memory that is zero.
-    pub fn new(dims: &[StageDims], memory: &mut &'a mut [T]) -> Self {
-        let (Largest { n, ld, nx, next_and_ng }, end) = (Largest::of::<T>(dims), end::<T>(dims));
+    pub fn new(extent: &Extent, memory: &mut &'a mut [T]) -> Self {
+        let Extent { n, ld, nx, next_and_ng, end } = *extent;
         Self {
             m: take_mut(memory, ld * (n + MORE)),
             w: take_mut(memory, ld * (next_and_ng + MORE)),
