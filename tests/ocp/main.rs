@@ -33,6 +33,7 @@ mod options;
 mod print;
 mod random;
 mod real_time;
+mod return_map;
 mod secant;
 mod sensitivities;
 mod smoothing;

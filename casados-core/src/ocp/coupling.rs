@@ -15,7 +15,8 @@ use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,
-    /// …). The initial state is to be free. None is periodic by default.
+    /// …). The initial state is to be free. None is periodic by default. Up to a given map,
+    /// `x₀ = g(x_N)`, they are with dynamics that end with it: `ReturnMap`.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]

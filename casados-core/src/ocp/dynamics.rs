@@ -196,11 +196,11 @@ pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 /// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or
 /// on the heap, and those that wrap them ([`Projected`](crate::Projected),
 /// [`Divided`](crate::Divided)); [`Along`](super::Along) is one with an integral cost,
-/// [`Map`](super::Map) a function that is `φ` itself, and `Shooting` a batch that takes all
-/// intervals at once.
+/// [`Map`](super::Map) a function that is `φ` itself, `Shooting` a batch that takes all intervals
+/// at once, and `ReturnMap` dynamics whose last interval ends with a map.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
-    note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
+    note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `Along`, `ReturnMap` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
 )]
 pub trait Dynamics<T: Real> {
     /// Dimensions.

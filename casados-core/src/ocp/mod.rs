@@ -98,6 +98,8 @@ mod problem;
 mod program;
 mod real_time;
 #[cfg(feature = "alloc")]
+mod return_map;
+#[cfg(feature = "alloc")]
 mod sensitivities;
 #[cfg(feature = "alloc")]
 mod shooting;
@@ -143,6 +145,8 @@ pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;
 pub use real_time::{Feedback, Prepared, RealTime};
+#[cfg(feature = "alloc")]
+pub use return_map::ReturnMap;
 #[cfg(feature = "alloc")]
 pub use sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
 #[cfg(feature = "alloc")]
