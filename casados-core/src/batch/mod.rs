@@ -47,9 +47,9 @@ use crate::tableau::{
 /// `Batch<Model, Gauss<4>>`, or `Batch<Model, Rk4>` of an explicit model.
 ///
 /// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, which [`Intervals`] lists; each is
-/// integrated as [`Irk`] does, or [`Erk`] of an explicit method, side by
-/// side in registers and, with the feature `parallel`, over threads. Results are written into the
-/// caller's slice, an element for each.
+/// integrated as [`Irk`] does, or [`Erk`] of an explicit method, side by side in registers and,
+/// with the feature `parallel`, over threads. Results are written into the caller's slice, an
+/// element for each.
 ///
 /// `Batch<Model, Custom<S>>` takes implicit tableaux of one's own, and explicit ones as if they
 /// were implicit; `batch::Integrator<Erk<Model, Custom<S>>>` takes explicit ones as they are.

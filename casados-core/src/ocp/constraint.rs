@@ -3,7 +3,7 @@
 use super::check::Labels;
 use super::error::{OcpError, Part};
 use super::pattern::{self, Entries};
-use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
+use super::point::{Cross, Terms, There, finite_outputs, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
@@ -215,15 +215,6 @@ impl<F: Function, T: Real> Constraint<F, T> {
         self.quadratic = Array::from_fn(|_| quadratic);
         self
     }
-
-    fn check_values(&self, stage: usize) -> Result<(), OcpError> {
-        match crate::irk::not_finite(self.g.as_ref()) {
-            None => Ok(()),
-            Some((output, value)) => {
-                Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
-            }
-        }
-    }
 }
 
 #[diagnostic::do_not_recommend]
@@ -258,7 +249,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
     }
     fn value(&mut self, v: &ArrayV<F, T>, values: &mut [T], stage: usize) -> Result<(), OcpError> {
         F::value::<T>(v, &mut self.g);
-        self.check_values(stage)?;
+        finite_outputs::<F, T>(&self.g, stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }
@@ -273,7 +264,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         stage: usize,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
-        self.check_values(stage)?;
+        finite_outputs::<F, T>(&self.g, stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }

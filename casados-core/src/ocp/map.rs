@@ -4,7 +4,7 @@ use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
 use super::names::Names;
 use super::pattern::Origin;
-use super::point::{parameter, position, read};
+use super::point::{finite_outputs, parameter, position, read};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
@@ -64,21 +64,12 @@ impl<F: Function, T: Real> Map<F, T> {
         map
     }
 
-    fn check(&self, stage: usize) -> Result<(), OcpError> {
-        match crate::irk::not_finite(self.y.as_ref()) {
-            None => Ok(()),
-            Some((output, value)) => {
-                Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
-            }
-        }
-    }
-
     fn run(&mut self, nodes: &Nodes<'_, T>, second: bool, sink: Sink<'_, T>) -> Result<(), OcpError> {
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for (k, interval) in nodes.iter().enumerate() {
             read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
             F::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
-            self.check(k)?;
+            finite_outputs::<F, T>(&self.y, k)?;
             self.x = vector(self.y.as_ref());
             for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
                 let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
@@ -151,7 +142,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
         for (k, interval) in nodes.iter().enumerate() {
             read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
             F::value::<T>(&self.v, &mut self.y);
-            self.check(k)?;
+            finite_outputs::<F, T>(&self.y, k)?;
             sink(k, &Step { x: self.y.as_ref(), ..Step::default() });
         }
         Ok(())

@@ -45,6 +45,19 @@ pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, [x, z, u, p]: [&[T];
     }
 }
 
+/// Whether all outputs of a function are finite.
+///
+/// # Errors
+/// [`OcpError::NonFiniteFunction`]
+pub(super) fn finite_outputs<F: Function, T: Real>(y: &ArrayY<F, T>, stage: usize) -> Result<(), OcpError> {
+    match crate::irk::not_finite(y.as_ref()) {
+        None => Ok(()),
+        Some((output, value)) => {
+            Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+        }
+    }
+}
+
 /// A value that follows from the outputs of a function, if it is finite.
 ///
 /// # Errors

@@ -3,9 +3,11 @@
 use super::cost::Show;
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step};
 use super::error::OcpError;
+use super::linearise::dot;
 use super::names::Names;
-use super::point::read;
+use super::point::{finite_outputs, read};
 use crate::function::{ArrayV, ArrayY, Function};
+use crate::qp::interior::set;
 use crate::scalar::Real;
 use crate::shape::{Outputs, Plain, Shape};
 use alloc::{vec, vec::Vec};
@@ -100,7 +102,7 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
                 return sink(k, step);
             }
             end.evaluate(step, t, derivatives, pi);
-            match end.check(k) {
+            match finite_outputs::<G, T>(&end.x, k) {
                 Ok(()) => sink(k, &end.mapped(step, derivatives)),
                 error => outcome = error,
             }
@@ -182,15 +184,6 @@ impl<G: Function, T: Real> End<G, T> {
         }
     }
 
-    fn check(&self, stage: usize) -> Result<(), OcpError> {
-        match crate::irk::not_finite(self.x.as_ref()) {
-            None => Ok(()),
-            Some((output, value)) => {
-                Err(OcpError::NonFiniteFunction { function: G::STRUCTURE.name, stage, output, value })
-            }
-        }
-    }
-
     /// The map at the end of a step, with so many derivatives.
     fn evaluate(&mut self, step: &Step<'_, T>, t: T, derivatives: usize, pi: &[T]) {
         read::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
@@ -221,8 +214,9 @@ impl<G: Function, T: Real> End<G, T> {
         let nx = G::Shape::NX.max(1);
         for (slopes, of_step) in self.slopes.iter_mut().zip([step.dx, step.du, step.dp]) {
             for (to, column) in slopes.chunks_exact_mut(nx).zip(of_step.chunks_exact(nx)) {
-                for (i, to) in to.iter_mut().enumerate() {
-                    *to = dot(self.first.iter().skip(i).step_by(nx), column);
+                to.fill(T::ZERO);
+                for (of_state, &by) in self.first.chunks_exact(nx).zip(column) {
+                    to.iter_mut().zip(of_state).for_each(|(to, &slope)| *to = *to + slope * by);
                 }
             }
         }
@@ -240,7 +234,7 @@ impl<G: Function, T: Real> End<G, T> {
                 for (i, row) in rows.chunks_exact(nx).enumerate() {
                     let mut sum = of_step.get(j * height + i).copied().unwrap_or(T::ZERO);
                     for (&factor, of_state) in row.iter().zip(self.second.chunks_exact(nx)) {
-                        sum = sum + factor * dot(of_state.iter(), column);
+                        sum = sum + factor * dot(of_state, column);
                     }
                     set(block, j * height + i, sum);
                 }
@@ -256,7 +250,7 @@ impl<G: Function, T: Real> End<G, T> {
         let begin = nodes.len().saturating_sub(1) * nodes.ld[1];
         let pi = crate::qp::part(nodes.multipliers, begin, nx);
         for (j, column) in self.first.chunks_exact(nx).enumerate() {
-            set(&mut self.multipliers, begin + j, dot(column.iter(), pi));
+            set(&mut self.multipliers, begin + j, dot(column, pi));
         }
     }
 
@@ -266,15 +260,5 @@ impl<G: Function, T: Real> End<G, T> {
         let [dx, du, dp] = self.slopes.each_ref().map(|slopes| all(derivatives > 0, slopes));
         let [xx, xu, uu, xp, up, pp] = self.curvature.each_ref().map(|block| all(derivatives > 1, block));
         Step { x: self.x.as_ref(), dx, du, dp, hessian: [xx, xu, uu], hessian_p: [xp, up, pp], ..*step }
-    }
-}
-
-fn dot<'a, T: Real>(a: impl Iterator<Item = &'a T>, b: &[T]) -> T {
-    a.zip(b).fold(T::ZERO, |sum, (&a, &b)| sum + a * b)
-}
-
-fn set<T>(numbers: &mut [T], index: usize, value: T) {
-    if let Some(number) = numbers.get_mut(index) {
-        *number = value;
     }
 }

@@ -260,6 +260,6 @@ BUILDS = """
 
 Each has one model with one method as integrator, horizon and whole problem, and the solvers of
 casados that the tables name; those with two stages have RK4 as integrator and whole problem, too.
-The aircraft is `awe`. Seconds are CPU seconds of a build by one
-thread, after everything that they share was there.
+The aircraft is `awe`. Seconds are CPU seconds of a build by one thread, after everything that they
+share was there.
 """

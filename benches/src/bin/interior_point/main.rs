@@ -324,6 +324,10 @@ fn value<'a>(arguments: &'a [String], name: &str) -> Option<&'a str> {
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().collect();
+    const PARTS: [&str; 3] = ["times", "horizons", "starts"];
+    if let Some(only) = value(&arguments, "--only").filter(|only| !PARTS.contains(only)) {
+        return Err(format!("no part {only:?}: there are {PARTS:?}").into());
+    }
     let count = value(&arguments, "--starts").map_or(Ok(100), str::parse)?;
     eprintln!("pinned: {}", pin());
     let mut ipopt = Peer::start("casadi_starts.py", |command| command).ok();
