@@ -22,4 +22,5 @@ mod erk;
 mod erk_reference;
 mod examples;
 mod kinematic;
+mod panels;
 mod tube;

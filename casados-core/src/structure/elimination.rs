@@ -35,7 +35,7 @@ pub struct Elimination {
     /// Read by the reconstruction of kinematic states.
     pub kinematic: &'static [Kinematic],
     /// The entries of `f_ẋ` and `f_x` by which other equations depend on kinematic states, state by
-    /// state.
+    /// state, in the order of their velocities.
     /// Read by right-hand sides and assembly through kinematic states.
     pub dependents: &'static [Dependent],
 }

@@ -153,7 +153,7 @@ fn rows_of_states(nx: usize, kinematic: &[Kinematic]) -> Vec<[u32; 3]> {
     states.map(row).collect()
 }
 
-/// The entries by which other equations depend on kinematic states.
+/// The entries by which other equations depend on kinematic states, by velocities.
 fn dependents(kinematic: &[Kinematic]) -> Vec<Dependent> {
     let of_state = |of: &Kinematic| {
         let (state, count) = (of.state, of.dependents.len());
@@ -165,5 +165,7 @@ fn dependents(kinematic: &[Kinematic]) -> Vec<Dependent> {
         };
         of.dependents.iter().enumerate().map(row).collect::<Vec<_>>()
     };
-    kinematic.iter().flat_map(of_state).collect()
+    let mut by_velocity: Vec<_> = kinematic.iter().collect();
+    by_velocity.sort_by_key(|of| of.velocity);
+    by_velocity.into_iter().flat_map(of_state).collect()
 }

@@ -86,41 +86,53 @@ fn by_column<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Optio
     entry::<M, V>(jacobian, *M::STRUCTURE.by_column.get(index)? as usize)
 }
 
-/// The same of a panel that begins with a column: entries column by column, from one of them on.
-/// Where the next panel begins.
+/// Entries of the Jacobian that are in their panels.
+#[derive(Clone, Copy, Default)]
+pub(in crate::irk) struct Placed {
+    /// Column by column.
+    entries: usize,
+    /// Those by which equations depend on kinematic states.
+    dependents: usize,
+}
+
+/// The same of a panel that begins with a column: entries column by column, those that follow the
+/// ones of the panel before.
 #[inline(always)]
 pub(in crate::irk) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     jacobian: &M::Jacobian<[E; S]>,
     nodes: &[E; S],
-    mut placed: usize,
+    placed: &mut Placed,
     dy: &mut [Packet<E, S, W>],
     begin: usize,
-) -> usize {
+) {
     for (slot, packet) in dy.iter_mut().enumerate() {
         if kinematic::<M>(slot).is_none() {
             *packet = [[E::from_f64(0.0); W]; S];
         }
     }
-    for dependent in M::STRUCTURE.elimination.dependents {
-        let Some((slot, velocity, products)) = through::<M, E, S>(jacobian, nodes, dependent) else {
-            continue;
-        };
-        let column = direction::<M, E, D>(velocity).and_then(|column| column.checked_sub(begin));
-        if let Some(column) = column.filter(|&column| column < W) {
-            subtract_at(dy, slot, column, &products);
+    while let Some(dependent) = M::STRUCTURE.elimination.dependents.get(placed.dependents) {
+        let through = through::<M, E, S>(jacobian, nodes, dependent);
+        if let Some((slot, velocity, products)) = through
+            && let Some(column) = direction::<M, E, D>(velocity)
+        {
+            if column >= begin + W {
+                break;
+            }
+            subtract_at(dy, slot, column.wrapping_sub(begin), &products);
         }
+        placed.dependents += 1;
     }
-    while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed) {
-        placed += 1;
-        let Some(column) = direction::<M, E, D>(c) else { continue };
-        if column >= begin + W {
-            return placed - 1;
+    while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed.entries) {
+        if let Some(column) = direction::<M, E, D>(c) {
+            if column >= begin + W {
+                break;
+            }
+            if kinematic::<M>(slot::<M>(r)).is_none() {
+                subtract_at(dy, slot::<M>(r), column - begin, values);
+            }
         }
-        if kinematic::<M>(slot::<M>(r)).is_none() {
-            subtract_at(dy, slot::<M>(r), column - begin, values);
-        }
+        placed.entries += 1;
     }
-    placed
 }
 
 /// Subtracts from one column of a row.

@@ -3,7 +3,7 @@
 
 use super::checksum::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::output::{Columns, Target};
-use super::right_hand_side::{Later, Scatter, place};
+use super::right_hand_side::{Later, Placed, Scatter, place};
 use super::stage_rows::CurvedRows;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
@@ -150,7 +150,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             distant: outputs.distant,
             sum: E::from_f64(0.0),
             second,
-            placed: 0,
+            placed: Placed::default(),
             model: PhantomData,
         })];
     }
@@ -218,8 +218,7 @@ struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
     /// That of all that was written to the result.
     sum: E,
     second: bool,
-    /// How many entries of the Jacobian, column by column, are in their panels.
-    placed: usize,
+    placed: Placed,
     model: PhantomData<M>,
 }
 
@@ -320,7 +319,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             let kinematic = Forward { jacobian, v, directions, column };
             Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
-            self.placed = place::<M, E, D, S, W>(jacobian, nodes, self.placed, dy, column);
+            place::<M, E, D, S, W>(jacobian, nodes, &mut self.placed, dy, column);
         }
     }
 

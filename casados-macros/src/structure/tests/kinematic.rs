@@ -87,3 +87,17 @@ fn no_velocity_is_kinematic() {
     let found: Vec<_> = found(&analysis).0.iter().map(|of| (of.state, of.velocity)).collect();
     assert_eq!(found, [(0, 5), (2, 7)]);
 }
+
+/// Entries that feel positions are by the velocities of these: states whose velocities are in the
+/// opposite order.
+#[test]
+fn dependents_are_by_velocities() {
+    let analysis = accepted(model([4, 0, 0, 0], |g, v| {
+        let (first, second) = (sub(g, v[0], v[7]), sub(g, v[1], v[6]));
+        let (third, fourth) = (mul(g, v[4], v[5]), g.unary(Unary::Sin, v[4]));
+        vec![first, second, sub(g, v[2], third), sub(g, v[3], fourth)]
+    }));
+    let dependents = &analysis.elimination.tables.dependents;
+    let states: Vec<_> = dependents.iter().map(|of| of.state).collect();
+    assert_eq!(states, [1, 0, 0]);
+}
