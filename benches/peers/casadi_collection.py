@@ -9,8 +9,8 @@ Reads one JSON object a line from standard input and answers each with one on st
 where `grid` is what the horizon is multiplied by, `bounds` are those of controls, `x` and `u` the guess.
 
 With the argument --write it writes tests/data/ocp/collection.json instead: objectives of all
-minima that it finds at a tolerance of 1e-10 with bounds that are not relaxed, from the plain guess
-and from some that are disturbed.
+minima that it finds at a tolerance of 1e-10 with bounds that are not relaxed, from the plain guess,
+from some that are disturbed, and from points of tests/data/ocp/starts.json, which it stays near.
 """
 
 import json
@@ -24,6 +24,9 @@ import ocps
 
 # Guesses, of which the first one is plain; how much the others are disturbed, of what states move.
 GUESSES, DISTURBANCE = 12, 0.1
+# A barrier so small that IPOPT does not leave a point for the middle between bounds.
+STAY = {"ipopt.mu_init": 1e-10}
+STAY |= {f"ipopt.{kind}_{by}": 1e-12 for kind in ["bound", "slack_bound"] for by in ["push", "frac"]}
 # Minima are different ones from here on.
 APART = 1e-6
 
@@ -53,7 +56,7 @@ def solve(o, x, options={}):
     return {"status": stats["return_status"], "iterations": stats["iter_count"], "objective": float(solution["f"])}
 
 
-def minima(o):
+def minima(o, points):
     random = np.random.default_rng(31)
     exact = {"ipopt.tol": 1e-10, "ipopt.bound_relax_factor": 0.0}
     found = []
@@ -64,6 +67,11 @@ def minima(o):
         objective = answer["objective"]
         if answer["status"] == "Solve_Succeeded" and all(abs(objective - f) > APART * (1 + abs(f)) for f in found):
             found.append(objective)
+    for point in points:
+        o.u = np.array(point["u"])
+        answer = solve(o, np.array(point["x"]), {**exact, **STAY})
+        if answer["status"] == "Solve_Succeeded":
+            found.append(answer["objective"])
     return sorted(found)
 
 
@@ -72,13 +80,14 @@ def write():
         "source": f"IPOPT through CasADi {ca.__version__}, benches/peers/casadi_collection.py --write",
         "problems": {},
     }
+    folder = pathlib.Path(__file__).parents[2] / "tests/data/ocp"
+    starts = json.loads((folder / "starts.json").read_text())
     for make in ocps.ALL:
         o = make()
         answer = solve(o, o.x)
-        data["problems"][make.__name__] = {"iterations": answer["iterations"], "minima": minima(o)}
+        data["problems"][make.__name__] = {"iterations": answer["iterations"], "minima": minima(o, starts.get(make.__name__, []))}
         print(make.__name__, data["problems"][make.__name__], flush=True)
-    path = pathlib.Path(__file__).parents[2] / "tests/data/ocp/collection.json"
-    path.write_text(json.dumps(data, indent=1) + "\n")
+    (folder / "collection.json").write_text(json.dumps(data, indent=1) + "\n")
 
 
 def serve():

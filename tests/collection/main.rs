@@ -4,6 +4,8 @@
 
 #[path = "../data/mod.rs"]
 mod data;
+
+mod astray;
 mod guesses;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
@@ -46,17 +48,7 @@ fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     let fine = sqp.solve(ocp)?;
     println!("{}{fine}", sqp.log());
     assert!(fine.is_converged(), "{fine}");
-    // What residuals change the objective by, to first order: gaps and violations by their
-    // multipliers, complementarity by one for each bound.
-    let mut terms = 0.0;
-    for stage in ocp.iterate().stages() {
-        terms += stage.dynamics.iter().map(|pi| pi.abs()).sum::<f64>();
-        for bounds in
-            [stage.x_lower, stage.x_upper, stage.u_lower, stage.u_upper, stage.g_lower, stage.g_upper]
-        {
-            terms += bounds.iter().map(|lambda| 1.0 + lambda.abs()).sum::<f64>();
-        }
-    }
+    let terms = change_by_residuals(ocp);
     let record = Record::load("ocp/collection.json")?.record("problems")?.record(name)?;
     // IPOPT's tolerance is a tenth of ours.
     let tolerance = 1.1 * FINE * terms;
@@ -70,6 +62,21 @@ fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     Ok(log)
 }
 const FINE: f64 = 1e-9;
+
+/// What residuals of one change the objective by, to first order: gaps and violations by their
+/// multipliers, complementarity by one for each bound.
+fn change_by_residuals<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> f64 {
+    let mut terms = 0.0;
+    for stage in ocp.iterate().stages() {
+        terms += stage.dynamics.iter().map(|pi| pi.abs()).sum::<f64>();
+        for bounds in
+            [stage.x_lower, stage.x_upper, stage.u_lower, stage.u_upper, stage.g_lower, stage.g_upper]
+        {
+            terms += bounds.iter().map(|lambda| 1.0 + lambda.abs()).sum::<f64>();
+        }
+    }
+    terms
+}
 
 macro_rules! all_are_solved {
     ($($theme:ident::$name:ident),* $(,)?) => {$(

@@ -21,6 +21,11 @@ impl Measure {
         self.objective.is_finite() && self.violation.is_finite()
     }
 
+    /// The merit function, where violations have their weights.
+    pub fn merit(&self) -> f64 {
+        self.objective + self.violation
+    }
+
     /// Whether violation or objective are smaller by a margin: `γ_θ` and `γ_φ`, parts of the
     /// violation. Differences of the objective up to `noise` are none.
     pub fn is_better(&self, other: &Self, margin: f64, noise: f64) -> bool {

@@ -201,9 +201,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             *target = f(a, b);
         }
     }
-    /// Everything as a function of what it was and another solution of the same dimensions.
-    pub(crate) fn update(&mut self, other: &Self, f: impl Fn(T, T) -> T) {
-        for (target, &other) in self.memory.as_mut().iter_mut().zip(other.memory.as_ref()) {
+    /// All multipliers as functions of what they were and those of another solution of the same
+    /// dimensions.
+    pub(crate) fn update_multipliers(&mut self, other: &Self, f: impl Fn(T, T) -> T) {
+        let begin = self.lengths[0];
+        let (targets, others) = (self.memory.as_mut(), other.memory.as_ref());
+        for (target, &other) in targets.iter_mut().zip(others).skip(begin) {
             *target = f(*target, other);
         }
     }

@@ -27,6 +27,20 @@ pub(super) struct Line {
     pub slope: f64,
 }
 
+impl Line {
+    /// Whether the merit function, if it is a parabola along the step, has its least before the end
+    /// of a step of this length: whether it shrinks by less than half of what its slope promises.
+    pub fn turns_before(&self, length: f64, there: &Measure) -> bool {
+        let promised = length * (self.slope - self.here.violation);
+        there.merit() - self.here.merit() > 0.5 * promised.min(0.0) + self.noise()
+    }
+
+    /// Near the solution, differences are roundings.
+    fn noise(&self) -> f64 {
+        1e4 * f64::EPSILON * (1.0 + self.here.objective.abs() + self.here.violation)
+    }
+}
+
 impl Search {
     pub fn new() -> Self {
         Self { filter: Filter::new(MARGIN, f64::INFINITY), full: true, linearised: None }
@@ -38,14 +52,12 @@ impl Search {
         if !there.is_finite() {
             return false;
         }
-        // Near the solution, differences are roundings.
-        let noise = 1e4 * f64::EPSILON * (1.0 + here.objective.abs() + here.violation);
+        let noise = line.noise();
         match options.globalisation {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
-                let merit = |m: &Measure| m.objective + m.violation;
                 let slope = slope - here.violation;
-                merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + noise
+                there.merit() <= here.merit() + ARMIJO * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 if !self.filter.admits(there, noise) {

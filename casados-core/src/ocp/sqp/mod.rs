@@ -89,7 +89,8 @@ pub struct Sqp<S, C, T, D, M> {
     trial: Solution<T, D, M>,
     /// The best iterate.
     best: Solution<T, D, M>,
-    /// The weights of constraints in the merit function, in the places of their multipliers.
+    /// The weights of constraints in the merit function, in the places of their multipliers; in
+    /// those of variables the guess.
     weights: Solution<T, D, M>,
     /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
     /// exchanges.

@@ -18,10 +18,12 @@ pub enum Globalisation {
     /// correction. Each constraint has a weight of its own, which follows its multiplier:
     /// `ν_i ← max(|λ_i|, ½ (ν_i + |λ_i|), 0.01 max |λ|)` (M. J. D. Powell, "A fast algorithm for
     /// nonlinearly constrained optimization calculations", 1978, and a bound from below). Where the
-    /// step is no direction of descent all of them grow until it is. Near a solution full steps are
-    /// what it accepts: the linearisation there is that of the next iteration. With the Hessian of
-    /// Gauss and Newton, steps of a quarter or less give way to damped ones while weighted gaps are
-    /// more than what the objective changes by.
+    /// step is no direction of descent all of them grow until it is. A step along which the merit
+    /// function shrinks by less than half of what its slope promises is halved as long as that is
+    /// better: the least of a parabola is before its end. Near a solution full steps are what it
+    /// accepts: the linearisation there is that of the next iteration. With the Hessian of Gauss
+    /// and Newton, and after a first attempt that failed, steps of a quarter or less give way to
+    /// damped ones while weighted gaps are more than what the objective changes by.
     #[default]
     Merit,
     /// As far as objective or violation shrink compared to all iterates before, with second-order

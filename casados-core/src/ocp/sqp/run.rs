@@ -1,7 +1,6 @@
 //! The iterations.
 
 use super::Sqp;
-use super::acceptance::Search;
 use super::direction::Direction;
 use super::options::Globalisation;
 use super::secant::Take;
@@ -18,7 +17,6 @@ use crate::ocp::problem::Formulation;
 use crate::ocp::watch::Watch;
 use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
-use core::marker::PhantomData;
 use core::ops::ControlFlow;
 
 /// The log has room for so many iterations before it grows.
@@ -32,6 +30,8 @@ const PASSING: usize = 4;
 /// The regularisation of directions, where no step along the one before is short enough.
 const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
 const MOST_DAMPING: f64 = 1e2;
+/// That of the first direction after a failure.
+const AGAIN: f64 = 1.0;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -64,20 +64,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.fits(self.solution.dims())?;
         self.options.check()?;
         self.qp_solver.refine(self.options.tolerance);
-        let mut state = State {
-            search: Search::new(),
-            elastic: false,
-            regularisation: 0.0,
-            damping: 0.0,
-            passing: false,
-            nearest: false,
-            penalty: 0.0,
-            elastic_steps: 0,
-            best_residual: f64::INFINITY,
-            best_iteration: Iteration::default(),
-            reach: f64::INFINITY,
-            number: PhantomData,
-        };
+        let mut state = State::new();
         if C::KEEPS {
             ocp.check_without_algebraic()?;
             self.curvature.follow(f64::INFINITY);
@@ -85,6 +72,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // Steps are to solutions of QPs: what is one stays so.
         ocp.join_controls();
         ocp.join_states();
+        self.weights.copy_from(&ocp.iterate);
         self.weights.multipliers_mut().fill(T::ZERO);
         #[cfg(feature = "alloc")]
         {
@@ -111,7 +99,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
                 self.log.push(row);
             }
-            if let Some(status) = end {
+            if let Some(status) = end
+                && !self.begin_again(ocp, &mut state, status, outcome.iterations)
+            {
                 outcome.status = status;
                 break;
             }
@@ -131,6 +121,30 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
+    }
+
+    /// Whether a run that failed begins again at its guess: once, with steps that are damped as
+    /// those of Gauss and Newton are. It was long steps at first that led astray.
+    fn begin_again<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        status: Status,
+        iterations: usize,
+    ) -> bool
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let failed = matches!(status, Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_));
+        let can = C::EXACT && !state.again && iterations < self.options.max_iterations;
+        if !(failed && can && self.curvature.convexification() == Convexification::Reduced) {
+            return false;
+        }
+        self.leave_elastic(ocp, state);
+        *state = State { again: true, damping: AGAIN, ..State::new() };
+        self.weights.multipliers_mut().fill(T::ZERO);
+        ocp.iterate.copy_from(&self.weights);
+        true
     }
 
     /// One iteration; a status if it is the last one.
@@ -165,16 +179,17 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             };
             self.take_hessians(ocp, take);
         }
-        if row.iteration == 0 && C::EXACT {
+        if state.begins && C::EXACT {
             self.first_multipliers(ocp)?;
         }
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
         let size = residuals.largest();
-        if size < state.best_residual || row.iteration == 0 {
+        if size < state.best_residual || state.begins {
             (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
         }
+        state.begins = false;
         if size <= self.options.tolerance {
             state.best_iteration = *row;
             return Ok(Some(Status::Converged));
@@ -243,7 +258,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
-        let damps = !C::EXACT && self.curvature.update().is_none();
+        let damps = state.again || !C::EXACT && self.curvature.update().is_none();
         for damping in DAMPING {
             if damps && damping > 0.0 && damping <= state.damping {
                 continue;

@@ -6,6 +6,7 @@ use super::options::Globalisation;
 use super::state::{State, Taken};
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::Measure;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
 use crate::ocp::problem::Formulation;
@@ -57,17 +58,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let shortest = if passing { 2.0 * SHORT } else { self.options.shortest_step };
         let mut length = 1.0;
         while length >= shortest {
-            let Self { options, solution, trial, work, weights, .. } = self;
-            let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-            between(&ocp.iterate, solution, length, trial);
             // A point without a value is one that is not good enough.
-            let there = ocp.measure(trial, weighted.then_some(&*weights), ends).ok();
-            if there.is_some_and(|there| state.search.accepts(options, length, &line, &there)) {
-                core::mem::swap(&mut ocp.iterate, trial);
-                state.search.full = length == 1.0;
+            let there = self.measure_at(ocp, length);
+            if let Some(there) = there
+                && state.search.accepts(&self.options, length, &line, &there)
+            {
+                let length = self.shortened(ocp, state, &line, length, there);
                 return Ok(Some(Taken { length, corrected: false }));
             }
-            if length == 1.0 && there.is_some_and(|m| (m.objective + m.violation).is_finite()) {
+            if length == 1.0 && there.is_some_and(|there| there.is_finite()) {
                 if !written {
                     self.linearise(ocp)?;
                     ocp.regularise(T::from_f64(row.regularisation));
@@ -81,6 +80,39 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(None)
     }
 
+    /// What there is at a part of the step, if it has a value.
+    fn measure_at<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, length: f64) -> Option<Measure> {
+        let Self { options, solution, trial, work, weights, .. } = self;
+        let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        between(&ocp.iterate, solution, length, trial);
+        let weighted = options.globalisation == Globalisation::Merit;
+        ocp.measure(trial, weighted.then_some(&*weights), ends).ok()
+    }
+
+    /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
+    /// function says that its least is before, and shrinks. The length.
+    fn shortened<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        line: &Line,
+        mut length: f64,
+        mut there: Measure,
+    ) -> f64 {
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        while weighted && line.turns_before(length, &there) && 0.5 * length >= self.options.shortest_step {
+            let half = self.measure_at(ocp, 0.5 * length);
+            let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
+                between(&ocp.iterate, &self.solution, length, &mut self.trial);
+                break;
+            };
+            (length, there) = (0.5 * length, half);
+        }
+        core::mem::swap(&mut ocp.iterate, &mut self.trial);
+        state.search.full = length == 1.0;
+        length
+    }
+
     /// The line from the iterate to the solution of the QP, with new weights of violations.
     fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Line {
         if self.options.globalisation != Globalisation::Merit {
@@ -92,7 +124,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
         let (half, least) = (T::from_f64(0.5), T::from_f64(LEAST) * largest);
         // Those of this step count at least.
-        self.weights.update(&self.solution, |w, multiplier| {
+        self.weights.update_multipliers(&self.solution, |w, multiplier| {
             let size = multiplier.abs();
             size.max(half * (w + size)).max(least)
         });
@@ -123,7 +155,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let there =
             ocp.linearise(self.curvature).map(|()| ocp.measure_here(weighted.then_some(&self.weights)));
         let seconds = watch.lap();
-        if there.is_ok_and(|there| state.search.accepts(&self.options, 1.0, line, &there)) {
+        let is_good = there.is_ok_and(|there| {
+            !(weighted && line.turns_before(1.0, &there))
+                && state.search.accepts(&self.options, 1.0, line, &there)
+        });
+        if is_good {
             state.search.linearised = Some(seconds);
             return true;
         }

@@ -6,6 +6,10 @@ use core::marker::PhantomData;
 
 /// What a run remembers from one iteration to the next.
 pub(super) struct State<T> {
+    /// Nothing has been done yet.
+    pub begins: bool,
+    /// The run failed, and began again.
+    pub again: bool,
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
@@ -39,6 +43,26 @@ const LEAST: f64 = 1e-3;
 const MOST: f64 = 1e2;
 
 impl<T> State<T> {
+    /// That of a run that begins.
+    pub fn new() -> Self {
+        Self {
+            begins: true,
+            again: false,
+            search: Search::new(),
+            elastic: false,
+            regularisation: 0.0,
+            damping: 0.0,
+            passing: false,
+            nearest: false,
+            penalty: 0.0,
+            elastic_steps: 0,
+            best_residual: f64::INFINITY,
+            best_iteration: Iteration::default(),
+            reach: f64::INFINITY,
+            number: PhantomData,
+        }
+    }
+
     /// Damping of the next direction, after a step.
     pub fn damp(&mut self, row: &Iteration) {
         self.damping = if row.step <= SHORT {

@@ -1,0 +1,66 @@
+//! Problems on which long first steps lead astray: the run begins again with steps that are damped,
+//! or steps are shortened where the merit function turns before their ends.
+
+use super::{Test, change_by_residuals, solve};
+use casados::ocp::{Exact, GeneralCost, Horizon, Problem};
+use casados::prelude::*;
+use casados::qp::residuals;
+use casados::{Erk, Rk4};
+
+/// An F-8 aircraft over `τ ∈ [0, 1]`: angle of attack, pitch, pitch rate, and the time that
+/// everything takes; the deflection of the elevator. W. L. Garrard, J. M. Jordan, "Design of
+/// nonlinear automatic flight control systems", Automatica 13 (1977).
+#[ode]
+fn crusader(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
+    let ([a, pitch, rate, time], w) = (x, u[0]);
+    let lift = -0.877 * a + rate - 0.088 * a * rate + 0.47 * a * a - 0.019 * pitch * pitch - a * a * rate
+        + 3.846 * a * a * a
+        - 0.215 * w
+        + 0.28 * a * a * w
+        + 0.47 * a * w * w
+        + 0.63 * w * w * w;
+    let moment = -4.208 * a - 0.396 * rate - 0.47 * a * a - 3.564 * a * a * a - 20.967 * w
+        + 6.265 * a * a * w
+        + 46.0 * a * w * w
+        + 61.4 * w * w * w;
+    [time * lift, time * rate, time * moment, 0.0]
+}
+
+#[function]
+fn time(x: [f64; 4], _u: [f64; 1]) -> f64 {
+    x[3]
+}
+
+/// To rest in the shortest time from a large angle of attack. The first step goes to the shortest
+/// time that is allowed, where violations have a minimum of their own. IPOPT (CasADi 3.8.2, the
+/// same discretisation and guess) takes 86 iterations to 5.730851135986 at a tolerance of 1e-6.
+#[test]
+fn time_that_is_too_short() -> Test {
+    let n = 60;
+    let erk = Erk::<Crusader, Rk4>::new(Options::default())?;
+    let mut ocp = Problem::new(erk)
+        .terminal_cost(GeneralCost::<Time>::new())
+        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+    ocp.free_initial_state();
+    ocp.bound("x[3]", .., 0.1, 30.0)?.bound("u", .., -0.05236, 0.05236)?;
+    for (i, first) in [0.4655, 0.0, 0.0].into_iter().enumerate() {
+        ocp.bound(&format!("x[{i}]"), 0..=0, first, first)?;
+        ocp.bound(&format!("x[{i}]"), n..=n, 0.0, 0.0)?;
+    }
+    for k in 0..=n {
+        let x = [0.4655 * (1.0 - k as f64 / n as f64), 0.0, 0.0, 5.0];
+        ocp.guess_stage(k, &x, if k < n { &[0.0] } else { &[] })?;
+    }
+    let (outcome, log) = solve(&mut ocp)?;
+    assert!(outcome.is_converged() && outcome.iterations <= 86, "{outcome}");
+    // The first attempt ends in the minimum of violations.
+    let shortest = log.iter().map(|row| row.objective).fold(f64::INFINITY, f64::min);
+    assert!(shortest < 0.2, "{shortest}");
+    ocp.linearise(Exact::default())?;
+    let (judged, _) = residuals(ocp.qp(), ocp.iterate());
+    assert!(judged.largest() <= 1e-6, "{judged}");
+    // Residuals of both solvers are below 1e-6, and IPOPT relaxes bounds by 1e-8.
+    let tolerance = (2.0 * 1e-6 + 1e-8) * change_by_residuals(&ocp);
+    assert!((outcome.objective - 5.730851135986).abs() <= tolerance, "{outcome}, {tolerance:e}");
+    Ok(())
+}
