@@ -173,8 +173,8 @@ impl fmt::Display for Status {
             Self::Converged => f.write_str("converged"),
             Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
             Self::MaxIterations => f.write_str(
-                "not converged: the iterations were used up; more of them (`options.max_iterations`), exact Hessians \
-                 (`Sqp::exact`) or another guess may help",
+                "not converged: the iterations were used up; more of them (`options.max_iterations`), another \
+                 guess or, instead of Gauss and Newton, exact Hessians (`Sqp::exact`) may help",
             ),
             Self::Stopped => f.write_str("stopped by the observer"),
             Self::OutOfTime => f.write_str("not converged: the time was over"),
