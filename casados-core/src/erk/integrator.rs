@@ -22,9 +22,20 @@ use core::marker::PhantomData;
 /// An interval of length `h` is divided into [`Options::steps`] equal steps. Derivatives are those
 /// of the discrete map, exact to rounding.
 ///
-/// ```text
-/// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
-/// let step = erk.forward(&x0, &u, 0.05)?;
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::{Vector1, vector};
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u]
+/// }
+///
+/// let mut erk = Erk::<Cart, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = erk.forward(&vector![0.0, 1.0], &Vector1::new(2.0), 0.5)?;
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// assert!((step.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
 /// ```
 pub struct Integrator<M: Ode, B, const S: usize, T: Real, W: Memory> {
     pub(super) engine: Engine<M, T, S, W>,

@@ -10,6 +10,41 @@ use bytemuck::Zeroable;
 use core::fmt;
 
 /// A convex function `φ(r)` of a residual with `NY` elements.
+///
+/// A function of one's own, `¼ r⁴` of every residual:
+///
+/// ```
+/// use casados::ocp::{Convex, ConvexCost, HeapSqp, Horizon, Map, Problem};
+/// use casados::prelude::*;
+///
+/// #[derive(Clone)]
+/// struct Quartic;
+/// impl Convex<f64> for Quartic {
+///     fn evaluate(&self, r: &[f64], gradient: &mut [f64], hessian: &mut [f64]) -> f64 {
+///         for (i, r) in r.iter().enumerate() {
+///             (gradient[i], hessian[i * (gradient.len() + 1)]) = (r.powi(3), 3.0 * r * r);
+///         }
+///         r.iter().map(|r| 0.25 * r.powi(4)).sum()
+///     }
+/// }
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// #[function]
+/// fn end(x: f64, _u: f64) -> f64 { x }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(ConvexCost::<Both, _>::new(Quartic))
+///     .terminal_cost(ConvexCost::<End, _>::new(Quartic))
+///     .on(Horizon::uniform(1, 1.0))?;
+/// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.3])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// // u³ + (1 + u)³ = 0
+/// assert!((ocp.stage(0)?.u[0] + 0.5).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Convex<T> {
     /// `φ(r)`, its gradient, `NY`, and its Hessian, `NY × NY` with both triangles, which is
     /// symmetric and positive semidefinite. Both are zero before the call.

@@ -44,6 +44,22 @@ pub enum Part {
 }
 
 /// A name in an error: its first bytes.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let error = ocp.bound("v", .., -1.0, 1.0).err().ok_or("there is one")?;
+/// assert!(matches!(error, OcpError::UnknownName { name, .. } if name.as_str() == "v"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Text {
     bytes: [u8; 32],
@@ -76,6 +92,25 @@ impl fmt::Debug for Text {
 }
 
 /// A constraint by its name.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// ocp.bound("u", .., -0.01, 0.01)?.bound("x", 20.., 0.0, 0.0)?;
+/// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let Status::Infeasible { constraint, violation } = outcome.status else { return Err("there is a way".into()) };
+/// println!("{constraint}: {violation:.1}"); // "the upper bound of `x` at stage 20: 0.8"
+/// assert!((constraint.name, constraint.stage) == ("x", 20) && (violation - 0.8).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConstraintName {
     /// What kind of bounds.

@@ -89,6 +89,35 @@ pub struct Ocp<P, T, D, M> {
 /// A problem with its memory on the heap.
 ///
 /// `problem.on(horizon)` makes it; [`Ocp`] has its methods, and an example.
+///
+/// A function of one's own returns it by what it can do:
+///
+/// ```
+/// use casados::ocp::{Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Problem, SecondOrder};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// /// To a place in a second. `SecondOrder` is what exact Hessians need.
+/// fn travel(
+///     place: f64,
+/// ) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>> {
+///     let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?)
+///         .running_cost(GeneralCost::<Effort>::new())
+///         .on(Horizon::uniform(10, 0.1))?;
+///     ocp.fix_initial_state(&[0.0; 2])?.bound("x[0]", 10.., place, place)?.guess(&[0.0; 2], &[0.0])?;
+///     Ok(ocp)
+/// }
+///
+/// let (mut one, mut other) = (travel(1.0)?, travel(1.0)?);
+/// let by_sqp = HeapSqp::new(&one)?.solve(&mut one)?;
+/// let by_ipm = HeapIpm::new(&other)?.solve(&mut other)?;
+/// assert!((by_sqp.objective - by_ipm.objective).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub type HeapOcp<P, T = f64> = Ocp<P, T, Vec<StageDims>, Vec<T>>;
 

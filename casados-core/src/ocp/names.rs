@@ -1,6 +1,23 @@
 //! What the variables of a model are called.
 
 /// Names of the variables of a model.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let error = ocp.bound("v", .., -1.0, 1.0).err().ok_or("there is one")?;
+/// let OcpError::UnknownName { known, .. } = error else { return Err(error.into()) };
+/// assert_eq!((known.model, known.x, known.u), ("Push", &["x"][..], &["u"][..]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Names {
     /// Of the model.

@@ -86,6 +86,36 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
 }
 
 /// The types of a [`Problem`] under one name.
+///
+/// What solvers take, so functions of one's own take it too:
+///
+/// ```
+/// use casados::ocp::{Formulation, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem};
+/// use casados::prelude::*;
+///
+/// /// The first control from several states.
+/// fn law<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, states: &[f64]) -> Result<Vec<f64>, OcpError> {
+///     let mut sqp = HeapSqp::new(ocp)?.gauss_newton();
+///     let mut first = |&x: &f64| {
+///         sqp.solve(ocp.fix_initial_state(&[x])?)?;
+///         Ok(ocp.stage(0)?.u[0])
+///     };
+///     states.iter().map(&mut first).collect()
+/// }
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.guess(&[0.0], &[0.0])?;
+/// let u = law(&mut ocp, &[1.0, 2.0])?;
+/// assert!((u[1] - 2.0 * u[0]).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a problem of optimal control with numbers `{T}`",
     note = "costs and constraints are functions with the arguments of the model (unused ones with an underscore), and have its dimensions"

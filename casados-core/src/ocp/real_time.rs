@@ -87,11 +87,52 @@ pub struct RealTime<P, S, C, T, D, M> {
 }
 
 /// A controller with its memory on the heap.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let mut x = 1.0;
+/// for _ in 0..20 {
+///     x += controller.prepare()?.feedback(&[x])?.u[0];
+///     controller.shift();
+/// }
+/// assert!(x.abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub type HeapRealTime<P, S = HeapInteriorPoint, C = GaussNewton, T = f64> =
     RealTime<P, S, C, T, Vec<StageDims>, Vec<T>>;
 
 /// A QP that waits for the state; see [`RealTime`].
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// // Integrations and derivatives are done here, before the state is known.
+/// let prepared = controller.prepare()?;
+/// // One QP is left.
+/// let feedback = prepared.feedback(&[0.8])?;
+/// assert!(feedback.statistics.iterations > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Prepared<'a, P, S, T, D, M> {
     qp_solver: &'a mut S,
     ocp: &'a mut Ocp<P, T, D, M>,

@@ -9,6 +9,29 @@ use crate::scalar::Real;
 ///
 /// # Errors
 /// [`QpError::InvalidValue`], [`QpError::CrossedBounds`]
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// assert!(check(qp.view()).is_ok());
+/// if let Some(mut last) = qp.stage_mut(3) {
+///     last.q_mut().set(0, 0, f64::NAN);
+/// }
+/// let error = check(qp.view()).unwrap_err();
+/// assert!(matches!(error, QpError::InvalidValue { field: QpField::Q, stage: 3, .. }));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     for (k, stage) in qp.stages().enumerate() {
         let blocks = [

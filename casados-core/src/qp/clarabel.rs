@@ -26,6 +26,27 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 ///
 /// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
 /// and a violation that at least one constraint must have.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
+/// assert!((u0 + 0.4).abs() < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 pub struct Clarabel {
     /// Clarabel's own options, which may be changed between calls.
     pub settings: DefaultSettings<f64>,

@@ -45,10 +45,38 @@ pub struct Qp<T, D, M> {
 }
 
 /// A QP with its memory on the heap.
+///
+/// ```
+/// use casados::qp::{HeapQp, StageDims};
+///
+/// // Two states, one control and one constraint at each of ten stages.
+/// let qp = HeapQp::<f64>::new(&[StageDims::new(2, 1, 1); 10])?;
+/// assert_eq!(qp.view().dims().len(), 10);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub type HeapQp<T = f64> = Qp<T, Vec<StageDims>, Vec<T>>;
 
 /// The data of a QP, for solvers.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let view = qp.view();
+/// assert_eq!(view.stages().filter_map(|stage| stage.q().get(0, 0)).sum::<f64>(), 4.0);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct QpView<'a, T> {
     pub(crate) dims: &'a [StageDims],

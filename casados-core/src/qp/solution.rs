@@ -53,6 +53,28 @@ pub struct SolutionView<'a, T> {
 }
 
 /// What a solution has of one stage.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let first = solution.stages().next().unwrap();
+/// // The control is at its lower bound, which pushes; nothing is at the upper one.
+/// assert!((first.u[0] + 0.4).abs() < 1e-7 && first.u_lower[0] > 0.1 && first.u_upper[0] < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct SolutionStage<'a, T> {
     /// `x`

@@ -6,6 +6,28 @@ use super::solution::SolutionView;
 use super::statistics::QpStatistics;
 
 /// Where a solver begins.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+/// let cold = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// qp.fix_initial_state(&[0.99])?;
+/// let warm = solver.solve(qp.view(), QpStart::Warm, solution.view_mut())?;
+/// assert!(warm.iterations <= cold.iterations);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QpStart {
@@ -18,6 +40,32 @@ pub enum QpStart {
 }
 
 /// A solver of QPs with the structure of optimal control.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// /// The first control, by any solver.
+/// fn first<S: QpSolver<f64>>(mut solver: S, qp: &HeapQp) -> Result<f64, QpError> {
+///     let mut solution = HeapSolution::new(qp.view().dims())?;
+///     solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+///     Ok(solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]))
+/// }
+/// let one = first(HeapInteriorPoint::new(), &qp)?;
+/// let other = first(Condensing::new(2, HeapInteriorPoint::new()), &qp)?;
+/// assert!((one + 0.4).abs() < 1e-7 && (one - other).abs() < 1e-7);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 pub trait QpSolver<T> {
     /// Solves a QP. The solution is in `solution` afterwards; after an error that comes from the
     /// run, the best iterate is.

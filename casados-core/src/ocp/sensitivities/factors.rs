@@ -102,7 +102,7 @@ pub struct SolutionFactors<T> {
     pub(super) work: Vec<T>,
 }
 
-/// `λᵀ dw/dx₀` and `λᵀ dw/dp`.
+/// `λᵀ dw/dx₀` and `λᵀ dw/dp`; see [`SolutionFactors`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SolutionAdjoint<'a, T> {
@@ -114,6 +114,25 @@ pub struct SolutionAdjoint<'a, T> {
 
 /// The Hessian of the optimal value; matrices column after column. Where the initial state is free
 /// there is nothing but `∂²V/∂p²`.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let mut factors = SolutionFactors::new(&ocp)?;
+/// ocp.factorise(Exact::default(), &mut factors)?;
+/// // The solution of Riccati's equation P² = P + 1, to which the horizon comes close.
+/// assert!((factors.value_hessian().xx[0] - 1.618).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ValueHessian<'a, T> {

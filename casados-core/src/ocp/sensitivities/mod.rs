@@ -31,6 +31,27 @@ use alloc::vec::Vec;
 /// Derivatives with respect to `p` are those where the parameters of all stages change together.
 /// Where few functions of the solution are of interest, adjoints by [`SolutionFactors`] are
 /// cheaper.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let mut sensitivities = Sensitivities::new(&ocp)?;
+/// ocp.differentiate(Exact::default(), &mut sensitivities)?;
+/// // The linear-quadratic regulator: u = -0.618 x, x₊ = 0.382 x.
+/// assert!((sensitivities.gain(0)[0] + 0.618).abs() < 1e-3);
+/// assert!((sensitivities.du(0)[0] + 0.618).abs() < 1e-3);
+/// assert!((sensitivities.dx(1)[0] - 0.382).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Sensitivities<T> {

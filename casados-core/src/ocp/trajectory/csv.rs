@@ -6,6 +6,22 @@ use core::fmt;
 
 /// A trajectory as comma-separated values, to be printed or written:
 /// `std::fs::write("solution.csv", solution.csv().to_string())`.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let text = ocp.solution()?.csv().to_string();
+/// assert!(text.starts_with("t,x,u\n0,1,0\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Csv<'a, T = f64>(&'a Trajectory<T>);
 

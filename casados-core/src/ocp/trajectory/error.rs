@@ -6,6 +6,24 @@ use alloc::vec::Vec;
 use core::fmt;
 
 /// Why a name means nothing, or a trajectory is none of a problem.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let solution = ocp.solution()?;
+/// let error = solution.state("speed").unwrap_err();
+/// println!("{error}"); // what there is
+/// assert!(matches!(error, TrajectoryError::Unknown { .. }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum TrajectoryError {

@@ -98,6 +98,28 @@ pub struct InteriorPoint<T, N, I> {
 }
 
 /// An interior point with its memory on the heap.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+/// solver.options.tolerance = 1e-9;
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
+/// assert!((u0 + 0.4).abs() < 1e-8);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub type HeapInteriorPoint<T = f64> = InteriorPoint<T, Vec<T>, Vec<u32>>;
 
