@@ -71,11 +71,44 @@ pub mod prelude {
 }
 
 /// Choices of [`Options`].
+///
+/// ```
+/// use casados::options::{Newton, Start};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let newton = Newton { tolerance: 1e-9, ..Default::default() };
+/// let options = Options { steps: 2, newton, start: Start::Warm, ..Default::default() };
+/// let irk = Irk::<Cart, Gauss<2>>::new(options)?;
+/// assert_eq!(irk.options().steps, 2);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub mod options {
     pub use casados_core::options::{Jacobian, Newton, Start};
 }
 
 /// What an [`Error`] tells: which argument, where, and why.
+///
+/// ```
+/// use casados::error::Argument;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let error = irk.solve(&vector![0.0, f64::NAN], &vector![1.0], 0.5).unwrap_err();
+/// println!("{error}"); // which of them, by its name
+/// assert!(matches!(error, Error::NonFiniteInput { argument: Argument::X0, .. }));
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub mod error {
     pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started};
 }
@@ -132,6 +165,25 @@ pub mod erk {
 }
 
 /// Many intervals at once: what [`Batch`] stands for.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// // Each interval has its own state and control; all have the same length.
+/// let (x0, u) = ([vector![0.0, 0.0]; 40], [1.0; 40].map(|u| vector![u]));
+/// let intervals = Intervals { x0: &x0, u: &u, h: &[0.5], ..Default::default() };
+/// let mut ends = vec![casados::result::Forward::default(); 40];
+/// batch.forward(&intervals, &mut ends)?;
+/// assert!(ends.iter().all(|end| (end.x - vector![0.125, 0.5]).norm() < 1e-14));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub mod batch {
     pub use casados_core::batch::{Batched, Integrator, Single, Slice, Standard};

@@ -31,6 +31,27 @@
 //! [`Sqp::keep_jacobians`] asks integrators for adjoints while steps contract, [`Sqp::secant`]
 //! learns Hessians from first derivatives.
 //!
+//! ```
+//! use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+//! use casados::prelude::*;
+//!
+//! /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+//! #[ode]
+//! fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+//! #[function]
+//! fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+//!
+//! let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+//!     .running_cost(GeneralCost::<Effort>::new())
+//!     .on(Horizon::uniform(20, 0.05))?;
+//! ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0, 0.0], &[0.0])?;
+//! ocp.bound("x[0]", 20.., 1.0, 1.0)?.bound("x[1]", 20.., 0.0, 0.0)?.bound("u", .., -8.0, 8.0)?;
+//! let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+//! assert!(outcome.is_converged());
+//! println!("{ocp}\n{}", ocp.solution()?.csv());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its
 //! stages to there (`z0` of its results), with their exact first derivatives; those of second
 //! order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of

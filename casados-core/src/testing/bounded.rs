@@ -16,6 +16,15 @@ const U: f64 = 0.5 * f64::EPSILON;
 const FUNCTION: f64 = 2.0 * U;
 
 /// A number and a bound of its rounding error.
+///
+/// ```
+/// use casados::testing::Bounded;
+///
+/// // 1/3 is rounded, and what is left of the difference is that rounding.
+/// let third = Bounded::exact(1.0) / Bounded::exact(3.0);
+/// let rest = third - Bounded::exact(0.3333333333333333);
+/// assert!(rest.value == 0.0 && rest.error > 1e-17 && rest.error < 1e-16);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 pub struct Bounded {
     /// The number, as `f64` computes it.

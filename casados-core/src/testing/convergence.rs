@@ -5,6 +5,26 @@ use std::string::String;
 use std::vec::Vec;
 
 /// Errors over numbers of steps. It prints as a table.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::convergence;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn decay(x: f64) -> f64 {
+///     -x
+/// }
+///
+/// let report = convergence(&[2, 4, 8, 16], &[f64::exp(-1.0)], 1e-15, |steps| {
+///     let mut irk = Irk::<Decay, Gauss<2>>::new(Options { steps, ..Default::default() })?;
+///     let end = irk.solve(&vector![1.0], &vector![], 1.0)?;
+///     Ok::<_, Error>(vec![end.x[0]])
+/// });
+/// println!("{report}"); // steps, errors, and orders between them
+/// assert!(report.order().is_some_and(|order| (order - 4.0).abs() < 0.1));
+/// assert!(report.best() < 1e-6);
+/// ```
 #[derive(Clone, Debug)]
 #[must_use = "a report says whether the check has passed: call `assert_order` or look at `order`"]
 pub struct Convergence {

@@ -52,6 +52,18 @@ pub fn check_derivatives<M: GraphDae>(points: &Points<M>) -> Report {
 }
 
 /// As [`check_derivatives`], for any model: against central differences of order 8 only.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::*;
+///
+/// #[ode]
+/// fn oscillator(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u - x[0].sin()]
+/// }
+///
+/// check_by_differences::<Oscillator>(&Points::random(5)).assert();
+/// ```
 pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("derivatives of {}", type_name::<M>()));
     for (number, v, mu) in samples(points) {
@@ -77,6 +89,18 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
 /// Checks by differences that entries outside of the declared patterns are zero, those of the
 /// Jacobian and those of the Hessian; and that what is declared constant does not change from point
 /// to point, and what is declared to matter to nobody has no entries.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::*;
+///
+/// #[ode]
+/// fn oscillator(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u - x[0].sin()]
+/// }
+///
+/// check_pattern::<Oscillator>(&Points::random(5)).assert();
+/// ```
 pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("patterns of {}", type_name::<M>()));
     let n = variables::<M>();

@@ -33,6 +33,33 @@ pub struct Exact {
 /// `coarse` takes fewer steps than `fine`: the difference between the two is the estimate of the
 /// discretisation error of `fine`, of which it is a multiple when the order is reached. Together
 /// with the sampled rounding error it is the tolerance of the comparison.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::{Exact, check_exact};
+/// use nalgebra::{Vector1, vector};
+///
+/// /// Its solution is x₀ e^(−p t).
+/// #[ode]
+/// fn decay(x: f64, p: f64) -> f64 {
+///     -p * x
+/// }
+///
+/// let (x0, p, h): (f64, f64, f64) = (2.0, 0.5, 1.0);
+/// let e = (-p * h).exp();
+/// let exact = Exact {
+///     states: vec![x0 * e],
+///     // By (x₀, p), and twice.
+///     first: vec![vec![e, -h * x0 * e]],
+///     second: vec![vec![vec![0.0, -h * e], vec![-h * e, h * h * x0 * e]]],
+/// };
+/// let integrator = |steps| Irk::<Decay, Gauss<3>>::new(Options { steps, ..Default::default() });
+/// let (mut coarse, mut fine) = (integrator(4)?, integrator(8)?);
+/// let report =
+///     check_exact(&mut coarse, &mut fine, &Vector1::new(x0), &vector![], &Vector1::new(p), h, &exact)?;
+/// report.assert();
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     coarse: &mut I,
     fine: &mut I,

@@ -6,6 +6,15 @@ use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number and its derivative in one direction.
+///
+/// ```
+/// use casados::testing::{Bounded, Forward};
+///
+/// // d(x²)/dx at 3.
+/// let x = Forward { re: Bounded::exact(3.0), d: Bounded::exact(1.0) };
+/// let square = x * x;
+/// assert_eq!((square.re.value, square.d.value), (9.0, 6.0));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Forward<S> {
     /// The number.

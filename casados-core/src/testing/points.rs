@@ -140,6 +140,14 @@ impl<M: Dae> Points<M> {
 }
 
 /// The generator SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine.
+///
+/// ```
+/// use casados::testing::Random;
+///
+/// let (mut one, mut other) = (Random::new(7), Random::new(7));
+/// assert!((0..100).all(|_| one.symmetric() == other.symmetric()));
+/// assert!((0..100).all(|_| (0.0..1.0).contains(&one.unit())));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 

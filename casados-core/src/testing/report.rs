@@ -37,6 +37,22 @@ pub struct Report {
 }
 
 /// The comparison of one quantity with one reference.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::*;
+///
+/// #[ode]
+/// fn oscillator(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u - x[0].sin()]
+/// }
+///
+/// let report = check_derivatives::<Oscillator>(&Points::random(5));
+/// for row in &report.rows {
+///     println!("{} against {}: {:.1e}", row.quantity, row.reference, row.difference);
+///     assert!(row.wrong == 0 && row.ratio <= 1.0);
+/// }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Row {
     /// What was compared.
@@ -61,6 +77,32 @@ pub struct Row {
 }
 
 /// An entry that is wrong.
+///
+/// What a check says of a closed form that is wrong:
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::{Exact, check_exact};
+/// use nalgebra::{Vector1, vector};
+///
+/// /// Its solution is x₀ e^(−p t).
+/// #[ode]
+/// fn decay(x: f64, p: f64) -> f64 {
+///     -p * x
+/// }
+///
+/// let (x0, p, h): (f64, f64, f64) = (2.0, 0.5, 1.0);
+/// let e = (-p * h).exp();
+/// let exact = Exact { states: vec![x0 * e + 1e-6], ..Default::default() };
+/// let integrator = |steps| Irk::<Decay, Gauss<3>>::new(Options { steps, ..Default::default() });
+/// let (mut coarse, mut fine) = (integrator(4)?, integrator(8)?);
+/// let report =
+///     check_exact(&mut coarse, &mut fine, &Vector1::new(x0), &vector![], &Vector1::new(p), h, &exact)?;
+/// println!("{report}");
+/// let deviation = &report.wrong[0];
+/// assert!(!report.passed() && (deviation.expected - deviation.value - 1e-6).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Deviation {
     /// What was compared.

@@ -3,6 +3,26 @@
 use super::*;
 
 /// An event that happened.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// let end = ball.solve(&vector![5.0, 0.0], &vector![], 1.5)?;
+/// // It hits the ground after a second, and goes up again with four fifths of its velocity.
+/// let hit = &end.occurrences[0];
+/// assert!((hit.t - 1.0).abs() < 1e-11 && (hit.before[1] + 10.0).abs() < 1e-10);
+/// assert!((hit.after[1] - 8.0).abs() < 1e-10);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct Occurrence<M: Dae, T: Real = f64> {
     /// Which.
@@ -16,6 +36,23 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end, and what happened before.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// let end = ball.solve(&vector![5.0, 0.0], &vector![], 1.5)?;
+/// assert!(end.occurrences.len() == 1 && !end.terminal && (end.t - 1.5).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct Solution<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
@@ -31,6 +68,24 @@ pub struct Solution<M: Dae, T: Real = f64> {
 
 /// The solution at the end and its derivatives; if an event ended the integration, with the change
 /// of its time.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// let end = ball.forward(&vector![5.0, 0.0], &vector![], 1.5)?;
+/// // The velocity after it is 0.8 · 10 t − 10 (1.5 − t), where t grows by 0.1 s for each metre.
+/// assert!((end.dx_dx0[(1, 0)] - 1.8).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct HybridForward<M: Dae, T: Real = f64> {
     /// The solution.
@@ -46,6 +101,24 @@ pub struct HybridForward<M: Dae, T: Real = f64> {
 }
 
 /// The derivatives of the time of an event.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// let end = ball.forward(&vector![5.0, 0.0], &vector![], 1.5)?;
+/// // It hits the ground at t = √(2 x₀ / 10).
+/// assert!((end.times[0].x0 - vector![0.1, 0.1]).norm() < 1e-10);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct TimeGradient<M: Dae, T: Real = f64> {
     /// `∂t/∂x₀`
@@ -57,6 +130,24 @@ pub struct TimeGradient<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end and the gradient of `λᵀx`.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// // The gradient of the velocity at the end, by the state at the start.
+/// let end = ball.adjoint(&vector![5.0, 0.0], &vector![], 1.5, &vector![0.0, 1.0])?;
+/// assert!((end.grad_x0[0] - 1.8).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct HybridAdjoint<M: Dae, T: Real = f64> {
     /// The solution.
