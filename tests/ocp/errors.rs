@@ -374,6 +374,11 @@ fn general_costs_name_their_function() -> Test {
         .on(Horizon::uniform(2, 0.1))?;
     ocp.fix_initial_state(&[-1.0, 0.0])?.set_parameters(.., &[0.1])?.guess(&[-1.0, 0.0], &[0.0])?;
     let error = HeapSqp::new(&ocp)?.solve(&mut ocp).err().map(|error| error.to_string());
-    assert_eq!(error.as_deref(), Some("stage 0: output 0 of `Root` is NaN"));
+    assert_eq!(
+        error.as_deref(),
+        Some(
+            "stage 0: output 0 of `Root` is NaN: another guess, or bounds that keep away from there, may help"
+        )
+    );
     Ok(())
 }

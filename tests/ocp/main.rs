@@ -29,6 +29,7 @@ mod infeasible;
 mod ipm;
 mod kept_jacobians;
 mod lifted;
+mod messages;
 mod options;
 mod print;
 mod random;

@@ -54,13 +54,17 @@ impl fmt::Display for Error {
             Error::NotExplicit { stage } => {
                 write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
             }
-            Error::NonFiniteInput { argument: Argument::H, value, .. } => write!(f, "h is {value}"),
-            Error::NonFiniteInput { argument: Argument::T, value, .. } => write!(f, "t is {value}"),
+            Error::NonFiniteInput { argument: Argument::H, value, .. } => {
+                write!(f, "the length `h` of the interval is {value}: it has to be finite")
+            }
+            Error::NonFiniteInput { argument: Argument::T, value, .. } => {
+                write!(f, "the time `t` is {value}: it has to be finite")
+            }
             Error::NonFiniteInput { argument, index, name: "", value } => {
-                write!(f, "element {index} of {argument} is {value}")
+                write!(f, "element {index} of {argument} is {value}: it has to be finite")
             }
             Error::NonFiniteInput { argument, name, value, .. } => {
-                write!(f, "`{name}` of {argument} is {value}")
+                write!(f, "`{name}` of {argument} is {value}: it has to be finite")
             }
             Error::ParametersNotSet => {
                 f.write_str("the model has parameters: call `set_parameters` before the first step")
@@ -70,7 +74,10 @@ impl fmt::Display for Error {
             }
             Error::NonFiniteModel { quantity, equation, value, at } => {
                 quantity.write(f, equation, value)?;
-                write!(f, " at {at}")
+                write!(
+                    f,
+                    " at {at}: look for roots, logarithms or quotients outside of their domains, or take shorter steps"
+                )
             }
             Error::NonFiniteStart {
                 quantity,

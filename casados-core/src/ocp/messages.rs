@@ -4,6 +4,9 @@ use super::error::{ConstraintName, OcpError, Part};
 use crate::qp::{QpField, Side};
 use core::fmt;
 
+/// What may help where a function has no value, or no derivative.
+const ELSEWHERE: &str = "another guess, or bounds that keep away from there, may help";
+
 impl Part {
     fn is_bound(self) -> bool {
         matches!(self, Self::StateBounds | Self::ControlBounds | Self::PathBounds | Self::TerminalBounds)
@@ -77,10 +80,16 @@ impl fmt::Display for OcpError {
                 name.as_str(),
                 end.saturating_sub(1)
             ),
+            Self::Length { part: Part::Dimensions, stage, expected, found } => write!(
+                f,
+                "these are the dimensions of another problem, {found} instead of {expected} at stage {stage}: memory \
+                 and solvers are made for one problem, as by `HeapSqp::new(&ocp)`"
+            ),
             Self::Length { part, stage, expected, found } => {
                 let elements = if *found == 1 { "element" } else { "elements" };
                 stage_of(f, *part, *stage)?;
-                write!(f, "{part} {} {found} {elements} instead of {expected}", part.verb())
+                write!(f, "{part} {} {found} {elements} instead of {expected}", part.verb())?;
+                f.write_str(if *expected == 0 { ": the problem has none" } else { "" })
             }
             Self::InvalidValue { part, stage, name, index, value } => {
                 stage_of(f, *part, *stage)?;
@@ -138,7 +147,7 @@ impl fmt::Display for OcpError {
                 f.write_str(if *terminal { "at the end of the horizon" } else { "at the nodes" })
             }
             Self::NonFiniteFunction { function, stage, output, value } => {
-                write!(f, "stage {stage}: output {output} of `{function}` is {value}")
+                write!(f, "stage {stage}: output {output} of `{function}` is {value}: {ELSEWHERE}")
             }
             Self::NonFiniteDerivative { field, stage, of, output, by, value } => {
                 write!(f, "stage {stage}: ")?;
@@ -148,7 +157,7 @@ impl fmt::Display for OcpError {
                     QpField::GradientX | QpField::GradientU => write!(f, "the derivative of the cost by `{by}`")?,
                     _ => write!(f, "the second derivative of the Lagrangian by `{of}` and `{by}`")?,
                 }
-                write!(f, " is {value}: another guess, or bounds that keep away from there, may help")
+                write!(f, " is {value}: {ELSEWHERE}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
             Self::Coupled => f.write_str(

@@ -167,48 +167,65 @@ impl Outcome {
     }
 }
 
-impl fmt::Display for Status {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Status {
+    /// What it is.
+    fn what(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Converged => f.write_str("converged"),
             Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
-            Self::MaxIterations => f.write_str(
-                "not converged: the iterations were used up; more of them (`options.max_iterations`), another \
-                 guess or, instead of Gauss and Newton, exact Hessians (`Sqp::exact`) may help",
-            ),
+            Self::MaxIterations => f.write_str("not converged: the iterations were used up"),
             Self::Stopped => f.write_str("stopped by the observer"),
             Self::OutOfTime => f.write_str("not converged: the time was over"),
-            Self::Unbounded => f.write_str(
-                "unbounded: variables grow without end; bounds of states and controls, or a cost of them, are missing",
-            ),
+            Self::Unbounded => f.write_str("unbounded: variables grow without end"),
             Self::Infeasible { constraint, violation } => {
-                write!(f, "locally infeasible: {constraint} is violated by {violation:e}; another guess may help")
+                write!(f, "locally infeasible: {constraint} is violated by {violation:e}")
             }
             Self::InfeasibleQp { constraint, violation } => {
-                write!(
-                    f,
-                    "the QP is infeasible: {constraint} is violated by {violation:e} at least; `options.elastic` goes on \
-                     where only QPs are"
-                )
+                write!(f, "the QP is infeasible: {constraint} is violated by {violation:e} at least")
             }
-            Self::QpFailed(error @ QpError::NotConvex { .. }) => {
-                write!(f, "the QP was not solved: {error}; `Convexification::Reduced` adds what is missing")
-            }
-            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}; another guess may help"),
-            Self::NoProgress => f.write_str(
-                "no step makes progress; another guess may help, in sequential quadratic programming also exact \
-                 Hessians (`Sqp::exact`), another `options.globalisation` or a smaller `options.shortest_step`",
-            ),
+            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
+            Self::NoProgress => f.write_str("no step makes progress"),
         }
+    }
+
+    /// What to do about it.
+    fn way_out(&self) -> &'static str {
+        match self {
+            Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
+            Self::MaxIterations => {
+                "; more of them (`options.max_iterations`), another guess or, instead of Gauss and Newton, exact \
+                 Hessians (`Sqp::exact`) may help"
+            }
+            Self::Unbounded => "; bounds of states and controls, or a cost of them, are missing",
+            Self::Infeasible { .. } => {
+                "; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"
+            }
+            Self::InfeasibleQp { .. } => "; `options.elastic` goes on where only QPs are",
+            Self::QpFailed(QpError::NotConvex { .. }) => "; `Convexification::Reduced` adds what is missing",
+            Self::QpFailed(_) => "; another guess may help",
+            Self::NoProgress => {
+                "; another guess may help, in sequential quadratic programming also exact Hessians (`Sqp::exact`), \
+                 another `options.globalisation` or a smaller `options.shortest_step`"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.what(f)?;
+        f.write_str(self.way_out())
     }
 }
 
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { status, iterations, objective, residuals, .. } = self;
+        status.what(f)?;
         write!(
             f,
-            "{} after {} iterations: objective {:.8e}, {}",
-            self.status, self.iterations, self.objective, self.residuals
+            " after {iterations} iterations: objective {objective:.8e}, {residuals}{}",
+            status.way_out()
         )
     }
 }

@@ -68,7 +68,7 @@ fn input_that_is_not_finite() {
     assert_eq!(fresh.hessian(&x0, &u, 0.1, &lambda).unwrap(), &result);
     at(irk.dense(nan).map(|_| ()), (Argument::T, 0, ""));
     let error = irk.solve(&vector![1.0, nan], &u, 0.1).unwrap_err();
-    assert_eq!(error.to_string(), "`x[1]` of x0 is NaN");
+    assert_eq!(error.to_string(), "`x[1]` of x0 is NaN: it has to be finite");
 }
 
 #[test]
@@ -82,7 +82,11 @@ fn a_model_that_is_not_finite() {
         }
         other => panic!("{other:?}"),
     }
-    assert_eq!(error.to_string(), "equation 0 of the model is NaN at step 0, stage 0, iteration 0");
+    assert_eq!(
+        error.to_string(),
+        "equation 0 of the model is NaN at step 0, stage 0, iteration 0: look for roots, logarithms or quotients \
+         outside of their domains, or take shorter steps"
+    );
     // The root is zero: the residual is finite, its derivative is not.
     let error = irk.solve(&vector![0.0], &vector![1.0], 0.0).unwrap_err();
     assert!(matches!(

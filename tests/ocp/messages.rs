@@ -1,0 +1,133 @@
+//! What a newcomer is told: each message has what is wrong, where by name, the values, and the way
+//! out.
+
+use crate::Test;
+use casados::ocp::{Formulation, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem};
+use casados::prelude::*;
+use nalgebra::{Vector1, vector};
+use std::fmt::Display;
+
+#[ode]
+fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[1], u]
+}
+#[ode]
+fn outflow(x: f64) -> f64 {
+    -x.sqrt()
+}
+#[function]
+fn deviation(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[0], u]
+}
+
+fn problem(weights: [f64; 2], horizon: Horizon<'_, f64>) -> Result<HeapOcp<impl Formulation<f64>>, OcpError> {
+    let irk = Irk::<Cart, Gauss<2>>::new(Options::default());
+    let irk = irk.map_err(|error| OcpError::Integration { interval: 0, error })?;
+    Problem::new(irk).stage_cost(LeastSquaresCost::<Deviation>::diagonal(&weights)).on(horizon)
+}
+
+/// The text of an error.
+fn text<V, E: Display>(result: Result<V, E>) -> String {
+    result.err().map(|error| error.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn of_a_horizon_and_weights() {
+    let horizon = |n, h| text(problem([1.0; 2], Horizon::uniform(n, h)));
+    assert_eq!(
+        horizon(0, 0.1),
+        "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times"
+    );
+    assert_eq!(horizon(3, 0.0), "interval 0 goes from 0 to 0: times of nodes are finite and increase");
+    for (weight, shown) in [(-2.0, "-2"), (f64::NAN, "NaN")] {
+        assert_eq!(
+            text(problem([1.0, weight], Horizon::uniform(3, 0.1))),
+            format!("the weight of output 1 of `Deviation` is {shown}: it has to be finite and not negative")
+        );
+    }
+}
+
+#[test]
+fn of_values_by_name() -> Test {
+    let mut ocp = problem([1.0; 2], Horizon::uniform(3, 0.1))?;
+    assert_eq!(
+        text(ocp.bound("speed", .., 0.0, 1.0)),
+        "`Cart` has no state or control `speed`: its states are `x[0]`, `x[1]`, its controls `u`"
+    );
+    assert_eq!(
+        text(ocp.bound("u", .., f64::NAN, 1.0)),
+        "stage 0: a bound of `u` is NaN: it has to be a number, or -inf below and inf above where there is none"
+    );
+    assert_eq!(
+        text(ocp.bound("x[1]", 1.., 2.0, 1.0)),
+        "stage 1: the lower bound 2 of `x[1]` is above the upper bound 1"
+    );
+    assert_eq!(
+        text(ocp.bound("u", 3.., 0.0, 1.0)),
+        "there is no stage 3: the bounds of the controls are at stages 0 to 2"
+    );
+    assert_eq!(
+        text(ocp.soften("u", .., 1.0, 1.0)),
+        "`u` has no bound at stages 0 to 2 that could be soft: call `bound` before `soften`"
+    );
+    assert_eq!(text(ocp.fix_initial_state(&[1.0])), "the initial state has 1 element instead of 2");
+    assert_eq!(
+        text(ocp.fix_initial_state(&[1.0, f64::NAN])),
+        "the initial value of `x[1]` is NaN: it has to be finite"
+    );
+    assert_eq!(
+        text(ocp.set_terminal_reference(&[1.0])),
+        "the reference of the terminal cost has 1 element instead of 0: the problem has none"
+    );
+    ocp.fix_initial_state(&[1.0, 0.0])?;
+    assert_eq!(
+        text(ocp.solution()?.state("speed")),
+        "the solution of `Cart` has no `speed`: it has `x[0]`, `x[1]`"
+    );
+    Ok(())
+}
+
+#[test]
+fn of_runs() -> Test {
+    let mut ocp = problem([1.0; 2], Horizon::uniform(3, 0.1))?;
+    let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
+    assert_eq!(
+        text(sqp.solve(&mut ocp)),
+        "nothing is said about the initial state: call `fix_initial_state` or `free_initial_state`"
+    );
+    ocp.fix_initial_state(&[1.0, 0.0])?;
+    let other = problem([1.0; 2], Horizon::uniform(4, 0.1))?;
+    assert_eq!(
+        text(HeapSqp::new(&other)?.gauss_newton().solve(&mut ocp)),
+        "these are the dimensions of another problem, 5 instead of 4 at stage 0: memory and solvers are made for one \
+         problem, as by `HeapSqp::new(&ocp)`"
+    );
+    // Degrees where radians were meant: too far for 0.3 s.
+    ocp.bound("u", .., -1.0, 1.0)?.bound("x[0]", 3.., 90.0, 90.0)?.guess(&[1.0, 0.0], &[0.0])?;
+    let outcome = sqp.solve(&mut ocp)?.to_string();
+    assert!(
+        outcome.starts_with("locally infeasible: the lower bound of `x[0]` at stage 3 is violated by 8.9")
+    );
+    assert!(outcome.contains(" iterations: objective "));
+    assert!(outcome.ends_with("; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"));
+    Ok(())
+}
+
+#[test]
+fn of_integrators() -> Test {
+    let mut irk = Irk::<Outflow, Gauss<2>>::new(Options::default())?;
+    assert_eq!(
+        text(irk.solve(&Vector1::new(f64::NAN), &vector![], 0.1)),
+        "`x` of x0 is NaN: it has to be finite"
+    );
+    assert_eq!(
+        text(irk.solve(&Vector1::new(1.0), &vector![], f64::INFINITY)),
+        "the length `h` of the interval is inf: it has to be finite"
+    );
+    assert_eq!(
+        text(irk.solve(&Vector1::new(-1.0), &vector![], 0.1)),
+        "equation 0 of the model is NaN at step 0, stage 0, iteration 0: look for roots, logarithms or quotients outside \
+         of their domains, or take shorter steps"
+    );
+    Ok(())
+}
