@@ -6,7 +6,7 @@ use crate::qp::QpError;
 use crate::qp::interior::Iterate;
 use crate::scalar::Real;
 
-/// The first `δ_w`.
+/// The first `δ_w`, as all of them in units of forces.
 const FIRST: f64 = 1e-4;
 /// With this on the diagonal, directions without curvature may be left alone.
 const FLAT: f64 = 1e-6;
@@ -26,17 +26,22 @@ impl Regularisation {
     ///
     /// # Errors
     /// Those of the recursion.
-    pub fn direction<T: Real>(&mut self, iterate: &mut Iterate<'_, T>, mu: T) -> Result<f64, QpError> {
-        let mut failed = match self.attempt(iterate, mu, 0.0) {
+    pub fn direction<T: Real>(
+        &mut self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        force: f64,
+    ) -> Result<f64, QpError> {
+        let mut failed = match self.attempt(iterate, mu, 0.0, force) {
             Ok(()) => return Ok(0.0),
             Err(failed) => failed,
         };
         let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
         while delta < MOST {
-            match self.attempt(iterate, mu, delta) {
+            match self.attempt(iterate, mu, delta, force) {
                 Ok(()) => {
                     self.last = delta;
-                    return Ok(delta);
+                    return Ok(delta * force);
                 }
                 Err(error) => failed = error,
             }
@@ -46,8 +51,14 @@ impl Regularisation {
     }
 
     /// One factorisation; a step that is not finite is no step.
-    fn attempt<T: Real>(&self, iterate: &mut Iterate<'_, T>, mu: T, delta: f64) -> Result<(), QpError> {
-        match step(iterate, mu, T::from_f64(delta)) {
+    fn attempt<T: Real>(
+        &self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        delta: f64,
+        force: f64,
+    ) -> Result<(), QpError> {
+        match step(iterate, mu, T::from_f64(delta * force)) {
             Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
             }

@@ -15,7 +15,7 @@ use crate::scalar::Real;
 const LARGEST: f64 = 1e4;
 /// A violation that larger penalties do not make smaller than this part of it is there to stay.
 const STAYS: f64 = 0.9;
-/// The barrier parameter of new penalties.
+/// The barrier parameter of new penalties, in units of forces.
 const BARRIER: f64 = 0.1;
 
 /// The hard bound that is violated most while penalties stand for it.
@@ -38,7 +38,7 @@ pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRe
     let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
     let stays = worst.violation > STAYS * state.stationary_violation;
-    if stays || penalty >= LARGEST * options.elastic_penalty {
+    if stays || penalty >= LARGEST * options.elastic_penalty * state.lengths.force {
         return Some(ocp.status_of_worst(&worst));
     }
     state.stationary_violation = worst.violation;
@@ -54,10 +54,10 @@ pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef
     penalty: f64,
 ) {
     ocp.set_penalties(given, Some(T::from_f64(penalty)));
-    state.lengths = Lengths::of(ocp.qp());
+    state.lengths = Lengths::of(ocp.qp(), state.lengths.force);
     state.elastic = Some(penalty);
     state.has_slacks = false;
-    state.mu = BARRIER;
+    state.mu = BARRIER * state.lengths.force;
     state.regularisation = Regularisation::default();
     state.has_filter = false;
 }

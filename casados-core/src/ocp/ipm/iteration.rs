@@ -8,7 +8,7 @@ use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
 use super::predictor::{self, needs_equal_steps};
 use super::state::{MARGIN, State};
 use super::work::Work;
-use super::{Ipm, elastic};
+use super::{Ipm, elastic, scaling};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::{Exact, Slopes};
 use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction, larger};
@@ -103,7 +103,7 @@ where
             if state.progress.adapts() {
                 // From the best point on, as carefully as may be.
                 ocp.recall(&self.best);
-                state.begin_monotone(self.options.start_mu);
+                state.begin_monotone(&self.options);
                 return Ok(None);
             }
             if state.elastic.is_some() || !self.options.elastic {
@@ -112,12 +112,14 @@ where
             // Where no step made progress is no place to begin.
             ocp.recall(&self.best);
             let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-            elastic::soften(ocp, state, work.penalties, self.options.elastic_penalty);
+            let penalty = self.options.elastic_penalty * state.lengths.force;
+            elastic::soften(ocp, state, work.penalties, penalty);
             return Ok(None);
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
-        let ends = direction.tiny && state.mu <= self.options.tolerance.max(self.options.final_mu);
+        let least = (self.options.tolerance * state.lengths.force).max(self.options.final_mu);
+        let ends = direction.tiny && state.mu <= least;
         Ok(ends.then_some(Status::NoProgress))
     }
 
@@ -155,7 +157,8 @@ where
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
-        iterate.store(&mut solution.view_mut());
+        let mut view = solution.view_mut();
+        iterate.store(&mut view);
         let objective = plain + penalties;
         if P::Dynamics::LIFTED {
             residuals.dynamics = larger(residuals.dynamics, of_stages);
@@ -164,12 +167,14 @@ where
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        state.update_barrier(&iterate, &residuals, &self.options);
+        let (relative, products) = scaling::relative(&residuals, &iterate, view.dynamics, state.lengths.force);
+        state.update_barrier(&iterate, (&relative, products), &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
-        let size = residuals.largest().max(violation);
+        state.error = relative.largest();
+        let size = state.error.max(violation);
         if size < state.best_residual || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
@@ -189,7 +194,7 @@ where
         row: &Iteration,
     ) -> Next {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        if row.residuals.largest() <= self.options.tolerance {
+        if state.error <= self.options.tolerance {
             let end = elastic::verdict(ocp, state, work.penalties, &self.options);
             return end.map_or(Next::NewPenalties, Next::End);
         }
@@ -217,21 +222,22 @@ where
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<bool, QpError> {
-        let least = barrier::least(self.options.least_error());
+        let force = state.lengths.force;
+        let least = force * barrier::least(self.options.least_error(force));
         let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let probes = state.progress.is_free();
         let aim = if probes { 0.0 } else { state.mu };
-        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim))?;
+        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim), force)?;
         row.regularisation = state.delta;
-        let mean = barrier::mean(&iterate.sides);
-        let monotone = state.progress.count(state.delta > 0.0, state.mu, mean);
+        let mean = barrier::mean(&iterate.sides) / force;
+        let monotone = state.progress.count(state.delta > 0.0, state.mu / force, mean);
         let mut is_corrected = false;
         if let Some(mu) = monotone {
-            state.mu = mu;
-            again(&mut iterate, T::from_f64(mu), false)?;
+            state.mu = mu * force;
+            again(&mut iterate, T::from_f64(state.mu), false)?;
         } else if probes {
             state.mu = predictor::probe(&iterate.sides, least);
-            is_corrected = predictor::correct(&mut iterate, state.mu)?;
+            is_corrected = predictor::correct(&mut iterate, state.mu, force)?;
         }
         if probes {
             state.filter.clear();
@@ -254,7 +260,7 @@ where
         let Self { trial, numbers, indices, work, .. } = self;
         let plain = ocp.objective.to_f64();
         let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
-        let mut here = measure::here(&iterate, plain, state.mu);
+        let mut here = measure::here(&iterate, plain, state.mu, lengths.force);
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
             let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
@@ -286,13 +292,13 @@ where
         let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let expected = Expected {
             here,
-            slope: measure::slope(&iterate, state.mu, work.scratch),
+            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.force,
             small_violation: state.small_violation,
             most: (GROWTH * here.violation).max(state.first_violation.max(1.0)),
             mu: state.mu,
             delta: state.delta,
         };
-        let tau = barrier::fraction_to_boundary(state.mu);
+        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
         let is_tiny = |(&d, &v): (&T, &T)| d.abs().to_f64() <= 10.0 * T::EPSILON * (1.0 + v.abs().to_f64());
         let tiny = here.violation <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);

@@ -11,15 +11,17 @@ pub(super) struct Lengths {
     pub fixed: bool,
     pub numbers: usize,
     pub extent: Extent,
+    /// The unit of forces: see `scaling`.
+    pub force: f64,
 }
 
 impl Lengths {
     /// Of a problem with its penalties as they are.
-    pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
+    pub fn of<T: Real>(qp: QpView<'_, T>, force: f64) -> Self {
         let reading = reading(qp);
         let counts = count(qp, &reading);
         let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
-        Self { counts, fixed: reading.fixed, numbers, extent }
+        Self { counts, fixed: reading.fixed, numbers, extent, force }
     }
 
     /// Of the same problem with every bound soft, equations too.

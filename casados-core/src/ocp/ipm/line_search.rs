@@ -27,7 +27,7 @@ const CORRECTED: f64 = 0.99;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expected {
     pub here: Measure,
-    /// `∇φᵀ d`
+    /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
     /// `θ_min`: below this violation the barrier function may decide.
     pub small_violation: f64,
@@ -209,7 +209,7 @@ where
             violation += coupling.violation();
         }
         let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
-        Some(Measure { objective: objective + penalties + mu * barrier, violation })
+        Some(Measure { objective: (objective + penalties + mu * barrier) / self.lengths.force, violation })
     }
 
     /// Second-order corrections: constraints take their values at the point that was tried.

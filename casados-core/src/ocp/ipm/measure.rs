@@ -21,14 +21,15 @@ pub(super) fn penalties_and_barrier<T: Real>(sides: &Sides<'_, T>, slacks: &[T])
     (penalties, barrier)
 }
 
-/// Barrier function and violation at the iterate itself, from residuals that are there.
-pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64) -> Measure {
+/// Barrier function, in units of forces, and violation at the iterate itself, from residuals that
+/// are there.
+pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64, force: f64) -> Measure {
     let sides = &iterate.sides;
     let size = |values: &[T]| values.iter().fold(0.0, |sum, r| sum + r.abs().to_f64());
     let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.violation());
     let violation = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual) + coupling;
     let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
-    Measure { objective: objective + penalties + mu * barrier, violation }
+    Measure { objective: (objective + penalties + mu * barrier) / force, violation }
 }
 
 /// `∇φᵀ d`

@@ -10,6 +10,7 @@
 //! | `start`, `multipliers` | the first point and its multipliers |
 //! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
+//! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
 //! | `elastic` | penalties where no step makes progress |
 //! | `lifted` | stages that are variables go with the iterate |
@@ -34,6 +35,7 @@ mod newton;
 mod options;
 mod predictor;
 mod run;
+mod scaling;
 mod start;
 mod state;
 mod work;

@@ -12,7 +12,7 @@ use crate::ocp::problem::Formulation;
 use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
-/// First multipliers that are larger are discarded.
+/// First multipliers that are more units are discarded.
 const LARGEST: f64 = 1e3;
 
 impl<T, D, M, I> Ipm<T, D, M, I>
@@ -41,12 +41,13 @@ where
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
-        begin_sides(&mut iterate, &self.options, warm, T::from_f64(state.mu), &view);
+        let force = state.lengths.force;
+        begin_sides(&mut iterate, &self.options, warm, [force, state.mu].map(T::from_f64), &view);
         iterate.store(&mut view);
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);
-        } else if least_squares(&mut iterate, &mut work).is_ok() {
-            let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST);
+        } else if least_squares(&mut iterate, &mut work, force).is_ok() {
+            let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST * force);
             if work.pi.iter().chain(&*work.hessian_multipliers).all(is_small) {
                 assign(view.dynamics, work.pi);
             } else {

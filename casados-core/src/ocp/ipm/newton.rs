@@ -23,7 +23,7 @@ pub(super) fn attach<'a, T: Real>(
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
-    sides.compliance = T::from_f64(T::EPSILON).sqrt();
+    sides.compliance = T::from_f64(T::EPSILON).sqrt() / T::from_f64(lengths.force);
     Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 
@@ -185,7 +185,7 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
     }
 }
 
-/// The weight of the identity in place of the Hessian in [`least_squares`].
+/// The weight of the identity in place of the Hessian in [`least_squares`], in units of forces.
 const IDENTITY: f64 = 1e8;
 
 /// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
@@ -198,12 +198,13 @@ const IDENTITY: f64 = 1e8;
 pub(super) fn least_squares<T: Real>(
     iterate: &mut Iterate<'_, T>,
     work: &mut Work<'_, T>,
+    force: f64,
 ) -> Result<(), QpError> {
-    let identity = T::from_f64(IDENTITY);
+    let identity = T::from_f64(IDENTITY * force);
     assign(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
-    T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, result: &mut result });
+    T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, identity, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
     assign(work.hessian_multipliers, sides.multiplier_step);
@@ -247,6 +248,7 @@ pub(super) fn is_general<'a, T: Real>(qp: QpView<'a, T>, rows: &'a [u32]) -> imp
 struct LeastSquares<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
+    identity: T,
     result: &'r mut Result<(), QpError>,
 }
 
@@ -256,10 +258,9 @@ LeastSquaresCompiled: LeastSquares<'r, 'a, 's, T>);
 impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, pi, result } = self;
+        let Self { iterate, pi, identity, result } = self;
         pi.fill(T::ZERO);
         iterate.evaluate_at::<E>(pi);
-        let identity = T::from_f64(IDENTITY);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;
         let sides = &mut iterate.sides;

@@ -39,6 +39,8 @@ pub struct IpmOptions {
     /// Bounds are left by this at the start, relative to their size and to the room between them;
     /// at most 0.5. Default 1e-2.
     pub bound_push: f64,
+    /// Whether the objective has a unit of its own. Default true.
+    pub scaling: bool,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,
     /// The same distance where the start is warm. Default 1e-6.
@@ -65,6 +67,7 @@ impl IpmOptions {
             final_mu: 0.0,
             barrier: Barrier::Adaptive,
             bound_push: 1e-2,
+            scaling: true,
             warm_start: false,
             warm_push: 1e-6,
             elastic: true,
@@ -72,9 +75,14 @@ impl IpmOptions {
         }
     }
 
-    /// The tolerance, or what the last barrier parameter leaves.
-    pub(super) fn least_error(&self) -> f64 {
-        self.tolerance.max(10.0 * self.final_mu)
+    /// The tolerance, or what the last barrier parameter leaves, in units of forces.
+    pub(super) fn least_error(&self, force: f64) -> f64 {
+        self.tolerance.max(10.0 * self.final_mu / force)
+    }
+
+    /// The first barrier parameter.
+    pub(super) fn first_mu(&self, force: f64) -> f64 {
+        (self.start_mu * force).max(self.final_mu)
     }
 
     /// Finds values that no run can have.

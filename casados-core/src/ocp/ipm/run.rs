@@ -4,6 +4,7 @@ use super::Ipm;
 use super::barrier::{Barrier, Progress};
 use super::direction::Regularisation;
 use super::lengths::Lengths;
+use super::scaling::unit_of_forces;
 use super::start::push_inside;
 use super::state::{MARGIN, State};
 use super::work::Work;
@@ -113,7 +114,7 @@ where
         let mut state = State {
             over,
             lengths,
-            mu: self.options.start_mu,
+            mu: self.options.first_mu(lengths.force),
             // Products that do not vanish leave nothing to correct.
             progress: Progress::new(if self.options.final_mu > 0.0 {
                 Barrier::Monotone
@@ -131,6 +132,7 @@ where
             has_slacks: false,
             is_linearised,
             has_filter: false,
+            error: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
         };
@@ -182,11 +184,16 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
     ) -> Result<(Lengths, Lengths, bool), OcpError> {
-        let lengths = Lengths::of(ocp.qp());
-        let capacity = lengths.all_soft(ocp.qp());
+        let mut lengths = Lengths::of(ocp.qp(), 1.0);
+        let mut capacity = lengths.all_soft(ocp.qp());
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
         self.work.at_least(length, QpField::Numbers)?.fill(T::ZERO);
         self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
+        if self.options.scaling {
+            let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
+            lengths.force = unit_of_forces(ocp.qp(), ocp.iterate.vectors().0, work.scratch);
+            capacity.force = lengths.force;
+        }
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
         self.trial.copy_from(iterate);

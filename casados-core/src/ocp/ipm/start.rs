@@ -47,12 +47,12 @@ fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
 }
 
 /// Slacks at the distances from the bounds, and no less than `push`; multipliers of a warm start,
-/// or one. `values` are evaluated already, so that distances are in `scratch`.
+/// or the unit of forces. Values are evaluated already, so that distances are in `scratch`.
 pub(super) fn begin_sides<T: Real>(
     iterate: &mut Iterate<'_, T>,
     options: &IpmOptions,
     warm: bool,
-    mu: T,
+    [force, mu]: [T; 2],
     solution: &SolutionView<'_, T>,
 ) {
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
@@ -69,7 +69,7 @@ pub(super) fn begin_sides<T: Real>(
         let size = if general { T::ONE } else { bound.abs().max(T::ONE) };
         *slack = if exact { distance } else { distance.max(push * size) };
     }
-    sides.multiplier.fill(T::ONE);
+    sides.multiplier.fill(force);
     if warm {
         sides.take_multipliers(solution);
         for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {

@@ -42,24 +42,28 @@ pub(super) struct State<'c> {
     pub is_linearised: bool,
     /// Whether the filter has the bound of violations that belongs to these slacks.
     pub has_filter: bool,
-    /// The largest residual of the best iterate.
+    /// The largest residual, relative to units and multipliers.
+    pub error: f64,
+    /// That of the best iterate.
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
 }
 
 impl State<'_> {
-    /// The next barrier parameter; another one has another filter.
+    /// The next barrier parameter, from residuals and with a unit of products in which errors are
+    /// relative; another one has another filter.
     pub fn update_barrier<T: Real>(
         &mut self,
         iterate: &Iterate<'_, T>,
-        residuals: &Residuals,
+        (residuals, products): (&Residuals, f64),
         options: &IpmOptions,
     ) {
+        let force = self.lengths.force;
         let Sides { slack, multiplier, .. } = &iterate.sides;
-        let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
-        let mean = barrier::mean(&iterate.sides);
-        let mu = self.progress.next(self.mu, error, mean, options.least_error());
+        let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
+        let mean = barrier::mean(&iterate.sides) / force;
+        let mu = force * self.progress.next(self.mu / force, error, mean, options.least_error(force));
         if mu != self.mu {
             self.mu = mu;
             self.filter.clear();
@@ -67,9 +71,9 @@ impl State<'_> {
     }
 
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
-    pub fn begin_monotone(&mut self, mu: f64) {
+    pub fn begin_monotone(&mut self, options: &IpmOptions) {
         self.progress = Progress::new(Barrier::Monotone);
-        self.mu = mu;
+        self.mu = options.first_mu(self.lengths.force);
         self.regularisation = Regularisation::default();
         (self.has_slacks, self.has_filter) = (false, false);
     }
