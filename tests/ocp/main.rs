@@ -35,6 +35,7 @@ mod print;
 mod random;
 mod real_time;
 mod return_map;
+mod scaling;
 mod secant;
 mod sensitivities;
 mod smoothing;

@@ -54,7 +54,8 @@ pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef
     penalty: f64,
 ) {
     ocp.set_penalties(given, Some(T::from_f64(penalty)));
-    state.lengths = Lengths::of(ocp.qp(), state.lengths.force);
+    let Lengths { force, least, .. } = state.lengths;
+    state.lengths = Lengths { force, least, ..Lengths::of(ocp.qp()) };
     state.elastic = Some(penalty);
     state.has_slacks = false;
     state.mu = BARRIER * state.lengths.force;

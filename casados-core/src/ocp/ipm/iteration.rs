@@ -141,7 +141,8 @@ where
         }
         self.curve(ocp, capacity, state)?;
         ocp.linearise(EXACT)?;
-        attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
+        attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
         Ok(())
     }
 
@@ -154,6 +155,7 @@ where
         row: &mut Iteration,
     ) -> Result<(), OcpError> {
         let (plain, [_, of_stages]) = (ocp.objective.to_f64(), ocp.stages.map(|left| left.to_f64()));
+        let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
@@ -167,7 +169,10 @@ where
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        let (relative, products) = scaling::relative(&residuals, &iterate, view.dynamics, state.lengths.force);
+        let (relative, products) = {
+            let work = Work::new(ends, capacity, self.work.as_mut());
+            scaling::relative(&residuals, &iterate, view.dynamics, work.units, state.lengths.force)
+        };
         state.update_barrier(&iterate, (&relative, products), &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
@@ -260,10 +265,10 @@ where
         let Self { trial, numbers, indices, work, .. } = self;
         let plain = ocp.objective.to_f64();
         let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
-        let mut here = measure::here(&iterate, plain, state.mu, lengths.force);
+        let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
+        let mut here = measure::here(&iterate, plain, state.mu, work.units, lengths.force);
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
-            let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
             let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
             here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
         }
@@ -300,8 +305,10 @@ where
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.lengths.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
-        let is_tiny = |(&d, &v): (&T, &T)| d.abs().to_f64() <= 10.0 * T::EPSILON * (1.0 + v.abs().to_f64());
-        let tiny = here.violation <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);
+        let noise = T::from_f64(10.0 * T::EPSILON);
+        let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
+        let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
+        let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
         Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
     }
 

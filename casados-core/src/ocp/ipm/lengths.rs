@@ -13,15 +13,17 @@ pub(super) struct Lengths {
     pub extent: Extent,
     /// The unit of forces: see `scaling`.
     pub force: f64,
+    /// The least unit of a row, at most one.
+    pub least: f64,
 }
 
 impl Lengths {
     /// Of a problem with its penalties as they are.
-    pub fn of<T: Real>(qp: QpView<'_, T>, force: f64) -> Self {
+    pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
         let reading = reading(qp);
         let counts = count(qp, &reading);
         let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
-        Self { counts, fixed: reading.fixed, numbers, extent, force }
+        Self { counts, fixed: reading.fixed, numbers, extent, force: 1.0, least: 1.0 }
     }
 
     /// Of the same problem with every bound soft, equations too.

@@ -1,5 +1,6 @@
 //! Barrier function and violation at a point, and how the barrier function changes along a step.
 
+use super::scaling::{of_gaps, of_sides, sum};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::Measure;
 use crate::ocp::instance::Ocp;
@@ -23,11 +24,18 @@ pub(super) fn penalties_and_barrier<T: Real>(sides: &Sides<'_, T>, slacks: &[T])
 
 /// Barrier function, in units of forces, and violation at the iterate itself, from residuals that
 /// are there.
-pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64, force: f64) -> Measure {
+pub(super) fn here<T: Real>(
+    iterate: &Iterate<'_, T>,
+    objective: f64,
+    mu: f64,
+    units: &[T],
+    force: f64,
+) -> Measure {
     let sides = &iterate.sides;
-    let size = |values: &[T]| values.iter().fold(0.0, |sum, r| sum + r.abs().to_f64());
+    let gaps = of_gaps(iterate.qp.dims, iterate.dynamics, units);
+    let equations = of_sides(sides.equations, sides.equation_residual, units);
     let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.violation());
-    let violation = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual) + coupling;
+    let violation = sum(gaps) + sum(of_sides(sides.rows, sides.residual, units)) + sum(equations) + coupling;
     let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
     Measure { objective: (objective + penalties + mu * barrier) / force, violation }
 }
@@ -90,13 +98,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(objective)
     }
 
-    /// The sum of the gaps between the ends of intervals and the states that follow.
-    pub(super) fn gaps_at(&self, at: &Solution<T, D, M>, ends: &[T]) -> f64 {
+    /// The sum of the gaps between the ends of intervals and the states that follow, in units.
+    pub(super) fn gaps_at(&self, at: &Solution<T, D, M>, ends: &[T], units: &[T]) -> f64 {
         let nx = P::Shape::NX;
         let mut sum = 0.0;
-        for (k, next) in at.stages().skip(1).enumerate() {
-            for (&phi, &x) in part(ends, k * nx, nx).iter().zip(next.x) {
-                sum += (phi - x).abs().to_f64();
+        for (k, (next, place)) in at.stages().zip(Places::<T>::new(at.dims())).skip(1).enumerate() {
+            let units = part(units, place.row, nx);
+            for ((&phi, &x), &unit) in part(ends, k * nx, nx).iter().zip(next.x).zip(units) {
+                sum += ((phi - x) / unit).abs().to_f64();
             }
         }
         sum
@@ -104,7 +113,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// Violations of sides and equations whose rows have such values, with such slacks.
-pub(super) fn violations<T: Real>(sides: &mut Sides<'_, T>, rows: &[T], slacks: &[T]) -> f64 {
+pub(super) fn violations<T: Real>(
+    sides: &mut Sides<'_, T>,
+    rows: &[T],
+    slacks: &[T],
+    units: &[T],
+) -> f64 {
     let at = |row: u32| rows.get(row as usize).copied().unwrap_or(T::ZERO);
     let lower = sides.counts.lower;
     let listed = sides.rows.iter().zip(&*sides.bound).zip(slacks);
@@ -118,7 +132,8 @@ pub(super) fn violations<T: Real>(sides: &mut Sides<'_, T>, rows: &[T], slacks: 
             *residual = *residual + violation;
         }
     }
-    let sum = part(sides.scratch, 0, sides.counts.sides()).iter().fold(0.0, |sum, r| sum + r.abs().to_f64());
+    let of_sides = sum(of_sides(sides.rows, sides.scratch, units));
+    let unit = |row: u32| units.get(row as usize).copied().unwrap_or(T::ONE);
     let equations = sides.equations.iter().zip(&*sides.equation_bound);
-    equations.fold(sum, |sum, (&row, &bound)| sum + (at(row) - bound).abs().to_f64())
+    equations.fold(of_sides, |sum, (&row, &bound)| sum + ((at(row) - bound) / unit(row)).abs().to_f64())
 }

@@ -1,6 +1,6 @@
 //! Multipliers: the first ones, and those that the Hessian has.
 
-use super::Ipm;
+use super::{Ipm, scaling};
 use super::lengths::Lengths;
 use super::newton::{attach, attach_to_new, evaluate_values, least_squares};
 use super::start::begin_sides;
@@ -36,19 +36,22 @@ where
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut work = Work::new(ends, capacity, self.work.as_mut());
+        let units = &*work.units;
+        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units)?;
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
         let force = state.lengths.force;
-        begin_sides(&mut iterate, &self.options, warm, [force, state.mu].map(T::from_f64), &view);
+        begin_sides(&mut iterate, &self.options, warm, [force, state.mu].map(T::from_f64), work.units, &view);
         iterate.store(&mut view);
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work, force).is_ok() {
-            let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST * force);
-            if work.pi.iter().chain(&*work.hessian_multipliers).all(is_small) {
+            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(LARGEST * force);
+            let rows = &*iterate.sides.rows;
+            let sides = scaling::of_sides(rows, work.hessian_multipliers, work.units);
+            if scaling::of_gaps(iterate.qp.dims, work.pi, work.units).chain(sides).all(is_small) {
                 assign(view.dynamics, work.pi);
             } else {
                 view.dynamics.fill(T::ZERO);

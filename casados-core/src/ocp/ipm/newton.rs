@@ -5,7 +5,7 @@
 
 use super::lengths::{Lengths, reading};
 use super::work::Work;
-use crate::qp::interior::{First, Iterate, Sides};
+use crate::qp::interior::{First, Iterate, Sides, at};
 use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
@@ -23,11 +23,12 @@ pub(super) fn attach<'a, T: Real>(
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
-    sides.compliance = T::from_f64(T::EPSILON).sqrt() / T::from_f64(lengths.force);
+    sides.compliance = T::from_f64(T::EPSILON.sqrt() * lengths.least * lengths.least / lengths.force);
     Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 
-/// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties.
+/// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties. What
+/// equations give way is measured in `units` of their rows.
 ///
 /// # Errors
 /// As [`attach`].
@@ -36,9 +37,15 @@ pub(super) fn attach_to_new<'a, T: Real>(
     lengths: &Lengths,
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
+    units: &[T],
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = attach(qp, lengths, numbers, indices)?;
     iterate.sides.list(qp, &reading(qp));
+    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.least));
+    for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
+        let ratio = least / at(units, row);
+        *stiffness = ratio * ratio;
+    }
     Ok(iterate)
 }
 

@@ -4,7 +4,6 @@ use super::Ipm;
 use super::barrier::{Barrier, Progress};
 use super::direction::Regularisation;
 use super::lengths::Lengths;
-use super::scaling::unit_of_forces;
 use super::start::push_inside;
 use super::state::{MARGIN, State};
 use super::work::Work;
@@ -184,20 +183,21 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
     ) -> Result<(Lengths, Lengths, bool), OcpError> {
-        let mut lengths = Lengths::of(ocp.qp(), 1.0);
+        let mut lengths = Lengths::of(ocp.qp());
         let mut capacity = lengths.all_soft(ocp.qp());
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
         self.work.at_least(length, QpField::Numbers)?.fill(T::ZERO);
         self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
+        let mut work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
+        work.units.fill(T::ONE);
         if self.options.scaling {
-            let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
-            lengths.force = unit_of_forces(ocp.qp(), ocp.iterate.vectors().0, work.scratch);
-            capacity.force = lengths.force;
+            ocp.find_units(&mut lengths, &mut work);
+            capacity = Lengths { force: lengths.force, least: lengths.least, ..capacity };
         }
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
         self.trial.copy_from(iterate);
-        push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
+        push_inside(qp, lengths.fixed, push, work.units, &mut iterate.view_mut());
         ocp.join_controls();
         let stays = self.trial.vectors().0 == ocp.iterate.vectors().0;
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());

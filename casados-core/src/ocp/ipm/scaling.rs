@@ -1,71 +1,249 @@
-//! Units: of forces by the objective, of constraints by their gradients, and how large multipliers
-//! are.
+//! Units in which sizes are near one: of forces by the objective, of variables by guess and bounds,
+//! of constraints by their gradients; and tolerances relative to multipliers.
+//!
+//! Iterates stay in the units of the problem. A constant of the algorithm is one in these units.
 //!
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), equations (5) and (6), and section 3.8.
 
-use crate::qp::interior::Iterate;
-use crate::qp::{Places, QpView, Residuals, add_symmetric, assign, part, part_mut};
+use super::lengths::Lengths;
+use super::work::Work;
+use crate::ocp::instance::Ocp;
+use crate::ocp::problem::Formulation;
+use crate::qp::interior::{Iterate, Sides, at, set};
+use crate::qp::{Bounds, Places, QpView, Residuals, StageDims, add_symmetric, assign, larger, part, part_mut};
 use crate::scalar::Real;
 
-/// `g_max`: gradients of the objective that are larger are so many units.
-const LARGE: f64 = 100.0;
-/// Gradients that are smaller are so many units.
-const SMALL: f64 = 1e-2;
+/// What is larger in the units of the problem is so many units.
+const LARGE: f64 = 1.0;
+/// What is smaller is so many units.
+const SMALL: f64 = 1.0;
+/// Gaps of a state need not be less than this part of it times the tolerance.
+const ROUNDING: f64 = 1e-5;
 /// `s_max`: a mean multiplier that is larger relaxes tolerances.
 const MEAN: f64 = 100.0;
 
-/// The unit of forces at a point where the QP was written without second derivatives of
-/// constraints: gradients of the objective are from `SMALL` to `LARGE` of it. What counts is the
-/// largest derivative by a variable, or what that changes by where the variable changes by one or
-/// by its size: at many guesses gradients vanish.
-pub(super) fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], scratch: &mut [T]) -> f64 {
-    let mut size = 0.0_f64;
+pub fn knob(name: &str, default: f64) -> f64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+/// The least and the largest of the sizes that something may have.
+#[derive(Clone, Copy)]
+struct Range {
+    least: f64,
+    most: f64,
+}
+
+impl Range {
+    const EMPTY: Self = Self { least: f64::INFINITY, most: 0.0 };
+
+    /// Zeros and infinite bounds say nothing.
+    fn add<T: Real>(&mut self, size: T) {
+        let size = size.abs().to_f64();
+        if size > 0.0 && size.is_finite() {
+            (self.least, self.most) = (self.least.min(size), self.most.max(size));
+        }
+    }
+
+    /// One, or what makes all sizes at most `LARGE` or at least `SMALL`.
+    fn unit<T: Real>(&self, kind: &str) -> T {
+        let (large, small) = (knob(&[kind, "_L"].concat(), LARGE), knob(&[kind, "_S"].concat(), SMALL));
+        let Self { least, most } = *self;
+        T::from_f64(if most == 0.0 {
+            1.0
+        } else if least > large {
+            least / large
+        } else if most < small {
+            most / small
+        } else {
+            1.0
+        })
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// All units at the iterate, where the QP was written without second derivatives of
+    /// constraints.
+    pub(super) fn find_units(&self, lengths: &mut Lengths, work: &mut Work<'_, T>) {
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let last = qp.dims.len().saturating_sub(1);
+        let variables = qp.dims.first().map_or(0, |dims| dims.nx + dims.nu);
+        for i in 0..variables {
+            units_of_variable(qp, v, i, work.units);
+        }
+        let (path, terminal) = (0..last, last..last + 1);
+        for stages in [path, terminal] {
+            for i in 0..qp.dims.get(stages.start).map_or(0, |dims| dims.ng) {
+                units_of_row(qp, v, (stages.clone(), i), work.units);
+            }
+        }
+        lengths.force = unit_of_forces(qp, lengths.fixed, v, work);
+        let least = work.units.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
+        lengths.least = least.to_f64();
+    }
+}
+
+/// The unit of a variable at all stages, by its guess and bounds.
+fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut [T]) {
+    let mut range = Range::EMPTY;
+    let mut guess = T::ZERO;
+    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(place, _)| i < place.n) {
+        guess = guess.max(at(v, (place.v + i) as u32).abs());
+        let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
+        let Bounds { lower, upper, .. } = bounds;
+        lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
+    }
+    range.add(guess);
+    let unit = range.unit("SV");
+    for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
+        set(units, place.row + i, unit);
+    }
+}
+
+/// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
+fn units_of_row<T: Real>(
+    qp: QpView<'_, T>,
+    v: &[T],
+    (stages, i): (core::ops::Range<usize>, usize),
+    units: &mut [T],
+) {
+    let mut range = Range::EMPTY;
+    let (mut slope, mut distance) = (T::ZERO, T::ZERO);
+    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage)) {
+        let view = stage.arrays();
+        let column = part(view.matrix, (place.next + i) * place.ld, place.ld);
+        let v = part(v, place.v, place.ld);
+        let mut value = T::ZERO;
+        for ((&g, &v), &unit) in column.iter().zip(v).zip(part(units, place.row, place.n)) {
+            value = value + g * v;
+            slope = slope.max((g * unit).abs());
+        }
+        let Bounds { lower, upper, .. } = stage.g_bounds();
+        let mut nearest = T::from_f64(f64::INFINITY);
+        for &bound in lower.get(i).into_iter().chain(upper.get(i)) {
+            nearest = nearest.min((value - bound).abs());
+        }
+        if nearest.is_finite() {
+            distance = distance.max(nearest);
+        }
+    }
+    range.add(slope);
+    range.add(distance);
+    let unit = range.unit("SR");
+    for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
+        set(units, place.row + place.ld + i, unit);
+    }
+}
+
+/// The unit of forces: of the largest derivative of the objective by a variable, or what that
+/// changes by where the variable changes by a unit or by its size. At many guesses gradients
+/// vanish.
+fn unit_of_forces<T: Real>(qp: QpView<'_, T>, fixed: bool, v: &[T], work: &mut Work<'_, T>) -> f64 {
+    let mut largest = T::ZERO;
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
-        let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
+        let (v, gradient) = (part(v, place.v, place.ld), part_mut(work.scratch, 0, place.ld));
         assign(gradient, part(view.gradient, 0, place.ld));
         add_symmetric(gradient, view.hessian, place.ld, v, place.n);
         let curvatures = view.hessian.iter().step_by(place.ld + 1);
-        for ((&slope, &curvature), &v) in gradient.iter().zip(curvatures).zip(v).take(place.n) {
-            let change = curvature.abs() * v.abs().max(T::ONE);
-            size = size.max(slope.abs().to_f64()).max(change.to_f64());
+        let given = if fixed && place.stage == 0 { place.nx } else { 0 };
+        let units = part(work.units, place.row, place.n);
+        for (((&slope, &curvature), &v), &unit) in
+            gradient.iter().zip(curvatures).zip(v).zip(units).skip(given)
+        {
+            let change = curvature * v.abs().max(unit);
+            largest = largest.max(slope.abs() * unit).max(change.abs() * unit);
         }
     }
-    unit(size)
+    let mut range = Range::EMPTY;
+    range.add(largest);
+    range.unit::<T>("SF").to_f64()
 }
 
-/// The unit in which a size is from `SMALL` to `LARGE`, nearest to one.
-fn unit(size: f64) -> f64 {
-    if !(size > 0.0 && size.is_finite()) {
-        return 1.0;
-    }
-    if size > LARGE {
-        size / LARGE
-    } else if size < SMALL {
-        size / SMALL
-    } else {
-        1.0
-    }
+/// Gaps of dynamics, each with the unit of its state.
+pub(super) fn of_gaps<'a, T: Real>(
+    dims: &'a [StageDims],
+    gaps: &'a [T],
+    units: &'a [T],
+) -> impl Iterator<Item = (T, T)> + 'a {
+    Places::<T>::new(dims).flat_map(move |place| {
+        let gaps = part(gaps, place.dynamics, place.next);
+        gaps.iter().copied().zip(part(units, place.row + place.rows, place.next).iter().copied())
+    })
 }
 
-/// Residuals in units of forces, relative to the mean sizes of multipliers where these are large:
-/// `s_d` is that of all of them, `s_c` that of sides.
+/// Numbers of sides, each with the unit of its row.
+pub(super) fn of_sides<'a, T: Real>(
+    rows: &'a [u32],
+    values: &'a [T],
+    units: &'a [T],
+) -> impl Iterator<Item = (T, T)> + 'a {
+    values.iter().copied().zip(rows.iter().map(|&row| at(units, row)))
+}
+
+/// The sum of sizes in their units.
+pub(super) fn sum<T: Real>(values: impl Iterator<Item = (T, T)>) -> f64 {
+    values.fold(0.0, |sum, (value, unit)| sum + (value / unit).abs().to_f64())
+}
+
+/// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
+/// is that of all of them, `s_c` that of sides; and the unit of products.
 pub(super) fn relative<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
     pi: &[T],
+    units: &[T],
     force: f64,
 ) -> (Residuals, f64) {
-    let sides = &iterate.sides;
-    let sum = |values: &[T]| values.iter().fold(0.0, |sum, value| sum + value.abs().to_f64());
-    let of_sides = sum(sides.multiplier);
-    let of_equations = sum(pi) + sum(sides.free);
+    let (sides, dims) = (&iterate.sides, iterate.qp.dims);
+    let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
+    let in_rows = of_sides(sides.rows, sides.multiplier, units).fold(0.0, size);
+    let others = part(sides.multiplier, sides.counts.sides(), sides.counts.soft);
+    let in_sides = others.iter().zip(&*sides.soft).fold(in_rows, |sum, (&value, &side)| {
+        size(sum, (value, at(units, sides.rows.get(side as usize).copied().unwrap_or(0))))
+    });
+    let in_equations = of_sides(sides.equations, sides.free, units).fold(0.0, size);
+    let (all, count) = of_gaps(dims, pi, units)
+        .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
     let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / MEAN).max(1.0);
     let pairs = sides.counts.pairs();
-    let all = mean(of_sides + of_equations, pairs + sides.counts.equations + pi.len());
-    let mut relative = *residuals;
-    let of_products = force * mean(of_sides, pairs);
-    relative.stationarity /= force * all;
-    relative.complementarity /= of_products;
-    (relative, of_products)
+    let products = force * mean(in_sides, pairs);
+    let stationarity = iterate.stationarity.iter().zip(units).fold(T::ZERO, |m, (&g, &unit)| {
+        larger(m, (g * unit).abs())
+    });
+    let dynamics = gaps(iterate, units);
+    let relative = Residuals {
+        stationarity: stationarity.to_f64() / (force * mean(all, count + pairs + sides.counts.equations)),
+        dynamics: if residuals.dynamics.is_finite() { dynamics } else { residuals.dynamics },
+        inequalities: inequalities(sides, units),
+        complementarity: residuals.complementarity / products,
+    };
+    (relative, products)
+}
+
+/// The largest gap in units of states that are not above one, nor below what rounding leaves of
+/// states.
+fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
+    let rounding = T::from_f64(ROUNDING);
+    let coupling = iterate.coupling.as_ref().map_or(T::ZERO, |coupling| {
+        coupling.residual.iter().fold(T::ZERO, |m, gap| larger(m, gap.abs()))
+    });
+    let mut largest = coupling;
+    for place in Places::<T>::new(iterate.qp.dims) {
+        let begin = place.row + place.rows;
+        let next = part(iterate.v, begin, place.next).iter().zip(part(units, begin, place.next));
+        for (&gap, (&x, &unit)) in part(iterate.dynamics, place.dynamics, place.next).iter().zip(next) {
+            largest = larger(largest, gap.abs() / unit.min(T::ONE).max(rounding * x.abs()));
+        }
+    }
+    largest.to_f64()
+}
+
+/// The largest residual of sides and equations in the units of their rows.
+fn inequalities<T: Real>(sides: &Sides<'_, T>, units: &[T]) -> f64 {
+    let equations = of_sides(sides.equations, sides.equation_residual, units);
+    let sides = sides.rows.iter().zip(&*sides.scratch);
+    sides
+        .map(|(&row, &distance)| ((-distance).max(T::ZERO), at(units, row)))
+        .chain(equations)
+        .fold(0.0, |m, (value, unit)| larger(m, (value / unit).abs().to_f64()))
 }

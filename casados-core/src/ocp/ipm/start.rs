@@ -2,15 +2,16 @@
 
 use super::IpmOptions;
 use crate::qp::interior::{Iterate, at, set};
-use crate::qp::{Bounds, Places, QpView, SolutionView, part_mut};
+use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
 use crate::scalar::Real;
 
-/// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by
+/// Moves states and controls that have hard bounds away from these by `κ max(unit, |bound|)`, and by
 /// no more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
 pub(super) fn push_inside<T: Real>(
     qp: QpView<'_, T>,
     fixed: bool,
     push: f64,
+    units: &[T],
     solution: &mut SolutionView<'_, T>,
 ) {
     let push = T::from_f64(push);
@@ -18,16 +19,16 @@ pub(super) fn push_inside<T: Real>(
         let v = part_mut(solution.v, place.v, place.n);
         let (x, u) = v.split_at_mut_checked(place.nx).unwrap_or_default();
         if !(fixed && place.stage == 0) {
-            push_part(&stage.x_bounds(), push, x);
+            push_part(&stage.x_bounds(), push, part(units, place.row, place.nx), x);
         }
-        push_part(&stage.u_bounds(), push, u);
+        push_part(&stage.u_bounds(), push, part(units, place.row + place.nx, place.nu), u);
     }
 }
 
-fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
+fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, units: &[T], v: &mut [T]) {
     let penalties = bounds.lower_linear.iter().zip(bounds.upper_linear);
-    for (((v, &lower), &upper), (soft_below, soft_above)) in
-        v.iter_mut().zip(bounds.lower).zip(bounds.upper).zip(penalties)
+    for ((((v, &lower), &upper), (soft_below, soft_above)), &unit) in
+        v.iter_mut().zip(bounds.lower).zip(bounds.upper).zip(penalties).zip(units)
     {
         let below = lower.is_finite() && !soft_below.is_finite();
         let above = upper.is_finite() && !soft_above.is_finite();
@@ -36,7 +37,7 @@ fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
             continue;
         }
         let room = if below && above { push * (upper - lower) } else { T::from_f64(f64::INFINITY) };
-        let distance = |bound: T| (push * bound.abs().max(T::ONE)).min(room);
+        let distance = |bound: T| (push * bound.abs().max(unit)).min(room);
         if below {
             *v = (*v).max(lower + distance(lower));
         }
@@ -53,6 +54,7 @@ pub(super) fn begin_sides<T: Real>(
     options: &IpmOptions,
     warm: bool,
     [force, mu]: [T; 2],
+    units: &[T],
     solution: &SolutionView<'_, T>,
 ) {
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
@@ -61,15 +63,18 @@ pub(super) fn begin_sides<T: Real>(
     // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are
     // pushed.
     let general = super::newton::is_general::<T>(iterate.qp, sides.rows);
-    for (((slack, &distance), &bound), general) in
-        sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(general)
+    let rows = sides.rows.iter().map(|&row| at(units, row));
+    for ((((slack, &distance), &bound), general), unit) in
+        sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(general).zip(rows)
     {
         let exact = !general && distance > T::ZERO;
         // Bounds of general constraints are those of the QP, whose size says nothing.
-        let size = if general { T::ONE } else { bound.abs().max(T::ONE) };
+        let size = if general { unit } else { bound.abs().max(unit) };
         *slack = if exact { distance } else { distance.max(push * size) };
     }
-    sides.multiplier.fill(force);
+    for (multiplier, &row) in sides.multiplier.iter_mut().zip(&*sides.rows) {
+        *multiplier = force / at(units, row);
+    }
     if warm {
         sides.take_multipliers(solution);
         for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
@@ -79,7 +84,8 @@ pub(super) fn begin_sides<T: Real>(
     for (j, &side) in sides.soft.iter().enumerate() {
         let (linear, quadratic) = (at(sides.linear, j as u32), at(sides.quadratic, j as u32));
         // `λ + ν = linear + quadratic e`, from the start on.
-        let violation = (at(sides.slack, side) - at(sides.scratch, side)).max(push);
+        let unit = at(units, sides.rows.get(side as usize).copied().unwrap_or(u32::MAX));
+        let violation = (at(sides.slack, side) - at(sides.scratch, side)).max(push * unit);
         let force = linear + quadratic * violation;
         let half = T::from_f64(0.5) * force;
         let multiplier = at(sides.multiplier, side).min(half);

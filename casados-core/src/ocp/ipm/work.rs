@@ -23,6 +23,8 @@ pub(super) struct Work<'a, T> {
     /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
     /// of the barrier go as far as they stay positive.
     pub hessian_multipliers: &'a mut [T],
+    /// Units of variables and constraints.
+    pub units: &'a mut [T],
     /// Over the variables of a stage.
     pub scratch: &'a mut [T],
     /// Linear penalties as they were given.
@@ -33,7 +35,7 @@ impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
         let (pairs, Extent { ld, end, .. }) = (counts.pairs(), Extent::of::<T>(dims));
-        ends + 2 * end.row + 4 * pairs + end.dynamics + ld + elastic::memory(dims)
+        ends + 3 * end.row + 4 * pairs + end.dynamics + ld + elastic::memory(dims)
     }
 
     /// In memory of that length, whose contents stay.
@@ -49,6 +51,7 @@ impl<'a, T: Real> Work<'a, T> {
             multiplier_step: take_mut(rest, pairs),
             pi: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
+            units: take_mut(rest, end.row),
             scratch: take_mut(rest, capacity.extent.ld),
             penalties: core::mem::take(rest),
         }

@@ -52,9 +52,12 @@ impl<T: Real> Iterate<'_, T> {
         let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
         scatter(self.gradient, lower, of_lower, |g, &push| g + push);
         scatter(self.gradient, upper, of_upper, |g, &push| g - push);
-        scatter(self.gradient, sides.equations, sides.equation_residual, |g, &residual| {
-            g + weight * residual
-        });
+        let equations = sides.equations.iter().zip(&*sides.stiffness).zip(&*sides.equation_residual);
+        for ((&row, &stiffness), &residual) in equations {
+            if let Some(g) = self.gradient.get_mut(row as usize) {
+                *g = *g + weight * stiffness * residual;
+            }
+        }
         if factor {
             self.weights.fill(T::ZERO);
             if self.proximal > T::ZERO {
@@ -63,7 +66,7 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
             scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
-            scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
+            scatter(self.weights, sides.equations, sides.stiffness, |sum, &stiffness| sum + weight * stiffness);
         }
     }
 
@@ -92,8 +95,8 @@ impl<T: Real> Iterate<'_, T> {
         let sides = &mut self.sides;
         add_scaled(sides.multiplier, of_sides, sides.multiplier_step);
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&*sides.equation_residual);
-        for ((&row, free), &residual) in equations {
-            *free = *free - of_equations * weight * (at(self.step, row) + residual);
+        for (((&row, free), &residual), &stiffness) in equations.zip(&*sides.stiffness) {
+            *free = *free - of_equations * (weight * stiffness) * (at(self.step, row) + residual);
         }
     }
 

@@ -56,7 +56,7 @@ impl Counts {
     }
     /// How many numbers the arrays take.
     pub const fn numbers(&self) -> usize {
-        8 * self.pairs() + 2 * self.sides() + 3 * self.equations + 2 * self.soft
+        8 * self.pairs() + 2 * self.sides() + 4 * self.equations + 2 * self.soft
     }
     /// How many indices the lists take.
     pub const fn indices(&self) -> usize {
@@ -204,6 +204,8 @@ pub struct Sides<'a, T> {
     pub equation_residual: &'a mut [T],
     /// Right-hand sides of equations.
     pub equation_bound: &'a mut [T],
+    /// How much stiffer equations are than `1 / δ`.
+    pub stiffness: &'a mut [T],
 }
 
 impl<'a, T: Real> Sides<'a, T> {
@@ -232,6 +234,7 @@ impl<'a, T: Real> Sides<'a, T> {
             free: take_mut(numbers, counts.equations),
             equation_residual: take_mut(numbers, counts.equations),
             equation_bound: take_mut(numbers, counts.equations),
+            stiffness: take_mut(numbers, counts.equations),
         }
     }
 
@@ -245,6 +248,7 @@ impl<'a, T: Real> Sides<'a, T> {
             if equation {
                 set(list.equations, equations, row);
                 set(list.equation_bound, equations, constraint.lower);
+                set(list.stiffness, equations, T::ONE);
                 equations += 1;
                 return;
             }
