@@ -171,7 +171,8 @@ where
         }
         let (relative, products) = {
             let work = Work::new(ends, capacity, self.work.as_mut());
-            scaling::relative(&residuals, &iterate, view.dynamics, work.units, state.lengths.force)
+            let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
+            scaling::relative(&residuals, &iterate, view.dynamics, work.units, [state.lengths.force, of_stages])
         };
         state.update_barrier(&iterate, (&relative, products), &self.options);
         (row.residuals, row.objective) = (residuals, objective);

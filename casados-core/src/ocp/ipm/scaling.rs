@@ -192,7 +192,7 @@ pub(super) fn relative<T: Real>(
     iterate: &Iterate<'_, T>,
     pi: &[T],
     units: &[T],
-    force: f64,
+    [force, of_stages]: [f64; 2],
 ) -> (Residuals, f64) {
     let (sides, dims) = (&iterate.sides, iterate.qp.dims);
     let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
@@ -210,10 +210,9 @@ pub(super) fn relative<T: Real>(
     let stationarity = iterate.stationarity.iter().zip(units).fold(T::ZERO, |m, (&g, &unit)| {
         larger(m, (g * unit).abs())
     });
-    let dynamics = gaps(iterate, units);
     let relative = Residuals {
         stationarity: stationarity.to_f64() / (force * mean(all, count + pairs + sides.counts.equations)),
-        dynamics: if residuals.dynamics.is_finite() { dynamics } else { residuals.dynamics },
+        dynamics: larger(gaps(iterate, units), of_stages),
         inequalities: inequalities(sides, units),
         complementarity: residuals.complementarity / products,
     };
