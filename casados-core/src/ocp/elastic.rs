@@ -4,7 +4,7 @@
 use crate::ocp::instance::{Initial, Ocp};
 use crate::ocp::problem::Formulation;
 pub(super) use crate::qp::Violation as Worst;
-use crate::qp::{StageDims, worst};
+use crate::qp::{StageDims, pad, worst};
 use crate::scalar::Real;
 
 /// How many numbers remember the linear penalties.
@@ -35,24 +35,29 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Writes them as they were, or with a number in place of infinite ones: of states but those at
-    /// the start, and of constraints.
-    pub(super) fn set_penalties(&mut self, memory: &[T], elastic: Option<T>) {
+    /// Writes them as they were, or with a number over the unit of the row, if there are units, in
+    /// place of infinite ones: of states but those at the start, and of constraints.
+    pub(super) fn set_penalties(&mut self, memory: &[T], elastic: Option<T>, units: &[T]) {
         let mut pairs = memory.as_chunks().0.iter();
+        let mut row = 0;
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
-            for kind in 0..3 {
+            let StageDims { nx, nu, ng } = stage.dims();
+            let ld = pad::<T>(nx + nu);
+            for (kind, begin) in [row, row + nx, row + ld].into_iter().enumerate() {
                 let bounds = match kind {
                     0 => stage.x_bounds_mut(),
                     1 => stage.u_bounds_mut(),
                     _ => stage.g_bounds_mut(),
                 };
                 let elastic = elastic.filter(|_| kind == 2 || (kind == 0 && k > 0));
-                let now = |given: T| elastic.filter(|_| !given.is_finite()).unwrap_or(given);
                 let penalties = bounds.lower_linear.iter_mut().zip(bounds.upper_linear);
-                for ((lower, upper), &[below, above]) in penalties.zip(&mut pairs) {
+                for (i, ((lower, upper), &[below, above])) in penalties.zip(&mut pairs).enumerate() {
+                    let elastic = elastic.map(|e| e / units.get(begin + i).copied().unwrap_or(T::ONE));
+                    let now = |given: T| elastic.filter(|_| !given.is_finite()).unwrap_or(given);
                     (*lower, *upper) = (now(below), now(above));
                 }
             }
+            row += ld + pad::<T>(ng);
         }
     }
 

@@ -32,33 +32,33 @@ pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<
 pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
-    given: &[T],
+    (given, units): (&[T], &[T]),
     options: &IpmOptions,
 ) -> Option<Status> {
     let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
     let stays = worst.violation > STAYS * state.stationary_violation;
-    if stays || penalty >= LARGEST * options.elastic_penalty * state.lengths.force {
+    if stays || penalty >= LARGEST * options.elastic_penalty {
         return Some(ocp.status_of_worst(&worst));
     }
     state.stationary_violation = worst.violation;
-    soften(ocp, state, given, 10.0 * penalty);
+    soften(ocp, state, (given, units), 10.0 * penalty);
     None
 }
 
-/// Penalties in place of hard bounds; slacks begin anew.
+/// Penalties, in units, in place of hard bounds; slacks begin anew.
 pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
-    given: &[T],
+    (given, units): (&[T], &[T]),
     penalty: f64,
 ) {
-    ocp.set_penalties(given, Some(T::from_f64(penalty)));
     let Lengths { force, least, .. } = state.lengths;
+    ocp.set_penalties(given, Some(T::from_f64(penalty * force)), units);
     state.lengths = Lengths { force, least, ..Lengths::of(ocp.qp()) };
     state.elastic = Some(penalty);
     state.has_slacks = false;
-    state.mu = BARRIER * state.lengths.force;
+    state.mu = BARRIER * force;
     state.regularisation = Regularisation::default();
     state.has_filter = false;
 }

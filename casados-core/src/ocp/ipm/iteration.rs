@@ -112,8 +112,8 @@ where
             // Where no step made progress is no place to begin.
             ocp.recall(&self.best);
             let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-            let penalty = self.options.elastic_penalty * state.lengths.force;
-            elastic::soften(ocp, state, work.penalties, penalty);
+            let given = (&*work.penalties, &*work.units);
+            elastic::soften(ocp, state, given, self.options.elastic_penalty);
             return Ok(None);
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
@@ -201,7 +201,7 @@ where
     ) -> Next {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         if state.error <= self.options.tolerance {
-            let end = elastic::verdict(ocp, state, work.penalties, &self.options);
+            let end = elastic::verdict(ocp, state, (work.penalties, work.units), &self.options);
             return end.map_or(Next::NewPenalties, Next::End);
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {

@@ -163,7 +163,7 @@ where
             outcome.iterations += 1;
         };
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
-        ocp.set_penalties(work.penalties, None);
+        ocp.set_penalties(work.penalties, None, &[]);
         if outcome.status != Status::Converged && state.best_residual.is_finite() {
             ocp.recall(&self.best);
         }

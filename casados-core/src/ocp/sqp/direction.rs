@@ -59,7 +59,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !state.elastic {
             ocp.remember_penalties(memory);
         }
-        ocp.set_penalties(memory, Some(T::from_f64(penalty)));
+        ocp.set_penalties(memory, Some(T::from_f64(penalty)), &[]);
         state.elastic = true;
         // Objectives with other penalties are not to be compared.
         state.search.filter.clear();
@@ -72,7 +72,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state: &mut State<T>,
     ) {
         if state.elastic {
-            ocp.set_penalties(self.penalties(ocp), None);
+            ocp.set_penalties(self.penalties(ocp), None, &[]);
             state.elastic = false;
             state.search.filter.clear();
         }

@@ -44,7 +44,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.solution.copy_from(&ocp.iterate);
         self.qp_solver.relax(self.options.tolerance);
         let result = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
-        ocp.set_penalties(self.penalties(ocp), None);
+        ocp.set_penalties(self.penalties(ocp), None, &[]);
         let multipliers = self.solution.multipliers_mut();
         if result.is_ok() && multipliers.iter().all(|m| m.abs() <= T::from_f64(LARGEST)) {
             ocp.iterate.multipliers_mut().copy_from_slice(multipliers);
