@@ -6,9 +6,10 @@ use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
 use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
 use super::predictor::{self, needs_equal_steps};
+use super::scaling::{Relative, of_tolerance, relative};
 use super::state::{MARGIN, State};
 use super::work::Work;
-use super::{Ipm, elastic, scaling};
+use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::{Exact, Slopes};
 use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction, larger};
@@ -118,7 +119,7 @@ where
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
-        let least = (self.options.tolerance * state.lengths.force).max(self.options.final_mu);
+        let least = (self.options.tolerance * of_tolerance(state.lengths.force)).max(self.options.final_mu);
         let ends = direction.tiny && state.mu <= least;
         Ok(ends.then_some(Status::NoProgress))
     }
@@ -169,17 +170,16 @@ where
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        let (relative, products) = {
-            let work = Work::new(ends, capacity, self.work.as_mut());
-            let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
-            scaling::relative(&residuals, &iterate, view.dynamics, work.units, [state.lengths.force, of_stages])
-        };
-        state.update_barrier(&iterate, (&relative, products), &self.options);
+        let work = Work::new(ends, capacity, self.work.as_mut());
+        let sizes = [state.lengths.force, if P::Dynamics::LIFTED { of_stages } else { 0.0 }];
+        let Relative { barrier, error } =
+            relative(&residuals, &iterate, view.dynamics, work.units, sizes);
+        state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
+        state.error = error;
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
-        state.error = relative.largest();
         let size = state.error.max(violation);
         if size < state.best_residual || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);

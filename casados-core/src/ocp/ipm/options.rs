@@ -1,6 +1,7 @@
 //! What can be chosen.
 
 use super::barrier::Barrier;
+use super::scaling::of_tolerance;
 use crate::ocp::error::OcpError;
 use crate::scalar::Real;
 
@@ -77,7 +78,7 @@ impl IpmOptions {
 
     /// The tolerance, or what the last barrier parameter leaves, in units of forces.
     pub(super) fn least_error(&self, force: f64) -> f64 {
-        self.tolerance.max(10.0 * self.final_mu / force)
+        (self.tolerance * of_tolerance(force)).max(10.0 * self.final_mu) / force
     }
 
     /// The first barrier parameter.

@@ -17,6 +17,8 @@ use crate::scalar::Real;
 const LARGE: f64 = 1.0;
 /// What is smaller is so many units.
 const SMALL: f64 = 1.0;
+/// Tolerances are those of the problem where units are up to this or its inverse.
+const WIDE: f64 = 100.0;
 /// Gaps of a state need not be less than this part of it times the tolerance.
 const ROUNDING: f64 = 1e-5;
 /// `s_max`: a mean multiplier that is larger relaxes tolerances.
@@ -185,15 +187,28 @@ pub(super) fn sum<T: Real>(values: impl Iterator<Item = (T, T)>) -> f64 {
     values.fold(0.0, |sum, (value, unit)| sum + (value / unit).abs().to_f64())
 }
 
+/// What a tolerance is multiplied by: the unit, but one from there to a hundredth of it.
+pub(super) fn of_tolerance(unit: f64) -> f64 {
+    unit.min(1.0).max(unit / WIDE)
+}
+
+/// Residuals relative to units.
+pub(super) struct Relative {
+    /// Of the barrier problem: all of them, and what products are divided by.
+    pub barrier: (Residuals, f64),
+    /// The largest of those that are compared with tolerances.
+    pub error: f64,
+}
+
 /// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
-/// is that of all of them, `s_c` that of sides; and the unit of products.
+/// is that of all of them, `s_c` that of sides.
 pub(super) fn relative<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
     pi: &[T],
     units: &[T],
     [force, of_stages]: [f64; 2],
-) -> (Residuals, f64) {
+) -> Relative {
     let (sides, dims) = (&iterate.sides, iterate.qp.dims);
     let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
     let in_rows = of_sides(sides.rows, sides.multiplier, units).fold(0.0, size);
@@ -206,17 +221,26 @@ pub(super) fn relative<T: Real>(
         .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
     let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / MEAN).max(1.0);
     let pairs = sides.counts.pairs();
-    let products = force * mean(in_sides, pairs);
-    let stationarity = iterate.stationarity.iter().zip(units).fold(T::ZERO, |m, (&g, &unit)| {
-        larger(m, (g * unit).abs())
-    });
-    let relative = Residuals {
-        stationarity: stationarity.to_f64() / (force * mean(all, count + pairs + sides.counts.equations)),
+    let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
+    let (mut in_units, mut judged) = (T::ZERO, T::ZERO);
+    for (&g, &unit) in iterate.stationarity.iter().zip(units) {
+        in_units = larger(in_units, (g * unit).abs());
+        judged = larger(judged, (g * unit.max((T::from_f64(WIDE) * unit).min(T::ONE))).abs());
+    }
+    let barrier = Residuals {
+        stationarity: in_units.to_f64() / (force * s_d),
         dynamics: larger(gaps(iterate, units), of_stages),
-        inequalities: inequalities(sides, units),
-        complementarity: residuals.complementarity / products,
+        inequalities: inequalities(sides, units, |unit| unit),
+        complementarity: residuals.complementarity / (force * s_c),
     };
-    (relative, products)
+    let of_force = of_tolerance(force);
+    let judged = Residuals {
+        stationarity: judged.to_f64() / (of_force * s_d),
+        inequalities: inequalities(sides, units, of_tolerance),
+        complementarity: residuals.complementarity / (of_force * s_c),
+        ..barrier
+    };
+    Relative { barrier: (barrier, force * s_c), error: judged.largest() }
 }
 
 /// The largest gap in units of states that are not above one, nor below what rounding leaves of
@@ -238,11 +262,11 @@ fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
 }
 
 /// The largest residual of sides and equations in the units of their rows.
-fn inequalities<T: Real>(sides: &Sides<'_, T>, units: &[T]) -> f64 {
+fn inequalities<T: Real>(sides: &Sides<'_, T>, units: &[T], of: impl Fn(f64) -> f64) -> f64 {
     let equations = of_sides(sides.equations, sides.equation_residual, units);
     let sides = sides.rows.iter().zip(&*sides.scratch);
     sides
         .map(|(&row, &distance)| ((-distance).max(T::ZERO), at(units, row)))
         .chain(equations)
-        .fold(0.0, |m, (value, unit)| larger(m, (value / unit).abs().to_f64()))
+        .fold(0.0, |m, (value, unit)| larger(m, value.abs().to_f64() / of(unit.to_f64())))
 }
