@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Problem,
-    SecondOrder, Status,
+    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon,
+    Problem, SecondOrder, Status,
 };
 use casados::prelude::*;
 use casados::qp::residuals;

@@ -172,8 +172,7 @@ where
         }
         let work = Work::new(ends, capacity, self.work.as_mut());
         let sizes = [state.lengths.force, if P::Dynamics::LIFTED { of_stages } else { 0.0 }];
-        let Relative { barrier, error } =
-            relative(&residuals, &iterate, view.dynamics, work.units, sizes);
+        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, work.units, sizes);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.error = error;
         (row.residuals, row.objective) = (residuals, objective);

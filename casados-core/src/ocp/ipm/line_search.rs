@@ -203,7 +203,8 @@ where
         }
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
-        let mut violation = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
+        let mut violation =
+            gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
         if let Some(coupling) = &mut iterate.coupling {
             coupling.evaluate(iterate.qp, self.work.rows);
             violation += coupling.violation();
@@ -233,7 +234,8 @@ where
             ocp.correct(self.trial, self.work.ends);
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
-                let mut iterate = attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                let mut iterate =
+                    attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
                 let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));

@@ -113,12 +113,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// Violations of sides and equations whose rows have such values, with such slacks.
-pub(super) fn violations<T: Real>(
-    sides: &mut Sides<'_, T>,
-    rows: &[T],
-    slacks: &[T],
-    units: &[T],
-) -> f64 {
+pub(super) fn violations<T: Real>(sides: &mut Sides<'_, T>, rows: &[T], slacks: &[T], units: &[T]) -> f64 {
     let at = |row: u32| rows.get(row as usize).copied().unwrap_or(T::ZERO);
     let lower = sides.counts.lower;
     let listed = sides.rows.iter().zip(&*sides.bound).zip(slacks);

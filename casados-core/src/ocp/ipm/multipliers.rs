@@ -1,11 +1,11 @@
 //! Multipliers: the first ones, and those that the Hessian has.
 
-use super::{Ipm, scaling};
 use super::lengths::Lengths;
 use super::newton::{attach, attach_to_new, evaluate_values, least_squares};
 use super::start::begin_sides;
 use super::state::State;
 use super::work::Work;
+use super::{Ipm, scaling};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;

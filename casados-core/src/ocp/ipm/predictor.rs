@@ -48,11 +48,7 @@ pub(super) fn probe<T: Real>(sides: &Sides<'_, T>, least: f64) -> f64 {
 ///
 /// # Errors
 /// Those of the recursion.
-pub(super) fn correct<T: Real>(
-    iterate: &mut Iterate<'_, T>,
-    mu: f64,
-    force: f64,
-) -> Result<bool, QpError> {
+pub(super) fn correct<T: Real>(iterate: &mut Iterate<'_, T>, mu: f64, force: f64) -> Result<bool, QpError> {
     again(iterate, T::from_f64(mu), true)?;
     let tau = barrier::fraction_to_boundary(mu / force);
     let (primal, dual) = lengths(&iterate.sides, tau);

@@ -10,23 +10,19 @@ use super::work::Work;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::{Iterate, Sides, at, set};
-use crate::qp::{Bounds, Places, QpView, Residuals, StageDims, add_symmetric, assign, larger, part, part_mut};
+use crate::qp::{
+    Bounds, Places, QpView, Residuals, StageDims, add_symmetric, assign, larger, part, part_mut,
+};
 use crate::scalar::Real;
 
-/// What is larger in the units of the problem is so many units.
-const LARGE: f64 = 1.0;
-/// What is smaller is so many units.
-const SMALL: f64 = 1.0;
+/// No unit is larger, or smaller than its inverse: squares of units are numbers.
+const FARTHEST: f64 = 1e12;
 /// Tolerances are those of the problem where units are up to this or its inverse.
 const WIDE: f64 = 100.0;
 /// Gaps of a state need not be less than this part of it times the tolerance.
 const ROUNDING: f64 = 1e-5;
 /// `s_max`: a mean multiplier that is larger relaxes tolerances.
 const MEAN: f64 = 100.0;
-
-pub fn knob(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
 
 /// The least and the largest of the sizes that something may have.
 #[derive(Clone, Copy)]
@@ -46,19 +42,11 @@ impl Range {
         }
     }
 
-    /// One, or what makes all sizes at most `LARGE` or at least `SMALL`.
-    fn unit<T: Real>(&self, kind: &str) -> T {
-        let (large, small) = (knob(&[kind, "_L"].concat(), LARGE), knob(&[kind, "_S"].concat(), SMALL));
+    /// The number between least and most that is nearest to one; one where nothing is known.
+    fn unit<T: Real>(&self) -> T {
         let Self { least, most } = *self;
-        T::from_f64(if most == 0.0 {
-            1.0
-        } else if least > large {
-            least / large
-        } else if most < small {
-            most / small
-        } else {
-            1.0
-        })
+        let unit = if most == 0.0 { 1.0 } else { least.max(most.min(1.0)) };
+        T::from_f64(unit.clamp(1.0 / FARTHEST, FARTHEST))
     }
 }
 
@@ -95,7 +83,7 @@ fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut 
         lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
     }
     range.add(guess);
-    let unit = range.unit("SV");
+    let unit = range.unit();
     for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
         set(units, place.row + i, unit);
     }
@@ -110,7 +98,9 @@ fn units_of_row<T: Real>(
 ) {
     let mut range = Range::EMPTY;
     let (mut slope, mut distance) = (T::ZERO, T::ZERO);
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage)) {
+    for (place, stage) in
+        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
+    {
         let view = stage.arrays();
         let column = part(view.matrix, (place.next + i) * place.ld, place.ld);
         let v = part(v, place.v, place.ld);
@@ -130,7 +120,7 @@ fn units_of_row<T: Real>(
     }
     range.add(slope);
     range.add(distance);
-    let unit = range.unit("SR");
+    let unit = range.unit();
     for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
         set(units, place.row + place.ld + i, unit);
     }
@@ -158,7 +148,7 @@ fn unit_of_forces<T: Real>(qp: QpView<'_, T>, fixed: bool, v: &[T], work: &mut W
     }
     let mut range = Range::EMPTY;
     range.add(largest);
-    range.unit::<T>("SF").to_f64()
+    range.unit::<T>().to_f64()
 }
 
 /// Gaps of dynamics, each with the unit of its state.
@@ -247,9 +237,10 @@ pub(super) fn relative<T: Real>(
 /// states.
 fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let rounding = T::from_f64(ROUNDING);
-    let coupling = iterate.coupling.as_ref().map_or(T::ZERO, |coupling| {
-        coupling.residual.iter().fold(T::ZERO, |m, gap| larger(m, gap.abs()))
-    });
+    let coupling = iterate
+        .coupling
+        .as_ref()
+        .map_or(T::ZERO, |coupling| coupling.residual.iter().fold(T::ZERO, |m, gap| larger(m, gap.abs())));
     let mut largest = coupling;
     for place in Places::<T>::new(iterate.qp.dims) {
         let begin = place.row + place.rows;

@@ -61,7 +61,8 @@ impl State<'_> {
     ) {
         let force = self.lengths.force;
         let Sides { slack, multiplier, .. } = &iterate.sides;
-        let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
+        let error =
+            |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
         let mean = barrier::mean(&iterate.sides) / force;
         let mu = force * self.progress.next(self.mu / force, error, mean, options.least_error(force));
         if mu != self.mu {

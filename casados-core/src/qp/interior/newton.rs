@@ -66,7 +66,9 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
             scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
-            scatter(self.weights, sides.equations, sides.stiffness, |sum, &stiffness| sum + weight * stiffness);
+            scatter(self.weights, sides.equations, sides.stiffness, |sum, &stiffness| {
+                sum + weight * stiffness
+            });
         }
     }
 
