@@ -20,8 +20,11 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below. Default 1e-8; of
-    /// single precision 1e-3.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below: the stationarity
+    /// over `s_d` and the complementarity over `s_c`, which are `max(1, mean |multiplier| / 100)`
+    /// of all multipliers and of those of bounds in their units ([`scaling`](Self::scaling)).
+    /// Where units are above 100 the tolerance is this times a hundredth of them, where they are
+    /// below one it is this times the unit. Default 1e-8; of single precision 1e-3.
     pub tolerance: f64,
     /// A point whose residuals stay below this for `acceptable_iterations` is accepted where the
     /// tolerance is not reached. Default 1e-6; of single precision 1e-2.
@@ -30,7 +33,7 @@ pub struct IpmOptions {
     pub acceptable_iterations: usize,
     /// Default 200.
     pub max_iterations: usize,
-    /// The first barrier parameter `μ`. Default 0.1.
+    /// The first barrier parameter `μ`, in units of forces. Default 0.1.
     pub start_mu: f64,
     /// The last one: what is solved is the barrier problem with this `μ`, whose solutions are
     /// smooth functions of the data. Default 0, the problem itself.
@@ -40,7 +43,17 @@ pub struct IpmOptions {
     /// Bounds are left by this at the start, relative to their size and to the room between them;
     /// at most 0.5. Default 1e-2.
     pub bound_push: f64,
-    /// Whether the objective has a unit of its own. Default true.
+    /// Whether constants of the algorithm are multiples of units in which sizes are near one, found
+    /// where a run begins. The unit of a variable is the largest of its guesses or one of its
+    /// bounds, whichever is nearest to one, where that is above 100 or below 0.01; that of a path or terminal constraint is the largest of
+    /// its gradients or of the distances from its bounds, over all stages. That of forces is
+    ///
+    /// ```text
+    /// max over i of  unit_i max(|∂f/∂v_i|, |∂²f/∂v_i²| max(|v_i|, unit_i))
+    /// ```
+    ///
+    /// of the objective `f`. Iterates, residuals and the log are in the units of the problem.
+    /// Without this all units are one. Default true.
     pub scaling: bool,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,
@@ -49,8 +62,8 @@ pub struct IpmOptions {
     /// Whether bounds of states and constraints get penalties where no step makes progress. Default
     /// true.
     pub elastic: bool,
-    /// The first of these penalties, linear; they grow by factors of ten up to ten thousand times
-    /// that. Default 1e2.
+    /// The first of these penalties, linear, in units of forces over those of what is bounded; they
+    /// grow by factors of ten up to ten thousand times that. Default 1e2.
     pub elastic_penalty: f64,
 }
 

@@ -72,7 +72,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The unit of a variable at all stages, by its guess and bounds.
+/// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
+/// one.
 fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut [T]) {
     let mut range = Range::EMPTY;
     let mut guess = T::ZERO;
@@ -83,7 +84,10 @@ fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut 
         lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
     }
     range.add(guess);
-    let unit = range.unit();
+    let size: T = range.unit();
+    let wide = T::from_f64(WIDE);
+    let is_usual = size <= wide && size * wide >= T::ONE;
+    let unit = if is_usual { T::ONE } else { size };
     for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
         set(units, place.row + i, unit);
     }

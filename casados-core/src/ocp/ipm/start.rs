@@ -5,8 +5,8 @@ use crate::qp::interior::{Iterate, at, set};
 use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
 use crate::scalar::Real;
 
-/// Moves states and controls that have hard bounds away from these by `κ max(unit, |bound|)`, and by
-/// no more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
+/// Moves states and controls that have hard bounds away from these by `κ max(unit, |bound|)`,
+/// and by no more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
 pub(super) fn push_inside<T: Real>(
     qp: QpView<'_, T>,
     fixed: bool,
