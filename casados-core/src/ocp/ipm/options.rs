@@ -43,17 +43,18 @@ pub struct IpmOptions {
     /// Bounds are left by this at the start, relative to their size and to the room between them;
     /// at most 0.5. Default 1e-2.
     pub bound_push: f64,
-    /// Whether constants of the algorithm are multiples of units in which sizes are near one, found
-    /// where a run begins. The unit of a variable is the largest of its guesses or one of its
-    /// bounds, whichever is nearest to one, where that is above 100 or below 0.01; that of a path or terminal constraint is the largest of
-    /// its gradients or of the distances from its bounds, over all stages. That of forces is
+    /// Whether constants of the algorithm are multiples of units, found where a run begins. That of
+    /// forces is
     ///
     /// ```text
     /// max over i of  unit_i max(|∂f/∂v_i|, |∂²f/∂v_i²| max(|v_i|, unit_i))
     /// ```
     ///
-    /// of the objective `f`. Iterates, residuals and the log are in the units of the problem.
-    /// Without this all units are one. Default true.
+    /// of the objective `f`. The unit of a variable is its largest guess or one of its bounds,
+    /// whichever is nearest to one, and that of a path or terminal constraint its largest gradient
+    /// or distance from the bounds, over all stages; from 0.01 to 100 it is one. Iterates,
+    /// residuals and the log are in the units of the problem. Without this all units are one.
+    /// Default true.
     pub scaling: bool,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,

@@ -48,6 +48,13 @@ impl Range {
         let unit = if most == 0.0 { 1.0 } else { least.max(most.min(1.0)) };
         T::from_f64(unit.clamp(1.0 / FARTHEST, FARTHEST))
     }
+
+    /// The same; one where that is between a hundredth and a hundred.
+    fn unit_far_from_one<T: Real>(&self) -> T {
+        let unit = self.unit::<T>();
+        let wide = T::from_f64(WIDE);
+        if unit <= wide && unit * wide >= T::ONE { T::ONE } else { unit }
+    }
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -83,11 +90,11 @@ fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut 
         let Bounds { lower, upper, .. } = bounds;
         lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
     }
-    range.add(guess);
-    let size: T = range.unit();
-    let wide = T::from_f64(WIDE);
-    let is_usual = size <= wide && size * wide >= T::ONE;
-    let unit = if is_usual { T::ONE } else { size };
+    // Small guesses are as good as zero.
+    if range.most > 0.0 || guess > T::ONE {
+        range.add(guess);
+    }
+    let unit = range.unit_far_from_one();
     for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
         set(units, place.row + i, unit);
     }
@@ -124,7 +131,7 @@ fn units_of_row<T: Real>(
     }
     range.add(slope);
     range.add(distance);
-    let unit = range.unit();
+    let unit = range.unit_far_from_one();
     for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
         set(units, place.row + place.ld + i, unit);
     }
@@ -216,10 +223,11 @@ pub(super) fn relative<T: Real>(
     let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / MEAN).max(1.0);
     let pairs = sides.counts.pairs();
     let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
-    let (mut in_units, mut judged) = (T::ZERO, T::ZERO);
+    let (mut in_units, mut judged, wide) = (T::ZERO, T::ZERO, T::from_f64(WIDE));
     for (&g, &unit) in iterate.stationarity.iter().zip(units) {
         in_units = larger(in_units, (g * unit).abs());
-        judged = larger(judged, (g * unit.max((T::from_f64(WIDE) * unit).min(T::ONE))).abs());
+        let unit = T::ONE.min(wide * unit).max(unit / wide);
+        judged = larger(judged, (g * unit).abs());
     }
     let barrier = Residuals {
         stationarity: in_units.to_f64() / (force * s_d),
