@@ -187,7 +187,7 @@ macro_rules! judge {
                     // By the problem linearised anew, element by element.
                     $ocp.linearise(GaussNewton::default())?;
                     let (judged, _) = residuals($ocp.qp(), $ocp.iterate());
-                    // Relative to hundredths of gradients at the guess, of which there are some hundreds.
+                    // Relative to hundredths of gradients at the guess, which are some hundreds.
                     assert!(judged.largest() <= 10.0 * $tolerance, "{}: {judged} {outcome}", $seed);
                     $counts.count("Ok");
                 } else {
