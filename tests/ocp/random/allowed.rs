@@ -1,0 +1,35 @@
+//! What is allowed of residuals: of the interior point relative to forces.
+
+use super::Draw;
+use casados::ocp::{IpmOptions, SqpOptions};
+
+/// Sizes of guesses in [`Draw::forces`] are at most this.
+const FARTHEST: f64 = 10.0;
+
+/// How large residuals may be, where derivatives of the objective at the guess are so large.
+pub(super) trait Allowed {
+    fn allowed(&self, forces: f64) -> f64;
+}
+
+impl Allowed for SqpOptions {
+    fn allowed(&self, _forces: f64) -> f64 {
+        self.tolerance
+    }
+}
+
+/// See [`IpmOptions::scaling`].
+impl Allowed for IpmOptions {
+    fn allowed(&self, forces: f64) -> f64 {
+        self.tolerance * (forces / 100.0).max(1.0)
+    }
+}
+
+impl Draw {
+    /// More than what the objective changes by at the guess, where a variable changes by its size
+    /// or by one. Guesses that are farther off are moved to bounds.
+    pub(super) fn forces(&self) -> f64 {
+        let sizes = |i: usize| self.guess.iter().map(move |guess| guess[i].abs().min(FARTHEST));
+        let of = |i: usize| sizes(i).fold(1.0, f64::max) + self.reference[i].abs();
+        (0..3).map(|i| self.weights[i] * of(i)).fold(0.0, f64::max)
+    }
+}
