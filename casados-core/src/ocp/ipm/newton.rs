@@ -7,7 +7,7 @@ use super::lengths::{Lengths, reading};
 use super::work::Work;
 use crate::qp::interior::{First, Iterate, Sides, at};
 use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
-use crate::scalar::{Packed, Real, Registers, compiled};
+use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
 /// The iterate of Newton's method in its memory, whose contents stay as they were.
 ///
@@ -23,7 +23,7 @@ pub(super) fn attach<'a, T: Real>(
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
-    sides.compliance = T::from_f64(T::EPSILON.sqrt() * lengths.least * lengths.least / lengths.force);
+    sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * lengths.least * lengths.least / lengths.force);
     Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 

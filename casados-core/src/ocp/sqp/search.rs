@@ -89,6 +89,16 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.measure(trial, weighted.then_some(&*weights), ends).ok()
     }
 
+    /// Whether a step that is good enough may be better where it is shorter. Hessians that are
+    /// learned from differences of gradients want long steps.
+    fn shortens<P: Formulation<T>>(&self, line: &Line, length: f64, there: &Measure) -> bool
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        weighted && self.curvature.update().is_none() && line.turns_before(length, there)
+    }
+
     /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
     /// function says that its least is before, and shrinks. The length.
     fn shortened<P: Formulation<T>>(
@@ -98,9 +108,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         line: &Line,
         mut length: f64,
         mut there: Measure,
-    ) -> f64 {
-        let weighted = self.options.globalisation == Globalisation::Merit;
-        while weighted && line.turns_before(length, &there) && 0.5 * length >= self.options.shortest_step {
+    ) -> f64
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        while self.shortens::<P>(line, length, &there) && 0.5 * length >= self.options.shortest_step {
             let half = self.measure_at(ocp, 0.5 * length);
             let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
                 between(&ocp.iterate, &self.solution, length, &mut self.trial);
@@ -156,8 +168,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             ocp.linearise(self.curvature).map(|()| ocp.measure_here(weighted.then_some(&self.weights)));
         let seconds = watch.lap();
         let is_good = there.is_ok_and(|there| {
-            !(weighted && line.turns_before(1.0, &there))
-                && state.search.accepts(&self.options, 1.0, line, &there)
+            !self.shortens::<P>(line, 1.0, &there) && state.search.accepts(&self.options, 1.0, line, &there)
         });
         if is_good {
             state.search.linearised = Some(seconds);
