@@ -167,7 +167,7 @@ fn violations_are_those_of_the_problem() -> Test {
     };
     // At a speed of 1.02 it gets no farther than 1.53.
     let first = missed(PLAIN)?;
-    assert!(first >= 2.0 - 1.53 && first < 2.0, "{first}");
+    assert!((2.0 - 1.53..2.0).contains(&first), "{first}");
     for units in others().filter(|units| units.row == 1.0) {
         let other = missed(units)?;
         println!("{units:?} {other}");
