@@ -15,7 +15,8 @@ use super::*;
 /// # #[function]
 /// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 /// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
 /// let end = ball.solve(&vector![5.0, 0.0], &vector![], 1.5)?;
 /// // It hits the ground after a second, and goes up again with four fifths of its velocity.
 /// let hit = &end.occurrences[0];
@@ -48,7 +49,8 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 /// # #[function]
 /// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 /// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
 /// let end = ball.solve(&vector![5.0, 0.0], &vector![], 1.5)?;
 /// assert!(end.occurrences.len() == 1 && !end.terminal && (end.t - 1.5).abs() < 1e-14);
 /// # Ok::<(), casados::Error>(())
@@ -80,7 +82,8 @@ pub struct Solution<M: Dae, T: Real = f64> {
 /// # #[function]
 /// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 /// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
 /// let end = ball.forward(&vector![5.0, 0.0], &vector![], 1.5)?;
 /// // The velocity after it is 0.8 · 10 t − 10 (1.5 − t), where t grows by 0.1 s for each metre.
 /// assert!((end.dx_dx0[(1, 0)] - 1.8).abs() < 1e-9);
@@ -113,7 +116,8 @@ pub struct HybridForward<M: Dae, T: Real = f64> {
 /// # #[function]
 /// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 /// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
 /// let end = ball.forward(&vector![5.0, 0.0], &vector![], 1.5)?;
 /// // It hits the ground at t = √(2 x₀ / 10).
 /// assert!((end.times[0].x0 - vector![0.1, 0.1]).norm() < 1e-10);
@@ -142,7 +146,8 @@ pub struct TimeGradient<M: Dae, T: Real = f64> {
 /// # #[function]
 /// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 /// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// # let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
 /// // The gradient of the velocity at the end, by the state at the start.
 /// let end = ball.adjoint(&vector![5.0, 0.0], &vector![], 1.5, &vector![0.0, 1.0])?;
 /// assert!((end.grad_x0[0] - 1.8).abs() < 1e-9);

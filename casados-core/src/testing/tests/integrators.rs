@@ -26,12 +26,8 @@ const REPEATED: u8 = 5;
 
 impl<const FAULT: u8> Closed<FAULT> {
     fn new() -> Self {
-        Self {
-            p: f64::NAN,
-            calls: 0.0,
-            result: bytemuck::Zeroable::zeroed(),
-            adjoint: bytemuck::Zeroable::zeroed(),
-        }
+        let (result, adjoint) = (bytemuck::Zeroable::zeroed(), bytemuck::Zeroable::zeroed());
+        Self { p: f64::NAN, calls: 0.0, result, adjoint }
     }
 
     fn evaluate(&mut self, x0: f64, u: f64, h: f64, lambda: f64) {
