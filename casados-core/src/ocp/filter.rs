@@ -21,6 +21,11 @@ impl Measure {
         self.objective.is_finite() && self.violation.is_finite()
     }
 
+    /// Both in a unit of forces.
+    pub fn over(self, force: f64) -> Self {
+        Self { objective: self.objective / force, violation: self.violation / force }
+    }
+
     /// The merit function, where violations have their weights.
     pub fn merit(&self) -> f64 {
         self.objective + self.violation

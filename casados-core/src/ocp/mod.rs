@@ -130,6 +130,7 @@ mod sqp;
 #[cfg(feature = "alloc")]
 mod trajectory;
 mod transfer;
+mod units;
 mod watch;
 mod weights;
 mod wrapped;

@@ -53,12 +53,12 @@ pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef
     (given, units): (&[T], &[T]),
     penalty: f64,
 ) {
-    let Lengths { force, least, .. } = state.lengths;
-    ocp.set_penalties(given, Some(T::from_f64(penalty * force)), units);
-    state.lengths = Lengths { force, least, ..Lengths::of(ocp.qp()) };
+    let sizes = state.lengths.sizes;
+    ocp.set_penalties(given, Some(T::from_f64(penalty * sizes.force)), units);
+    state.lengths = Lengths { sizes, ..Lengths::of(ocp.qp()) };
     state.elastic = Some(penalty);
     state.has_slacks = false;
-    state.mu = BARRIER * force;
+    state.mu = BARRIER * sizes.force;
     state.regularisation = Regularisation::default();
     state.has_filter = false;
 }

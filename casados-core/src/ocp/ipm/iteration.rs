@@ -6,7 +6,7 @@ use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
 use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
 use super::predictor::{self, needs_equal_steps};
-use super::scaling::{Relative, of_tolerance, relative};
+use super::scaling::{Relative, relative};
 use super::state::{MARGIN, State};
 use super::work::Work;
 use super::{Ipm, elastic};
@@ -19,6 +19,7 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
 use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
+use crate::ocp::units::of_tolerance;
 use crate::ocp::watch::Watch;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
@@ -119,7 +120,7 @@ where
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
-        let least = (self.options.tolerance * of_tolerance(state.lengths.force)).max(self.options.final_mu);
+        let least = (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);
         let ends = direction.tiny && state.mu <= least;
         Ok(ends.then_some(Status::NoProgress))
     }
@@ -171,8 +172,9 @@ where
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
         let work = Work::new(ends, capacity, self.work.as_mut());
-        let sizes = [state.lengths.force, if P::Dynamics::LIFTED { of_stages } else { 0.0 }];
-        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, work.units, sizes);
+        let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
+        let units = state.lengths.units(work.units);
+        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.error = error;
         (row.residuals, row.objective) = (residuals, objective);
@@ -227,7 +229,7 @@ where
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<bool, QpError> {
-        let force = state.lengths.force;
+        let force = state.lengths.sizes.force;
         let least = force * barrier::least(self.options.least_error(force));
         let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let probes = state.progress.is_free();
@@ -266,7 +268,7 @@ where
         let plain = ocp.objective.to_f64();
         let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
         let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
-        let mut here = measure::here(&iterate, plain, state.mu, work.units, lengths.force);
+        let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
             let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
@@ -297,13 +299,13 @@ where
         let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let expected = Expected {
             here,
-            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.force,
+            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
             small_violation: state.small_violation,
             most: (GROWTH * here.violation).max(state.first_violation.max(1.0)),
             mu: state.mu,
             delta: state.delta,
         };
-        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.force);
+        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
         let noise = T::from_f64(10.0 * T::EPSILON);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);

@@ -1,5 +1,6 @@
 //! How much memory Newton's equations take.
 
+use crate::ocp::units::{Sizes, Units};
 use crate::qp::interior::{Counts, Extent, Iterate, Penalties, Reading, count, is_first_fixed};
 use crate::qp::{InteriorPointOptions, QpView};
 use crate::scalar::Real;
@@ -11,10 +12,8 @@ pub(super) struct Lengths {
     pub fixed: bool,
     pub numbers: usize,
     pub extent: Extent,
-    /// The unit of forces: see `scaling`.
-    pub force: f64,
-    /// The least unit of a row, at most one.
-    pub least: f64,
+    /// What is known of units.
+    pub sizes: Sizes,
 }
 
 impl Lengths {
@@ -23,7 +22,12 @@ impl Lengths {
         let reading = reading(qp);
         let counts = count(qp, &reading);
         let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
-        Self { counts, fixed: reading.fixed, numbers, extent, force: 1.0, least: 1.0 }
+        Self { counts, fixed: reading.fixed, numbers, extent, sizes: Sizes { force: 1.0, least: 1.0 } }
+    }
+
+    /// Units whose sizes these are.
+    pub fn units<'a, T>(&self, rows: &'a [T]) -> Units<'a, T> {
+        Units { sizes: self.sizes, rows }
     }
 
     /// Of the same problem with every bound soft, equations too.

@@ -5,6 +5,7 @@ use crate::ocp::error::OcpError;
 use crate::ocp::filter::Measure;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
+use crate::ocp::units::Units;
 use crate::qp::interior::{Iterate, Sides};
 use crate::qp::{Places, Solution, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
@@ -28,9 +29,9 @@ pub(super) fn here<T: Real>(
     iterate: &Iterate<'_, T>,
     objective: f64,
     mu: f64,
-    units: &[T],
-    force: f64,
+    units: Units<'_, T>,
 ) -> Measure {
+    let (force, units) = (units.sizes.force, units.rows);
     let sides = &iterate.sides;
     let gaps = of_gaps(iterate.qp.dims, iterate.dynamics, units);
     let equations = of_sides(sides.equations, sides.equation_residual, units);

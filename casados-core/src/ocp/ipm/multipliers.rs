@@ -37,13 +37,13 @@ where
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut work = Work::new(ends, capacity, self.work.as_mut());
-        let units = &*work.units;
-        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units)?;
+        let units = state.lengths.units(work.units);
+        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
-        let force = state.lengths.force;
-        begin_sides(&mut iterate, &self.options, warm, [force, state.mu].map(T::from_f64), work.units, &view);
+        let force = state.lengths.sizes.force;
+        begin_sides(&mut iterate, &self.options, warm, state.mu, units, &view);
         iterate.store(&mut view);
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);

@@ -5,6 +5,7 @@
 
 use super::lengths::{Lengths, reading};
 use super::work::Work;
+use crate::ocp::units::Sizes;
 use crate::qp::interior::{First, Iterate, Sides, at};
 use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
@@ -23,7 +24,8 @@ pub(super) fn attach<'a, T: Real>(
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
-    sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * lengths.least * lengths.least / lengths.force);
+    let Sizes { force, least } = lengths.sizes;
+    sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 
@@ -41,7 +43,7 @@ pub(super) fn attach_to_new<'a, T: Real>(
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = attach(qp, lengths, numbers, indices)?;
     iterate.sides.list(qp, &reading(qp));
-    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.least));
+    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.sizes.least));
     for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
         let ratio = least / at(units, row);
         *stiffness = ratio * ratio;

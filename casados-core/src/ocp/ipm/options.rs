@@ -1,8 +1,8 @@
 //! What can be chosen.
 
 use super::barrier::Barrier;
-use super::scaling::of_tolerance;
 use crate::ocp::error::OcpError;
+use crate::ocp::units::of_tolerance;
 use crate::scalar::Real;
 
 /// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation

@@ -113,7 +113,7 @@ where
         let mut state = State {
             over,
             lengths,
-            mu: self.options.first_mu(lengths.force),
+            mu: self.options.first_mu(lengths.sizes.force),
             // Products that do not vanish leave nothing to correct.
             progress: Progress::new(if self.options.final_mu > 0.0 {
                 Barrier::Monotone
@@ -188,11 +188,11 @@ where
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
         self.work.at_least(length, QpField::Numbers)?.fill(T::ZERO);
         self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
-        let mut work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         work.units.fill(T::ONE);
         if self.options.scaling {
-            ocp.find_units(&mut lengths, &mut work);
-            capacity = Lengths { force: lengths.force, least: lengths.least, ..capacity };
+            lengths.sizes = ocp.find_units(work.units, work.scratch);
+            capacity.sizes = lengths.sizes;
         }
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();

@@ -1,6 +1,7 @@
 //! The first point: inside of all bounds, with slacks and multipliers away from zero.
 
 use super::IpmOptions;
+use crate::ocp::units::Units;
 use crate::qp::interior::{Iterate, at, set};
 use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
 use crate::scalar::Real;
@@ -53,10 +54,11 @@ pub(super) fn begin_sides<T: Real>(
     iterate: &mut Iterate<'_, T>,
     options: &IpmOptions,
     warm: bool,
-    [force, mu]: [T; 2],
-    units: &[T],
+    mu: f64,
+    units: Units<'_, T>,
     solution: &SolutionView<'_, T>,
 ) {
+    let ([force, mu], units) = ([units.sizes.force, mu].map(T::from_f64), units.rows);
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
     let sides = &mut iterate.sides;
     let count = sides.counts.sides();

@@ -59,7 +59,7 @@ impl State<'_> {
         (residuals, products): (&Residuals, f64),
         options: &IpmOptions,
     ) {
-        let force = self.lengths.force;
+        let force = self.lengths.sizes.force;
         let Sides { slack, multiplier, .. } = &iterate.sides;
         let error =
             |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
@@ -74,7 +74,7 @@ impl State<'_> {
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
     pub fn begin_monotone(&mut self, options: &IpmOptions) {
         self.progress = Progress::new(Barrier::Monotone);
-        self.mu = options.first_mu(self.lengths.force);
+        self.mu = options.first_mu(self.lengths.sizes.force);
         self.regularisation = Regularisation::default();
         (self.has_slacks, self.has_filter) = (false, false);
     }

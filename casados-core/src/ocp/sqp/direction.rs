@@ -2,6 +2,7 @@
 //! penalties where it is infeasible.
 
 use super::Sqp;
+use super::scaled::{Way, penalties_end, penalties_mut};
 use super::state::State;
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::Curvature;
@@ -44,7 +45,7 @@ pub(super) enum Direction {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     pub(super) fn penalties<'s, P: Formulation<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
-        self.work.as_ref().get(ocp.ends()..).unwrap_or_default()
+        self.work.as_ref().get(ocp.ends()..penalties_end(ocp)).unwrap_or_default()
     }
 
     /// Penalties in place of hard bounds.
@@ -54,8 +55,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state: &mut State<T>,
         penalty: f64,
     ) {
-        let ends = ocp.ends();
-        let memory = self.work.as_mut().get_mut(ends..).unwrap_or_default();
+        let memory = penalties_mut(self.work.as_mut(), ocp);
         if !state.elastic {
             ocp.remember_penalties(memory);
         }
@@ -72,7 +72,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state: &mut State<T>,
     ) {
         if state.elastic {
+            // What is remembered is in units.
+            self.scale(ocp, state, Way::Into);
             ocp.set_penalties(self.penalties(ocp), None, &[]);
+            self.scale(ocp, state, Way::Back);
             state.elastic = false;
             state.search.filter.clear();
         }
@@ -88,18 +91,43 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        state.nearest = false;
+        (state.nearest, state.residual) = (false, row.residuals.largest());
+        self.scale(ocp, state, Way::Into);
+        if state.sizes.is_some() {
+            state.residual = ocp.residuals().0.largest();
+        }
+        let mut direction = self.direction_in_units(ocp, state, row);
+        self.scale(ocp, state, Way::Back);
+        if state.nearest {
+            self.linearise(ocp)?;
+        }
+        if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
+            *worst = self.in_problem(ocp, *worst);
+        }
+        Ok(direction)
+    }
+
+    /// The same where the QP, the iterate and all constants are in units.
+    fn direction_in_units<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+    ) -> Result<Direction, QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
-        self.qp_solver.relax(self.options.qp_accuracy * row.residuals.largest());
+        self.qp_solver.relax(self.options.qp_accuracy * state.residual);
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
-        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Ok(Direction::Step)) };
+        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
             error,
             QpError::Infeasible { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. }
         );
         if !(may_help && self.options.elastic) {
-            return Ok(Err(error));
+            return Err(error);
         }
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
@@ -112,15 +140,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
             // Without objective and curvature it is nearly a linear program.
             if self.nearest(ocp, state, row, before).is_err() {
-                return Ok(Err(error));
+                return Err(error);
             }
-            return self.go_near(ocp, state, row).map(Ok);
+            return Ok(Self::go_near(state, row));
         }
         let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
-            return Ok(Ok(Direction::Step));
+            return Ok(Direction::Step);
         };
         if self.violation_of_solution(ocp) < STAYS * before {
-            return Ok(Ok(Direction::Step));
+            return Ok(Direction::Step);
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
@@ -135,42 +163,33 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if stays && self.violation_of_solution(ocp) < STAYS * before {
                 // It is, and from now on it does.
                 state.penalty = penalty;
-                return Ok(Ok(Direction::Step));
+                return Ok(Direction::Step);
             }
         }
         // The Hessian may, too: nearly a linear program is what tells where gaps are closed.
         if stays && gaps <= CLOSED * bounds {
             if self.nearest(ocp, state, row, before).is_err() {
-                return Ok(Err(error));
+                return Err(error);
             }
             if self.violation_of_solution(ocp) >= STAYS * before {
-                return Ok(Ok(Direction::Infeasible(worst)));
+                return Ok(Direction::Infeasible(worst));
             }
-            return self.go_near(ocp, state, row).map(Ok);
+            return Ok(Self::go_near(state, row));
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
         if stays && gaps <= bounds {
-            return Ok(Ok(Direction::Infeasible(worst)));
+            return Ok(Direction::Infeasible(worst));
         }
         state.penalty = 0.0;
         self.set_elastic(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.solution, &mut self.trial);
-        Ok(Ok(Direction::Step))
+        Ok(Direction::Step)
     }
 
-    /// The step to the nearest point.
-    fn go_near<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
-        row: &mut Iteration,
-    ) -> Result<Direction, OcpError>
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
+    /// The step to the nearest point; the QP has another objective than that of the iterate.
+    fn go_near(state: &mut State<T>, row: &mut Iteration) -> Direction {
         (state.nearest, row.regularisation) = (true, 0.0);
-        self.linearise(ocp)?;
-        Ok(Direction::Step)
+        Direction::Step
     }
 
     /// The point that violates the linearisation least, near the iterate:

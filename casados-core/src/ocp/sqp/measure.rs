@@ -45,14 +45,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         slope.to_f64() + soft
     }
 
-    /// Objective and violations at some point, with the weights of violations or without.
+    /// Objective and violations at some point, with the weights of violations.
     ///
     /// # Errors
     /// Those of functions and integrators.
     pub(super) fn measure(
         &mut self,
         at: &Solution<T, D, M>,
-        weights: Option<&Solution<T, D, M>>,
+        weights: &Solution<T, D, M>,
         ends: &mut [T],
     ) -> Result<Measure, OcpError> {
         let objective = self.evaluate(at, ends)?;
@@ -60,10 +60,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (intervals, nx, rows) = (self.intervals(), P::Shape::NX, self.rows());
         let values = ends.get(intervals * nx..).unwrap_or_default();
         let mut stages = at.stages().peekable();
-        let mut weights = weights.map(Solution::stages);
+        let mut weights = weights.stages();
         for (k, stage) in self.qp.view().stages().enumerate() {
             let Some(point) = stages.next() else { break };
-            let weights = weights.as_mut().and_then(Iterator::next);
+            let weights = weights.next();
             if let Some(next) = stages.peek() {
                 for (i, (&phi, &x)) in part(ends, k * nx, nx).iter().zip(next.x).enumerate() {
                     sum.violation += of_gap(weights.as_ref(), i, phi - x);
@@ -101,15 +101,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// [`Ocp::measure`] at the iterate, from the QP that was written there.
-    pub(super) fn measure_here(&self, weights: Option<&Solution<T, D, M>>) -> Measure {
+    pub(super) fn measure_here(&self, weights: &Solution<T, D, M>) -> Measure {
         let mut sum = Measure { objective: self.objective.to_f64(), violation: 0.0 };
         let (v, _) = self.iterate.vectors();
         let mut begin = 0;
         let mut stages = self.iterate.stages().peekable();
-        let mut weights = weights.map(Solution::stages);
+        let mut weights = weights.stages();
         for stage in self.qp.view().stages() {
             let Some(point) = stages.next() else { break };
-            let weights = weights.as_mut().and_then(Iterator::next);
+            let weights = weights.next();
             let view = stage.arrays();
             let here = part(v, begin, view.ld);
             begin += view.ld;

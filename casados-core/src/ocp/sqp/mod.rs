@@ -10,6 +10,7 @@
 //! | `secant` | Hessians from differences of gradients |
 //! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
+//! | `scaled` | the QP in units |
 //! | `run` | the iterations, and how they end |
 
 mod acceptance;
@@ -18,6 +19,7 @@ mod measure;
 mod multipliers;
 mod options;
 mod run;
+mod scaled;
 mod search;
 mod secant;
 mod state;
@@ -33,6 +35,7 @@ use super::log::{Iteration, Log};
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::HeapInteriorPoint;
+use crate::qp::interior::Extent;
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -93,7 +96,7 @@ pub struct Sqp<S, C, T, D, M> {
     /// those of variables the guess.
     weights: Solution<T, D, M>,
     /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
-    /// exchanges.
+    /// exchanges, then units of rows.
     work: M,
     /// What [`Secant`](super::Secant) remembers.
     history: M,
@@ -130,7 +133,7 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
         qp_solver: S,
     ) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
-        let length = ocp.ends() + elastic::memory(dims);
+        let length = ocp.ends() + elastic::memory(dims) + Extent::of::<T>(dims).end.row;
         let mut work = Vec::new();
         let bytes = length.saturating_mul(size_of::<T>());
         work.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
@@ -230,6 +233,7 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
             .saturating_mul(4)
             .saturating_add(super::linearise::ends::<P, T>(dims))
             .saturating_add(elastic::memory(dims))
+            .saturating_add(Extent::of::<T>(dims).end.row)
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.

@@ -9,6 +9,8 @@
 //! program: its Hessian would know nothing of the dynamics, and its solution is far away.
 
 use super::Sqp;
+use super::scaled::{Way, penalties_mut};
+use super::state::State;
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
@@ -29,6 +31,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn first_multipliers<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
+        state: &State<T>,
     ) -> Result<(), OcpError>
     where
         C: Curvature<P::Dynamics, T>,
@@ -37,8 +40,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if given || ocp.controls_have_curvature() {
             return Ok(());
         }
-        let ends = ocp.ends();
-        ocp.remember_penalties(self.work.as_mut().get_mut(ends..).unwrap_or_default());
+        self.scale(ocp, state, Way::Into);
+        ocp.remember_penalties(penalties_mut(self.work.as_mut(), ocp));
         ocp.ignore_inequalities();
         ocp.flatten(T::from_f64(SMALL), T::ONE);
         self.solution.copy_from(&ocp.iterate);
@@ -49,6 +52,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if result.is_ok() && multipliers.iter().all(|m| m.abs() <= T::from_f64(LARGEST)) {
             ocp.iterate.multipliers_mut().copy_from_slice(multipliers);
         }
+        self.scale(ocp, state, Way::Back);
         ocp.linearise(self.curvature)
     }
 }

@@ -45,8 +45,9 @@ pub enum Globalisation {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SqpOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Default
-    /// 1e-6; of single precision 1e-3.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Where
+    /// units are above 100 it is this times a hundredth of them, where they are below 0.01 it is
+    /// this times the unit ([`scaling`](Self::scaling)). Default 1e-6; of single precision 1e-3.
     pub tolerance: f64,
     /// Default 200.
     pub max_iterations: usize,
@@ -62,6 +63,11 @@ pub struct SqpOptions {
     pub elastic: bool,
     /// These penalties, linear; positive. Default 1e3.
     pub elastic_penalty: f64,
+    /// Whether constants, tolerances and QPs are in units, found where a run begins, as
+    /// [`IpmOptions::scaling`](super::super::IpmOptions::scaling) says; but that of forces is one,
+    /// too, from 0.01 to 100, and all are powers of two. The log and residuals are in the units of
+    /// the problem. Default true.
+    pub scaling: bool,
     /// The shortest step of a line search; above 0, at most 1. Default 1e-6.
     pub shortest_step: f64,
 }
@@ -78,6 +84,7 @@ impl SqpOptions {
             qp_accuracy: 1e-4,
             elastic: true,
             elastic_penalty: 1e3,
+            scaling: true,
             shortest_step: 1e-6,
         }
     }

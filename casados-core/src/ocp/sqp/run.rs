@@ -73,7 +73,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.join_controls();
         ocp.join_states();
         self.weights.copy_from(&ocp.iterate);
-        self.weights.multipliers_mut().fill(T::ZERO);
         #[cfg(feature = "alloc")]
         {
             self.log.clear();
@@ -141,9 +140,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         self.leave_elastic(ocp, state);
-        *state = State { again: true, damping: AGAIN, ..State::new() };
+        *state = State { again: true, damping: AGAIN, sizes: state.sizes, ..State::new() };
         self.weights.multipliers_mut().fill(T::ZERO);
         ocp.iterate.copy_from(&self.weights);
+        self.forget_weights(ocp, state);
         true
     }
 
@@ -170,6 +170,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         };
         self.leave_elastic(ocp, state);
+        if row.iteration == 0 {
+            if self.options.scaling {
+                self.find_units(ocp, state);
+            }
+            self.forget_weights(ocp, state);
+        }
         if let Some(update) = self.curvature.update() {
             let take = match (row.iteration, state.elastic_steps) {
                 (0, _) => Take::First,
@@ -180,11 +186,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.take_hessians(ocp, take);
         }
         if state.begins && C::EXACT {
-            self.first_multipliers(ocp)?;
+            self.first_multipliers(ocp, state)?;
         }
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
-        let size = residuals.largest();
+        let size = self.judge(ocp, state, &residuals);
         if size < state.best_residual || state.begins {
             (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
@@ -209,7 +215,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // would be far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
             state.search.linearised = None;
-            self.weights.multipliers_mut().fill(T::ZERO);
+            self.forget_weights(ocp, state);
         }
         Ok(None)
     }

@@ -3,6 +3,7 @@
 use super::Sqp;
 use super::acceptance::Line;
 use super::options::Globalisation;
+use super::scaled::Way;
 use super::state::{State, Taken};
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
@@ -42,7 +43,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let weighted = self.options.globalisation == Globalisation::Merit;
-        let line = self.line(ocp);
+        let line = self.line(ocp, state);
         let mut written = true;
         if state.search.full {
             if self.try_linearised(ocp, state, &line) {
@@ -59,7 +60,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut length = 1.0;
         while length >= shortest {
             // A point without a value is one that is not good enough.
-            let there = self.measure_at(ocp, length);
+            let there = self.measure_at(ocp, state, length);
             if let Some(there) = there
                 && state.search.accepts(&self.options, length, &line, &there)
             {
@@ -69,7 +70,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if length == 1.0 && there.is_some_and(|there| there.is_finite()) {
                 if !written {
                     self.linearise(ocp)?;
+                    self.scale(ocp, state, Way::Into);
                     ocp.regularise(T::from_f64(row.regularisation));
+                    self.scale(ocp, state, Way::Back);
                 }
                 if self.corrected(ocp, state, &line, row) {
                     return Ok(Some(Taken { length, corrected: true }));
@@ -80,13 +83,28 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(None)
     }
 
+    /// Weights of violations before the first line search: those of a filter are the inverses of
+    /// units and stay.
+    pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<T>) {
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
+        if !weighted {
+            // The solution is written before it is read.
+            self.scale_weights(ocp, state, Way::Back);
+        }
+    }
+
     /// What there is at a part of the step, if it has a value.
-    fn measure_at<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, length: f64) -> Option<Measure> {
-        let Self { options, solution, trial, work, weights, .. } = self;
+    fn measure_at<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<T>,
+        length: f64,
+    ) -> Option<Measure> {
+        let Self { solution, trial, work, weights, .. } = self;
         let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         between(&ocp.iterate, solution, length, trial);
-        let weighted = options.globalisation == Globalisation::Merit;
-        ocp.measure(trial, weighted.then_some(&*weights), ends).ok()
+        ocp.measure(trial, weights, ends).ok().map(|there| there.over(state.force()))
     }
 
     /// Whether a step that is good enough may be better where it is shorter. Hessians that are
@@ -113,7 +131,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         while self.shortens::<P>(line, length, &there) && 0.5 * length >= self.options.shortest_step {
-            let half = self.measure_at(ocp, 0.5 * length);
+            let half = self.measure_at(ocp, state, 0.5 * length);
             let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
                 between(&ocp.iterate, &self.solution, length, &mut self.trial);
                 break;
@@ -126,12 +144,20 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
-    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Line {
+    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> Line {
+        let (here, slope) = self.weigh(ocp, state);
+        Line { here: here.over(state.force()), slope: slope / state.force() }
+    }
+
+    /// Objective and weighted violations at the iterate, with new weights, and the slope of the
+    /// objective.
+    fn weigh<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> (Measure, f64) {
         if self.options.globalisation != Globalisation::Merit {
-            let here = ocp.measure_here(None);
+            let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
-            return Line { here, slope };
+            return (here, slope);
         }
+        self.scale_weights(ocp, state, Way::Into);
         let multipliers = self.solution.multipliers_mut();
         let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
         let (half, least) = (T::from_f64(0.5), T::from_f64(LEAST) * largest);
@@ -140,15 +166,16 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let size = multiplier.abs();
             size.max(half * (w + size)).max(least)
         });
-        let here = ocp.measure_here(Some(&self.weights));
+        self.scale_weights(ocp, state, Way::Back);
+        let here = ocp.measure_here(&self.weights);
         let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
         let factor = slope / ((1.0 - SHARE) * here.violation);
         if !(factor > 1.0 && factor.is_finite()) {
-            return Line { here, slope };
+            return (here, slope);
         }
         let factor = T::from_f64(factor);
         self.weights.multipliers_mut().iter_mut().for_each(|w| *w = factor * *w);
-        Line { here: ocp.measure_here(Some(&self.weights)), slope }
+        (ocp.measure_here(&self.weights), slope)
     }
 
     /// The full step, tried by linearising there.
@@ -163,9 +190,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let mut watch = Watch::start();
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
-        let weighted = self.options.globalisation == Globalisation::Merit;
-        let there =
-            ocp.linearise(self.curvature).map(|()| ocp.measure_here(weighted.then_some(&self.weights)));
+        let there = ocp.linearise(self.curvature);
+        let there = there.map(|()| ocp.measure_here(&self.weights).over(state.force()));
         let seconds = watch.lap();
         let is_good = there.is_ok_and(|there| {
             !self.shortens::<P>(line, 1.0, &there) && state.search.accepts(&self.options, 1.0, line, &there)
@@ -186,17 +212,22 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         line: &Line,
         row: &mut Iteration,
     ) -> bool {
-        let Self { options, qp_solver, solution, trial, work, weights, .. } = self;
-        let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        ocp.correct(trial, ends);
-        trial.copy_from(solution);
-        let Ok(statistics) = qp_solver.solve(ocp.qp(), QpStart::Warm, trial.view_mut()) else { return false };
+        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        ocp.correct(&self.trial, ends);
+        self.trial.copy_from(&self.solution);
+        // It is the trial that is solved for, and scaled back.
+        core::mem::swap(&mut self.solution, &mut self.trial);
+        self.scale(ocp, state, Way::Into);
+        let solved = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
+        self.scale(ocp, state, Way::Back);
+        core::mem::swap(&mut self.solution, &mut self.trial);
+        let Ok(statistics) = solved else { return false };
         row.qp_iterations += statistics.iterations;
-        let weights = (options.globalisation == Globalisation::Merit).then_some(&*weights);
-        let there = ocp.measure(trial, weights, ends).ok();
-        let is_good = there.is_some_and(|there| state.search.accepts(options, 1.0, line, &there));
+        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        let there = ocp.measure(&self.trial, &self.weights, ends).ok().map(|there| there.over(state.force()));
+        let is_good = there.is_some_and(|there| state.search.accepts(&self.options, 1.0, line, &there));
         if is_good {
-            core::mem::swap(&mut ocp.iterate, trial);
+            core::mem::swap(&mut ocp.iterate, &mut self.trial);
         }
         is_good
     }

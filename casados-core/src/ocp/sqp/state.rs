@@ -2,6 +2,7 @@
 
 use super::acceptance::Search;
 use crate::ocp::log::Iteration;
+use crate::ocp::units::Sizes;
 use core::marker::PhantomData;
 
 /// What a run remembers from one iteration to the next.
@@ -29,6 +30,10 @@ pub(super) struct State<T> {
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
+    /// The largest residual in units.
+    pub residual: f64,
+    /// Units, unless all of them are one.
+    pub sizes: Option<Sizes>,
     /// The largest change of a variable by the last full step; infinite at first.
     pub reach: f64,
     pub number: PhantomData<T>,
@@ -58,9 +63,16 @@ impl<T> State<T> {
             elastic_steps: 0,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
+            residual: f64::INFINITY,
+            sizes: None,
             reach: f64::INFINITY,
             number: PhantomData,
         }
+    }
+
+    /// The unit of forces.
+    pub fn force(&self) -> f64 {
+        self.sizes.map_or(1.0, |sizes| sizes.force)
     }
 
     /// Damping of the next direction, after a step.
