@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon,
-    Problem, SecondOrder, Status,
+    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, Globalisation, HeapIpm, HeapOcp,
+    HeapSqp, Horizon, OcpError, Outcome, Problem, SecondOrder, Status,
 };
 use casados::prelude::*;
 use casados::qp::residuals;
@@ -92,38 +92,79 @@ fn write_plain<P: Formulation<f64>, Q: Formulation<f64>>(
     Ok(())
 }
 
-/// With default options, in no more than half as many iterations again as in plain units. The
-/// conditions of optimality of the plain problem hold at each solution, judged element by element
-/// by code that is not the solver's.
+/// What solves the problem, with default options but these.
+#[derive(Clone, Copy, Debug)]
+enum Solver {
+    Ipm(Barrier),
+    Sqp(Globalisation),
+}
+
+impl Solver {
+    /// How a run ends, and its log.
+    fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+        self,
+        ocp: &mut HeapOcp<P>,
+    ) -> Result<(Outcome, String), OcpError> {
+        match self {
+            Self::Ipm(barrier) => {
+                let mut ipm = HeapIpm::new(ocp)?;
+                ipm.options.barrier = barrier;
+                Ok((ipm.solve(ocp)?, ipm.log().to_string()))
+            }
+            Self::Sqp(globalisation) => {
+                let mut sqp = HeapSqp::new(ocp)?;
+                sqp.options.globalisation = globalisation;
+                Ok((sqp.solve(ocp)?, sqp.log().to_string()))
+            }
+        }
+    }
+
+    /// The default.
+    fn tolerance(self) -> f64 {
+        match self {
+            Self::Ipm(_) => 1e-8,
+            Self::Sqp(_) => 1e-6,
+        }
+    }
+}
+
+/// In no more than half as many iterations again as in plain units. The conditions of optimality of
+/// the plain problem hold at each solution, judged element by element by code that is not the
+/// solver's.
 #[test]
 fn units_do_not_matter() -> Test {
-    for barrier in [Barrier::Adaptive, Barrier::Monotone] {
+    for solver in [
+        Solver::Ipm(Barrier::Adaptive),
+        Solver::Ipm(Barrier::Monotone),
+        Solver::Sqp(Globalisation::Merit),
+        Solver::Sqp(Globalisation::Filter),
+    ] {
         let solve = |units| -> Result<_, Box<dyn std::error::Error>> {
             let mut ocp = way(units, 1.0)?;
-            let mut ipm = HeapIpm::new(&ocp)?;
-            ipm.options.barrier = barrier;
-            let outcome = ipm.solve(&mut ocp)?;
-            assert!(outcome.is_converged(), "{barrier:?} {units:?}: {outcome}\n{}", ipm.log());
+            let (outcome, log) = solver.solve(&mut ocp)?;
+            assert!(outcome.is_converged(), "{solver:?} {units:?}: {outcome}\n{log}");
             Ok((ocp, outcome))
         };
         let (_, first) = solve(PLAIN)?;
         for units in others() {
             let (ocp, outcome) = solve(units)?;
-            println!("{barrier:?} {units:?}: {outcome}");
+            println!("{solver:?} {units:?}: {outcome}");
             // Gaps of a state of 1e6 are to be 1e-14 of it, which takes some more.
             let most = if units.states > 1e3 { 2.0 } else { 1.5 };
             assert!(outcome.iterations as f64 <= most * first.iterations as f64, "{outcome} {first}");
             let mut plain = way(PLAIN, 1.0)?;
             write_plain(&ocp, units, &mut plain)?;
             plain.linearise(Exact { convexification: Convexification::None })?;
-            let (judged, objective) = residuals(plain.qp(), plain.iterate());
+            let (judged, _) = residuals(plain.qp(), plain.iterate());
             // Residuals are relative to units, which are at most the sizes that the problem names:
             // 1.2 of the power, 1 of the rest.
-            assert!(judged.largest() <= 1.2e-8, "{units:?} {judged}");
+            let tolerance = 1.2 * solver.tolerance();
+            assert!(judged.largest() <= tolerance, "{units:?} {judged}");
             // Both objectives are off by residuals times multipliers: of 300 conditions, none of
             // whose multipliers is above 10.
-            let objective = (outcome.objective / units.cost, objective).0;
-            assert!((objective - first.objective).abs() <= 2.0 * 1.2e-8 * 300.0 * 10.0, "{objective}");
+            let most = 2.0 * tolerance * 300.0 * 10.0;
+            let objective = outcome.objective / units.cost;
+            assert!((objective - first.objective).abs() <= most, "{objective}");
         }
     }
     Ok(())
@@ -132,9 +173,11 @@ fn units_do_not_matter() -> Test {
 /// What a run says of itself is in the units of the problem.
 #[test]
 fn residuals_are_those_of_the_problem() -> Test {
-    for units in [Units { cost: 1e6, states: 1e3, row: 1e4 }, Units { cost: 1e-6, states: 1e-3, row: 1e-4 }] {
+    let cases = [Units { cost: 1e6, states: 1e3, row: 1e4 }, Units { cost: 1e-6, states: 1e-3, row: 1e-4 }];
+    let solvers = [Solver::Ipm(Barrier::Adaptive), Solver::Sqp(Globalisation::Merit)];
+    for (units, solver) in cases.into_iter().flat_map(|units| solvers.map(|solver| (units, solver))) {
         let mut ocp = way(units, 1.0)?;
-        let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+        let (outcome, _) = solver.solve(&mut ocp)?;
         let (judged, _) = residuals(ocp.qp(), ocp.iterate());
         // Sums in another order: roundings of terms as large as these.
         let largest = |of: &dyn Fn(&casados::qp::SolutionStage<'_, f64>) -> f64| {
@@ -154,24 +197,25 @@ fn residuals_are_those_of_the_problem() -> Test {
 /// A way that is too long is missed by as much in all units.
 #[test]
 fn violations_are_those_of_the_problem() -> Test {
-    let missed = |units: Units| -> Result<f64, Box<dyn std::error::Error>> {
+    let missed = |solver: Solver, units: Units| -> Result<f64, Box<dyn std::error::Error>> {
         let mut ocp = way(units, 2.0)?;
-        let mut ipm = HeapIpm::new(&ocp)?;
-        let outcome = ipm.solve(&mut ocp)?;
+        let (outcome, log) = solver.solve(&mut ocp)?;
         match outcome.status {
             Status::Infeasible { constraint, violation } if constraint.name == "x[0]" => {
                 Ok(violation / units.states)
             }
-            status => Err(format!("{units:?} {status}\n{}", ipm.log()).into()),
+            status => Err(format!("{solver:?} {units:?} {status}\n{log}").into()),
         }
     };
-    // At a speed of 1.02 it gets no farther than 1.53.
-    let first = missed(PLAIN)?;
-    assert!((2.0 - 1.53..2.0).contains(&first), "{first}");
-    for units in others().filter(|units| units.row == 1.0) {
-        let other = missed(units)?;
-        println!("{units:?} {other}");
-        assert!((other - first).abs() <= 1e-3 * first, "{units:?} {other} {first}");
+    for solver in [Solver::Ipm(Barrier::Adaptive), Solver::Sqp(Globalisation::Merit)] {
+        // At a speed of 1.02 it gets no farther than 1.53.
+        let first = missed(solver, PLAIN)?;
+        assert!((2.0 - 1.53..2.0).contains(&first), "{first}");
+        for units in others().filter(|units| units.row == 1.0) {
+            let other = missed(solver, units)?;
+            println!("{solver:?} {units:?} {other}");
+            assert!((other - first).abs() <= 1e-3 * first, "{units:?} {other} {first}");
+        }
     }
     Ok(())
 }
@@ -179,15 +223,22 @@ fn violations_are_those_of_the_problem() -> Test {
 /// Without units the plain problem has the same solution.
 #[test]
 fn units_are_an_option() -> Test {
-    let mut objectives = [0.0; 2];
-    for (objective, scaling) in objectives.iter_mut().zip([true, false]) {
+    let mut objectives = [[0.0; 2]; 2];
+    for (objectives, scaling) in objectives.iter_mut().zip([true, false]) {
         let mut ocp = way(PLAIN, 1.0)?;
         let mut ipm = HeapIpm::new(&ocp)?;
         ipm.options.scaling = scaling;
-        let outcome = ipm.solve(&mut ocp)?;
-        assert!(outcome.is_converged(), "{outcome}");
-        *objective = outcome.objective;
+        let by_ipm = ipm.solve(&mut ocp)?;
+        let mut ocp = way(PLAIN, 1.0)?;
+        let mut sqp = HeapSqp::new(&ocp)?;
+        sqp.options.scaling = scaling;
+        let by_sqp = sqp.solve(&mut ocp)?;
+        assert!(by_ipm.is_converged() && by_sqp.is_converged(), "{by_ipm} {by_sqp}");
+        *objectives = [by_ipm.objective, by_sqp.objective];
     }
-    assert!((objectives[0] - objectives[1]).abs() <= 2.0 * 1e-8 * 300.0 * 10.0, "{objectives:?}");
+    let [with, without] = objectives;
+    assert!((with[0] - without[0]).abs() <= 2.0 * 1e-8 * 300.0 * 10.0, "{objectives:?}");
+    // All units of the plain problem are one.
+    assert_eq!(with[1], without[1]);
     Ok(())
 }

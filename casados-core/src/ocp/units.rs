@@ -106,6 +106,10 @@ fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut 
         let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
         let Bounds { lower, upper, .. } = bounds;
         lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
+        // Where zero is says nothing: of a temperature between 298 and 398 it is the room.
+        if let (Some(&lower), Some(&upper)) = (lower.get(i), upper.get(i)) {
+            range.add(upper - lower);
+        }
     }
     // Small guesses are as good as zero.
     if range.most > 0.0 || guess > T::ONE {
