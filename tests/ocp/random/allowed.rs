@@ -1,4 +1,4 @@
-//! What is allowed of residuals: of the interior point relative to forces.
+//! What is allowed of residuals: relative to forces.
 
 use super::Draw;
 use casados::ocp::{IpmOptions, SqpOptions};
@@ -11,13 +11,13 @@ pub(super) trait Allowed {
     fn allowed(&self, forces: f64) -> f64;
 }
 
+/// See [`IpmOptions::scaling`].
 impl Allowed for SqpOptions {
-    fn allowed(&self, _forces: f64) -> f64 {
-        self.tolerance
+    fn allowed(&self, forces: f64) -> f64 {
+        self.tolerance * (forces / 100.0).max(1.0)
     }
 }
 
-/// See [`IpmOptions::scaling`].
 impl Allowed for IpmOptions {
     fn allowed(&self, forces: f64) -> f64 {
         self.tolerance * (forces / 100.0).max(1.0)

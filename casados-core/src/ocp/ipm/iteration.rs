@@ -31,6 +31,9 @@ const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
+/// So many iterations with nothing left but complementarity are more than Newton's method needs.
+const HELD: usize = 3;
+
 /// What follows the residuals of an iteration.
 enum Next {
     /// A search direction.
@@ -83,6 +86,10 @@ where
             Next::NewPenalties => return Ok(None),
             Next::End(status) => return Ok(Some(status)),
         }
+        if state.held >= HELD {
+            state.held = 0;
+            self.release(ocp, state)?;
+        }
         let direction = self.direction(ocp, state, row).and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
             self.along(ocp, capacity, state, here, is_corrected)
@@ -120,7 +127,8 @@ where
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
-        let least = (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);
+        let least =
+            (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);
         let ends = direction.tiny && state.mu <= least;
         Ok(ends.then_some(Status::NoProgress))
     }
@@ -174,9 +182,16 @@ where
         let work = Work::new(ends, capacity, self.work.as_mut());
         let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
-        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, units, of_stages);
+        let Relative { barrier, error, others } =
+            relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.error = error;
+        // Complementarity is all that is left, and no smaller `μ` can make it less.
+        let tolerance = self.options.tolerance;
+        let least = barrier::least(self.options.least_error(state.lengths.sizes.force));
+        let is_last = state.mu <= 2.0 * least * state.lengths.sizes.force;
+        let is_held = is_last && others <= tolerance && error > tolerance;
+        state.held = if is_held { state.held + 1 } else { 0 };
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
@@ -189,6 +204,21 @@ where
         }
         let acceptable = size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
+        Ok(())
+    }
+
+    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
+    fn release<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_>,
+    ) -> Result<(), OcpError> {
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        barrier::release(&mut iterate.sides, state.mu, self.options.tolerance);
+        let mut view = solution.view_mut();
+        iterate.store(&mut view);
+        evaluate(&mut iterate, &mut view);
         Ok(())
     }
 

@@ -210,7 +210,10 @@ where
             violation += coupling.violation();
         }
         let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
-        Some(Measure { objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force, violation })
+        Some(Measure {
+            objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force,
+            violation,
+        })
     }
 
     /// Second-order corrections: constraints take their values at the point that was tried.

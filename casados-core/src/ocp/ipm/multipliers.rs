@@ -38,7 +38,8 @@ where
         let mut view = solution.view_mut();
         let mut work = Work::new(ends, capacity, self.work.as_mut());
         let units = state.lengths.units(work.units);
-        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
+        let mut iterate =
+            attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);

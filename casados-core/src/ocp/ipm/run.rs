@@ -128,6 +128,7 @@ where
             elastic: None,
             stationary_violation: f64::INFINITY,
             acceptable: 0,
+            held: 0,
             has_slacks: false,
             is_linearised,
             has_filter: false,

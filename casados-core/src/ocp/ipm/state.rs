@@ -36,6 +36,8 @@ pub(super) struct State<'c> {
     pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
+    /// Iterations one after the other in which complementarity is all that is left.
+    pub held: usize,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
     pub has_slacks: bool,
     /// Whether the QP is that at the iterate, with whatever multipliers.

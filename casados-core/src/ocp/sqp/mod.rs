@@ -35,7 +35,6 @@ use super::log::{Iteration, Log};
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::HeapInteriorPoint;
-use crate::qp::interior::Extent;
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -133,7 +132,7 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
         qp_solver: S,
     ) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
-        let length = ocp.ends() + elastic::memory(dims) + Extent::of::<T>(dims).end.row;
+        let length = ocp.ends() + elastic::memory(dims) + scaled::memory::<T>(dims);
         let mut work = Vec::new();
         let bytes = length.saturating_mul(size_of::<T>());
         work.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
@@ -233,7 +232,7 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
             .saturating_mul(4)
             .saturating_add(super::linearise::ends::<P, T>(dims))
             .saturating_add(elastic::memory(dims))
-            .saturating_add(Extent::of::<T>(dims).end.row)
+            .saturating_add(scaled::memory::<T>(dims))
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.

@@ -15,7 +15,7 @@ use crate::ocp::problem::Formulation;
 use crate::ocp::units::{Sizes, Units, WIDE, of_tolerance};
 use crate::qp::interior::at;
 use crate::qp::{
-    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, part, part_mut,
+    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, pad, part, part_mut,
 };
 use crate::scalar::Real;
 
@@ -23,6 +23,22 @@ use crate::scalar::Real;
 const FARTHEST: f64 = 8192.0;
 /// What is below the leading digit of a number.
 const DIGITS: u64 = (1 << 52) - 1;
+
+/// How many numbers are units of rows.
+pub(super) const fn memory<T>(dims: &[StageDims]) -> usize {
+    let (mut length, mut rest) = (0_usize, dims);
+    while let Some((first, others)) = rest.split_first() {
+        length = length.saturating_add(padded::<T>(first.nx.saturating_add(first.nu)));
+        length = length.saturating_add(padded::<T>(first.ng));
+        rest = others;
+    }
+    length
+}
+
+/// The length of a padded vector.
+const fn padded<T>(n: usize) -> usize {
+    if n > usize::MAX / 2 { usize::MAX } else { pad::<T>(n) }
+}
 
 /// The power of two that is not above a positive number.
 fn power<T: Real>(unit: f64) -> f64 {
@@ -120,11 +136,7 @@ impl<T: Real> Scale<'_, T> {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Finds the units at the iterate, where the QP is written.
-    pub(super) fn find_units<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
-    ) {
+    pub(super) fn find_units<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<T>) {
         let rows = self.work.as_mut().get_mut(penalties_end(ocp)..).unwrap_or_default();
         let Sizes { force, .. } = ocp.find_units(rows, self.trial.view_mut().v);
         let force = if (1.0 / WIDE..=WIDE).contains(&force) { 1.0 } else { power::<T>(force) };
@@ -143,12 +155,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP, the iterate and the solution, into units or back.
-    pub(super) fn scale<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<T>,
-        way: Way,
-    ) {
+    pub(super) fn scale<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>, way: Way) {
         let Some(sizes) = state.sizes else { return };
         let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
         let scale = Scale { units: Units { sizes, rows }, way, judges: false };
