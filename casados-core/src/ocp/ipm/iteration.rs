@@ -31,8 +31,10 @@ const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
-/// So many iterations with nothing left but complementarity are more than Newton's method needs.
+/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
+/// are no convergence of Newton's method.
 const HELD: usize = 3;
+const CRAWLS: f64 = 0.9;
 
 /// What follows the residuals of an iteration.
 enum Next {
@@ -86,8 +88,8 @@ where
             Next::NewPenalties => return Ok(None),
             Next::End(status) => return Ok(Some(status)),
         }
-        if state.held >= HELD {
-            state.held = 0;
+        if state.held >= HELD && !state.released {
+            (state.held, state.released) = (0, true);
             self.release(ocp, state)?;
         }
         let direction = self.direction(ocp, state, row).and_then(|is_corrected| {
@@ -185,12 +187,12 @@ where
         let Relative { barrier, error, others } =
             relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
-        state.error = error;
         // Complementarity is all that is left, and no smaller `μ` can make it less.
         let tolerance = self.options.tolerance;
         let least = barrier::least(self.options.least_error(state.lengths.sizes.force));
         let is_last = state.mu <= 2.0 * least * state.lengths.sizes.force;
-        let is_held = is_last && others <= tolerance && error > tolerance;
+        let is_held = is_last && others <= tolerance && error > tolerance.max(CRAWLS * state.error);
+        state.error = error;
         state.held = if is_held { state.held + 1 } else { 0 };
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);

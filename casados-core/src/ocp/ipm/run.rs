@@ -129,6 +129,7 @@ where
             stationary_violation: f64::INFINITY,
             acceptable: 0,
             held: 0,
+            released: false,
             has_slacks: false,
             is_linearised,
             has_filter: false,

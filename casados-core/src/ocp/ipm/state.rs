@@ -36,8 +36,10 @@ pub(super) struct State<'c> {
     pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
-    /// Iterations one after the other in which complementarity is all that is left.
+    /// Iterations one after the other in which complementarity is all that is left, and stays.
     pub held: usize,
+    /// Whether slacks that multipliers held were released.
+    pub released: bool,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
     pub has_slacks: bool,
     /// Whether the QP is that at the iterate, with whatever multipliers.
