@@ -10,6 +10,7 @@ mod guesses;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;
+mod units;
 
 use casados::ocp::{Exact, Formulation, HeapOcp, HeapSqp, Iteration, Outcome, Part, SecondOrder, Status};
 use casados::qp::{Side, residuals};

@@ -50,8 +50,8 @@ pub struct IpmOptions {
     /// max over i of  unit_i max(|∂f/∂v_i|, |∂²f/∂v_i²| max(|v_i|, unit_i))
     /// ```
     ///
-    /// of the objective `f`. The unit of a variable is its largest guess or one of its bounds,
-    /// whichever is nearest to one, and that of a path or terminal constraint its largest gradient
+    /// of the objective `f`. The unit of a variable is its largest guess, one of its bounds or the
+    /// room between them, whichever is nearest to one, and that of a path or terminal constraint its largest gradient
     /// or distance from the bounds, over all stages; from 0.01 to 100 it is one. Iterates,
     /// residuals and the log are in the units of the problem. Without this all units are one.
     /// Default true.
