@@ -51,10 +51,10 @@ pub struct IpmOptions {
     /// ```
     ///
     /// of the objective `f`. The unit of a variable is its largest guess, one of its bounds or the
-    /// room between them, whichever is nearest to one, and that of a path or terminal constraint its largest gradient
-    /// or distance from the bounds, over all stages; from 0.01 to 100 it is one. Iterates,
-    /// residuals and the log are in the units of the problem. Without this all units are one.
-    /// Default true.
+    /// room between them, whichever is nearest to one, and that of a path or terminal constraint
+    /// its largest gradient or distance from the bounds, over all stages; from 0.01 to 100 it is
+    /// one. Iterates, residuals and the log are in the units of the problem. Without this all
+    /// units are one. Default true.
     pub scaling: bool,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,
