@@ -31,11 +31,6 @@ const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
-/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
-/// are no convergence of Newton's method.
-const HELD: usize = 3;
-const CRAWLS: f64 = 0.9;
-
 /// What follows the residuals of an iteration.
 enum Next {
     /// A search direction.
@@ -88,8 +83,7 @@ where
             Next::NewPenalties => return Ok(None),
             Next::End(status) => return Ok(Some(status)),
         }
-        if state.held >= HELD && !state.released {
-            (state.held, state.released) = (0, true);
+        if state.is_held() {
             self.release(ocp, state)?;
         }
         let direction = self.direction(ocp, state, row).and_then(|is_corrected| {
@@ -187,13 +181,7 @@ where
         let Relative { barrier, error, others } =
             relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
-        // Complementarity is all that is left, and no smaller `μ` can make it less.
-        let tolerance = self.options.tolerance;
-        let least = barrier::least(self.options.least_error(state.lengths.sizes.force));
-        let is_last = state.mu <= 2.0 * least * state.lengths.sizes.force;
-        let is_held = is_last && others <= tolerance && error > tolerance.max(CRAWLS * state.error);
-        state.error = error;
-        state.held = if is_held { state.held + 1 } else { 0 };
+        state.judge(error, others, &self.options);
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
@@ -206,21 +194,6 @@ where
         }
         let acceptable = size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
-        Ok(())
-    }
-
-    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
-    fn release<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_>,
-    ) -> Result<(), OcpError> {
-        let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        barrier::release(&mut iterate.sides, state.mu, self.options.tolerance);
-        let mut view = solution.view_mut();
-        iterate.store(&mut view);
-        evaluate(&mut iterate, &mut view);
         Ok(())
     }
 

@@ -1,11 +1,11 @@
-//! Multipliers: the first ones, and those that the Hessian has.
+//! Multipliers: the first ones, those that the Hessian has, and those that hold slacks.
 
 use super::lengths::Lengths;
-use super::newton::{attach, attach_to_new, evaluate_values, least_squares};
+use super::newton::{attach, attach_to_new, evaluate, evaluate_values, least_squares};
 use super::start::begin_sides;
 use super::state::State;
 use super::work::Work;
-use super::{Ipm, scaling};
+use super::{Ipm, barrier, scaling};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
@@ -80,6 +80,21 @@ where
         iterate.take_point(&view);
         iterate.store(&mut view);
         assign(iterate.sides.multiplier, work.slacks);
+        Ok(())
+    }
+
+    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
+    pub(super) fn release<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_>,
+    ) -> Result<(), OcpError> {
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        barrier::release(&mut iterate.sides, state.mu, self.options.tolerance);
+        let mut view = solution.view_mut();
+        iterate.store(&mut view);
+        evaluate(&mut iterate, &mut view);
         Ok(())
     }
 }

@@ -13,6 +13,11 @@ use crate::scalar::Real;
 /// `γ_φ`
 pub(super) const MARGIN: f64 = 1e-8;
 
+/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
+/// are no convergence of Newton's method.
+const HELD: usize = 3;
+const CRAWLS: f64 = 0.9;
+
 /// What a run remembers from one iteration to the next.
 pub(super) struct State<'c> {
     /// Whether the time is over.
@@ -73,6 +78,23 @@ impl State<'_> {
             self.mu = mu;
             self.filter.clear();
         }
+    }
+
+    /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
+    /// that is all that is left, and stays, no smaller `μ` can make it less.
+    pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
+        let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
+        let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
+        let stays = error > tolerance.max(CRAWLS * self.error);
+        self.held = if is_last && others <= tolerance && stays { self.held + 1 } else { 0 };
+        self.error = error;
+    }
+
+    /// Whether multipliers hold slacks, which is said once.
+    pub fn is_held(&mut self) -> bool {
+        let is_held = self.held >= HELD && !self.released;
+        self.released |= is_held;
+        is_held
     }
 
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
