@@ -7,6 +7,7 @@ mod data;
 
 mod astray;
 mod guesses;
+mod held;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;
