@@ -40,6 +40,16 @@ pub(in crate::irk) struct Summed<'a, E, const S: usize, const W: usize> {
     pub ahead: Ahead<'a, E>,
 }
 
+impl<E: Field, const S: usize, const W: usize> Summed<'_, E, S, W> {
+    /// Adds all unknowns of a panel.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn all<A: Arithmetic>(&mut self, packets: &[Packet<E, S, W>]) {
+        for (slot, packet) in packets.iter().enumerate() {
+            self.on_solved::<A>(slot, packet);
+        }
+    }
+}
+
 impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_solved<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {

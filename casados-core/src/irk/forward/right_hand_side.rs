@@ -24,6 +24,13 @@ pub(in crate::irk) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
+    /// Places all of them.
+    #[inline(always)]
+    pub fn all<A: Arithmetic>(&mut self) {
+        each_row::<A, _>(self);
+        each_row::<A, _>(&mut ScatterDependents(self));
+    }
+
     /// Subtracts from one column of an equation.
     #[inline(always)]
     fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
@@ -39,26 +46,31 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
-    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`, and those by which other equations depend on
-    /// kinematic states.
-    const ROWS: usize =
-        M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] + M::STRUCTURE.elimination.dependents.len();
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let entries = const { M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] };
-        if row >= entries {
-            let Some(dependent) = M::STRUCTURE.elimination.dependents.get(row - entries) else { return };
-            let through = through::<M, E, S>(self.jacobian, self.nodes, dependent);
-            let Some((slot, velocity, products)) = through else { return };
-            if let Some(column) = direction::<M, E, D>(velocity) {
-                self.subtract(slot, column, &products);
-            }
-            return;
-        }
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
         let (None, Some(column)) = (kinematic::<M>(slot::<M>(r)), direction::<M, E, D>(c)) else { return };
         self.subtract(slot::<M>(r), column, values);
+    }
+}
+
+/// The entries by which other equations depend on kinematic states.
+struct ScatterDependents<'a, 'b, M: Dae, E: Plain, D, const S: usize>(&'a mut Scatter<'b, M, E, D, S>);
+
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDependents<'_, '_, M, E, D, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.dependents.len();
+    const INSTRUCTIONS: usize = 3 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some(dependent) = M::STRUCTURE.elimination.dependents.get(row) else { return };
+        let through = through::<M, E, S>(self.0.jacobian, self.0.nodes, dependent);
+        let Some((slot, velocity, products)) = through else { return };
+        if let Some(column) = direction::<M, E, D>(velocity) {
+            self.0.subtract(slot, column, &products);
+        }
     }
 }
 
@@ -155,13 +167,10 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
 #[inline(always)]
 fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
     let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-    if variable < 2 * nx {
-        D::column(variable - nx)
-    } else if variable < 2 * nx + nz {
-        None
-    } else {
-        D::column(variable - nx - nz)
+    if variable >= 2 * nx && variable < 2 * nx + nz {
+        return None;
     }
+    D::column(if variable < 2 * nx { variable - nx } else { variable - nx - nz })
 }
 
 /// The same of a panel, whatever `V_n` is.

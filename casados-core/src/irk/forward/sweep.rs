@@ -11,7 +11,7 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Visitor, coupling, dispatch, each_row, is_long,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, coupling, dispatch, is_long,
     is_short, kernels, sweeps,
 };
 use crate::memory::Fallback;
@@ -252,12 +252,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
         if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
-            each_row::<A, _>(&mut Scatter::<M, E, D, S> {
-                jacobian,
-                nodes: &nodes,
-                dy,
-                directions: PhantomData,
-            });
+            Scatter::<M, E, D, S> { jacobian, nodes: &nodes, dy, directions: PhantomData }.all::<A>();
         }
         let Self { coefficients, h, .. } = self;
         let mut minus_weights = coefficients.b;
@@ -290,16 +285,18 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         self.before::<A, W>(column, &shared.nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
-        if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
-            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
-        } else if self.phase == Phase::Whole {
-            let ahead = match &self.result {
-                Some(to) if self.distant => Ahead(to.following::<W>(column)),
-                _ => Ahead(&[]),
-            };
-            let sums = &mut *self.sums;
-            let visitor = &mut Summed { sums, minus_weights, ahead };
-            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
+        if self.phase == Phase::Whole {
+            if const { Self::sums_late::<A>() } {
+                sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
+            } else {
+                let ahead = match &self.result {
+                    Some(to) if self.distant => Ahead(to.following::<W>(column)),
+                    _ => Ahead(&[]),
+                };
+                let sums = &mut *self.sums;
+                let visitor = &mut Summed { sums, minus_weights, ahead };
+                sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
+            }
         }
         self.after::<A, W>(column, minus_weights, shared);
     }
@@ -337,15 +334,15 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
             return;
         }
-        let late = self.phase == Phase::After || const { Self::sums_late::<A>() };
         let (jacobian, directions) = (self.jacobian, self.directions);
         let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
         let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
-        if late {
+        if const { Self::sums_late::<A>() } {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
-            for (slot, packet) in dy.iter().enumerate() {
-                sums.on_solved::<A>(slot, packet);
-            }
+            sums.all::<A>(dy);
+        } else if self.phase == Phase::After {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
+            sums.all::<A>(dy);
         } else {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
         }

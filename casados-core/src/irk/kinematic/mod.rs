@@ -192,10 +192,10 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for
         let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
             return;
         };
-        let (from, to) = if WHAT == RECONSTRUCT { (velocity, state) } else { (state, velocity) };
+        let (from, to) = if const { WHAT == RECONSTRUCT } { (velocity, state) } else { (state, velocity) };
         let Some(from) = rows.get(from) else { return };
         let mut moved = [[E::from_f64(0.0); W]; S];
-        if WHAT == RECONSTRUCT {
+        if const { WHAT == RECONSTRUCT } {
             subtract::<A, E, S, W>(&mut moved, minus_ha, from);
         } else {
             subtract_transposed::<A, E, S, W>(&mut moved, minus_ha, from);
@@ -226,7 +226,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
         if of.first {
             *sum = [[E::from_f64(0.0); W]; S];
         }
-        if WHAT == ELIMINATE {
+        if const { WHAT == ELIMINATE } {
             if of.first {
                 subtract::<A, E, S, W>(sum, minus_ha, &own);
             }

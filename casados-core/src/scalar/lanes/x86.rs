@@ -48,7 +48,7 @@ macro_rules! memory {
         pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
             // SAFETY: the array is as large as the register that is loaded whole.
             unsafe {
-                if N == $width {
+                if const { N == $width } {
                     $load(cell.as_ptr())
                 } else {
                     $set($(cell[if $index < N { $index } else { N - 1 }]),*)
@@ -57,6 +57,10 @@ macro_rules! memory {
         }
         #[inline(always)]
         pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
+            if const { N == $width } {
+                // SAFETY: the array is as large as the register.
+                return unsafe { $store(cell.as_mut_ptr(), a) };
+            }
             let mut all = [0.0; $width];
             // SAFETY: the array is as large as the register.
             unsafe { $store(all.as_mut_ptr(), a) };
