@@ -107,6 +107,10 @@ pub trait Array<T>:
     fn flat(arrays: &[Self]) -> &[T];
     /// The elements of arrays, one array after the other.
     fn flat_mut(arrays: &mut [Self]) -> &mut [T];
+    /// `W` elements, from one on.
+    fn chunk<const W: usize>(&self, begin: usize) -> Option<&[T; W]>;
+    /// `W` elements, from one on.
+    fn chunk_mut<const W: usize>(&mut self, begin: usize) -> Option<&mut [T; W]>;
 }
 
 impl<T: Plain, const N: usize> Array<T> for [T; N] {
@@ -122,6 +126,26 @@ impl<T: Plain, const N: usize> Array<T> for [T; N] {
     #[inline(always)]
     fn flat_mut(arrays: &mut [Self]) -> &mut [T] {
         arrays.as_flattened_mut()
+    }
+    #[inline(always)]
+    fn chunk<const W: usize>(&self, begin: usize) -> Option<&[T; W]> {
+        if const { N == W } {
+            return self.first_chunk();
+        }
+        match self.get(begin..) {
+            Some(columns) => columns.first_chunk(),
+            None => None,
+        }
+    }
+    #[inline(always)]
+    fn chunk_mut<const W: usize>(&mut self, begin: usize) -> Option<&mut [T; W]> {
+        if const { N == W } {
+            return self.first_chunk_mut();
+        }
+        match self.get_mut(begin..) {
+            Some(columns) => columns.first_chunk_mut(),
+            None => None,
+        }
     }
 }
 

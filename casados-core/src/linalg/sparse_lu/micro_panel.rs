@@ -15,7 +15,7 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     let mut packet = [[E::from_f64(0.0); W]; S];
     if let Some(row) = rows.get(slot) {
         for (packet, row) in packet.iter_mut().zip(row) {
-            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
+            if let Some(columns) = row.chunk(column) {
                 *packet = *columns;
             }
         }
@@ -37,9 +37,7 @@ pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize,
         return;
     }
     for (elements, other) in block.iter().zip(other) {
-        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else {
-            continue;
-        };
+        let Some(other) = other.chunk(column) else { continue };
         for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
             A::subtract_row(packet, element, other);
         }
@@ -72,8 +70,7 @@ pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
 ) {
     if let Some(row) = rows.get_mut(slot) {
         for (packet, row) in packet.iter().zip(row) {
-            let columns = row.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut());
-            if let Some(columns) = columns {
+            if let Some(columns) = row.chunk_mut(column) {
                 *columns = *packet;
             }
         }

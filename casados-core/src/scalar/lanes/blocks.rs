@@ -159,6 +159,15 @@ macro_rules! blocks {
             _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
+            // One register, written without a loop: most rows are that, and compile in less time.
+            if const { WIDE && W == $most } {
+                let (t, r) = (Wide::<W>::load(target), Wide::<W>::load(row));
+                return t.subtract_product(Wide::<W>::splat(factor), r).store(target);
+            }
+            if const { W == $more } {
+                let (t, r) = (Register::<W>::load(target), Register::<W>::load(row));
+                return t.subtract_product(Register::<W>::splat(factor), r).store(target);
+            }
             if const { WIDE && W.is_multiple_of($most) } {
                 let (target, _) = target.as_chunks_mut::<$most>();
                 let (row, _) = row.as_chunks::<$most>();
@@ -170,12 +179,17 @@ macro_rules! blocks {
             }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let (row, row_rest) = row.as_chunks::<$more>();
-            for (target, row) in target.iter_mut().zip(row) {
-                let (t, r) = (Register::<$more>::load(target), Register::<$more>::load(row));
-                t.subtract_product(Register::<$more>::splat(factor), r).store(target);
+            if const { W > $more } {
+                let factor = Register::<$more>::splat(factor);
+                for (target, row) in target.iter_mut().zip(row) {
+                    let (t, r) = (Register::<$more>::load(target), Register::<$more>::load(row));
+                    t.subtract_product(factor, r).store(target);
+                }
             }
-            for (target, &element) in target_rest.iter_mut().zip(row_rest) {
-                *target = target.subtract_product(factor, element);
+            if const { !W.is_multiple_of($more) } {
+                for (target, &element) in target_rest.iter_mut().zip(row_rest) {
+                    *target = target.subtract_product(factor, element);
+                }
             }
         }
         #[inline(always)]
