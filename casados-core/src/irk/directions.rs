@@ -117,8 +117,10 @@ impl<M: Dae> Identity<M> {
     /// The column of a direction.
     #[inline(always)]
     pub(crate) fn column(index: usize) -> Option<usize> {
-        let column = M::STRUCTURE.column_of_direction.get(index).copied().unwrap_or(NO_COLUMN);
-        (column != NO_COLUMN).then_some(column as usize)
+        match M::STRUCTURE.column_of_direction.get(index) {
+            Some(&NO_COLUMN) | None => None,
+            Some(&column) => Some(column as usize),
+        }
     }
 }
 

@@ -52,8 +52,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let (None, Some(column)) = (kinematic::<M>(slot::<M>(r)), direction::<M, E, D>(c)) else { return };
-        self.subtract(slot::<M>(r), column, values);
+        let slot = slot::<M>(r);
+        if kinematic::<M>(slot).is_none()
+            && let Some(column) = direction::<M, E, D>(c)
+        {
+            self.subtract(slot, column, values);
+        }
     }
 }
 
@@ -82,9 +86,9 @@ fn through<M: Dae, E: Lanes, const S: usize>(
     nodes: &[E; S],
     of: &Dependent,
 ) -> Option<(usize, usize, [E; S])> {
-    let kinematic = kinematic::<M>(of.state as usize)?;
-    let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
-    let (slot, &(mut products), derivative) = dependence::<M, E, S>(of, jacobian)?;
+    let Some(kinematic) = kinematic::<M>(of.state as usize) else { return None };
+    let Some(minus_c) = minus_c::<M, E, S>(kinematic, jacobian) else { return None };
+    let Some((slot, &(mut products), derivative)) = dependence::<M, E, S>(of, jacobian) else { return None };
     for (product, &node) in products.iter_mut().zip(nodes) {
         let factor = if derivative { minus_c } else { node * minus_c };
         *product = -(*product * factor);

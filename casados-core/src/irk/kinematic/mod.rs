@@ -52,7 +52,10 @@ pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
     of: &Kinematic,
     jacobian: &M::Jacobian<[E; S]>,
 ) -> Option<E> {
-    jacobian.as_ref().get(of.entry as usize)?.first().copied()
+    match jacobian.as_ref().get(of.entry as usize) {
+        Some(entry) => entry.first().copied(),
+        None => None,
+    }
 }
 
 /// An entry by which an equation depends on a kinematic state: its slot, its values, whether it
@@ -63,7 +66,7 @@ pub(super) fn dependence<'a, M: Dae, E: Plain, const S: usize>(
     jacobian: &'a M::Jacobian<[E; S]>,
 ) -> Option<(usize, &'a [E; S], bool)> {
     let index = of.entry as usize;
-    let (row, _, values) = entry::<M, _>(jacobian, index)?;
+    let Some((row, _, values)) = entry::<M, _>(jacobian, index) else { return None };
     Some((slot::<M>(row), values, index < M::STRUCTURE.blocks[1]))
 }
 

@@ -15,11 +15,14 @@ mod lines;
 /// Whether there are lines at all.
 const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
-/// So many rows are left to the optimiser to unroll.
-const CHUNK: usize = 8;
+/// So many rows are left to the optimiser to unroll: as often it looks what constants simplify.
+const CHUNK: usize = 10;
 
 /// So many chunks, and so many pivots, can be written one after the other.
 const MOST: usize = 48;
+
+/// So many rows.
+const MOST_ROWS: usize = 384;
 
 /// They are not longer than so many instructions: they share the nearest cache, and take long to
 /// compile.
@@ -48,7 +51,7 @@ pub trait AtRow {
 /// Whether the rows of a table are unrolled.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
     let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
-    WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= most
+    WANTED && A::FUSED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
 }
 
 /// All rows of a table.

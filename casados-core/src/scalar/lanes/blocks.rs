@@ -13,23 +13,17 @@ macro_rules! blocks {
             known: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::$avx2 as Register;
-            if let (Some([t0, t1]), Some([l0, l1]), Some([r0, r1])) =
-                (target.first_chunk::<2>(), left.first_chunk::<2>(), right.first_chunk::<2>())
-                && let (&[t00, t10, ..], &[t01, t11, ..]) = (&t0[..], &t1[..])
-                && let (&[l00, l10, ..], &[l01, l11, ..]) = (&l0[..], &l1[..])
-                && let (&[r00, r10, ..], &[r01, r11, ..]) = (&r0[..], &r1[..])
-                && const { S == 2 }
-            {
+            if const { S == 2 } {
                 // A whole block fits a register.
-                let mut sum = Register::<4>::load(&[t00, t10, t01, t11]);
-                let columns = [[l00, l10, l00, l10], [l01, l11, l01, l11]];
-                let factors = [[r00, r00, r01, r01], [r10, r10, r11, r11]];
-                for (column, factor) in columns.iter().zip(&factors) {
-                    sum = sum.subtract_product(Register::<4>::load(column), Register::<4>::load(factor));
-                }
-                let mut block = [0.0; 4];
-                sum.store(&mut block);
-                target.as_flattened_mut().copy_from_slice(&block);
+                let Some(target) = target.as_flattened_mut().first_chunk_mut::<4>() else { return };
+                let Some(&[l00, l10, l01, l11]) = left.as_flattened().first_chunk() else { return };
+                let Some(&[r00, r10, r01, r11]) = right.as_flattened().first_chunk() else { return };
+                let (first, second) = ([l00, l10, l00, l10], [l01, l11, l01, l11]);
+                let (by_first, by_second) = ([r00, r00, r01, r01], [r10, r10, r11, r11]);
+                Register::<4>::load(target)
+                    .subtract_product(Register::load(&first), Register::load(&by_first))
+                    .subtract_product(Register::load(&second), Register::load(&by_second))
+                    .store(target);
                 return;
             }
             if const { WIDE && S == 4 } {
@@ -65,10 +59,10 @@ macro_rules! blocks {
             _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::$avx2 as Register;
-            if let (&[a, b, c, d], [to]) =
-                (block.as_flattened(), target.as_flattened_mut().as_chunks_mut::<4>().0)
-            {
-                Register::<4>::load(&[a, b, c, d]).store(to);
+            if const { S == 2 } {
+                let Some(block) = block.as_flattened().first_chunk::<4>() else { return };
+                let Some(target) = target.as_flattened_mut().first_chunk_mut() else { return };
+                Register::<4>::load(block).store(target);
             } else {
                 *target = *block;
             }

@@ -51,7 +51,7 @@ macro_rules! memory {
                 if const { N == $width } {
                     $load(cell.as_ptr())
                 } else {
-                    $set($(cell[if $index < N { $index } else { N - 1 }]),*)
+                    $set($(cell[const { if $index < N { $index } else { N - 1 } }]),*)
                 }
             }
         }

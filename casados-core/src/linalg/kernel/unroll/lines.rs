@@ -46,7 +46,7 @@ pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
 /// A pivot.
 macro_rules! pivot {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
-        $(if Nth::<$M, $n>::EXISTS && let Some((pivot, others, updates)) = Nth::<$M, $n>::PIVOT {
+        $(if const { Nth::<$M, $n>::EXISTS } && let Some((pivot, others, updates)) = Nth::<$M, $n>::PIVOT {
             $visit.at::<$A>(pivot, others, updates);
         })*
     };
@@ -116,8 +116,8 @@ mod tests {
     fn a_line_has_every_row_once() {
         rows::<0>();
         rows::<1>();
-        rows::<8>();
-        rows::<9>();
+        rows::<CHUNK>();
+        rows::<{ CHUNK + 1 }>();
         rows::<{ MOST * CHUNK - 1 }>();
         rows::<{ MOST * CHUNK }>();
     }
