@@ -5,7 +5,7 @@
 //! wants.
 
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
-use crate::scalar::Field;
+use crate::scalar::{Field, each};
 
 /// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
 pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
@@ -38,11 +38,9 @@ pub fn product<A: Arithmetic, E: Field, const S: usize>(
 /// `−packet`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S, W>) {
-    for row in packet {
-        for element in row {
-            *element = -*element;
-        }
-    }
+    each!(i < S => {
+        each!(w < W => { packet[i][w] = -packet[i][w]; });
+    });
 }
 
 /// `packet − block · other`
@@ -60,11 +58,9 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
         packet.as_flattened_mut().copy_from_slice(&target);
         return;
     }
-    for (column, other) in block.iter().zip(other) {
-        for (&element, packet) in column.iter().zip(packet.iter_mut()) {
-            A::subtract_row(packet, element, other);
-        }
-    }
+    each!(k < S => {
+        each!(i < S => { A::subtract_row(&mut packet[i], block[k][i], &other[k]); });
+    });
 }
 
 /// `packet − diag(scale) · other`
@@ -82,9 +78,7 @@ pub fn subtract_diagonal<A: Arithmetic, E: Field, const S: usize, const W: usize
         packet.as_flattened_mut().copy_from_slice(&target);
         return;
     }
-    for ((&scale, packet), other) in scale.iter().zip(packet).zip(other) {
-        A::subtract_row(packet, scale, other);
-    }
+    each!(i < S => { A::subtract_row(&mut packet[i], scale[i], &other[i]); });
 }
 
 /// `packet − blockᵀ · other`
@@ -94,11 +88,9 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
     block: &Block<E, S>,
     other: &Packet<E, S, W>,
 ) {
-    for i in 0..S {
-        for j in 0..S {
-            A::subtract_row(&mut packet[i], block[i][j], &other[j]);
-        }
-    }
+    each!(i < S => {
+        each!(j < S => { A::subtract_row(&mut packet[i], block[i][j], &other[j]); });
+    });
 }
 
 /// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane,

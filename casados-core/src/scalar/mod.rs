@@ -36,6 +36,20 @@ pub use tangent::Tangent;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 
+/// A loop over indices from zero on, for kernels: iterators over arrays would be inlined into each,
+/// and simplified there again, which takes most of the time to compile it. `continue` in its body
+/// goes round for ever.
+macro_rules! each {
+    ($index:ident < $count:expr => $body:block) => {{
+        let mut $index = 0;
+        while $index < $count {
+            $body
+            $index += 1;
+        }
+    }};
+}
+pub(crate) use each;
+
 /// A number that lies in memory as itself.
 macro_rules! own_cell {
     () => {

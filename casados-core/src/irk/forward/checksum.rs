@@ -3,7 +3,7 @@
 
 use crate::irk::directions::weight;
 use crate::linalg::{Ahead, Arithmetic, Packet, Visitor};
-use crate::scalar::Field;
+use crate::scalar::{Field, each};
 
 /// So many strands a sum over all columns has; of numbers that are registers themselves only the
 /// first is used.
@@ -53,9 +53,8 @@ impl<E: Field, const S: usize, const W: usize> Summed<'_, E, S, W> {
 impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn on_solved<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
-        for (strands, row) in self.sums.get_mut(slot).into_iter().flatten().zip(packet) {
-            accumulate::<A, E, W>(strands, self.minus_weights, row);
-        }
+        let Some(sums) = self.sums.get_mut(slot) else { return };
+        each!(i < S => { accumulate::<A, E, W>(&mut sums[i], self.minus_weights, &packet[i]); });
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pass(&mut self) {
@@ -82,19 +81,13 @@ pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
 ) {
     if const { is_one::<E>() } {
         let [sum, ..] = strands;
-        for (&weight, &element) in minus_weights.iter().zip(row) {
-            *sum = A::subtract(*sum, weight, element);
-        }
+        each!(w < W => { *sum = A::subtract(*sum, minus_weights[w], row[w]); });
         return;
     }
     let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
     // In registers: the optimiser cannot know that they do not overlap.
     let mut own = *strands;
-    for (weights, row) in weights.iter().zip(row) {
-        A::subtract_products(&mut own, weights, row);
-    }
-    for ((strand, &weight), &element) in own.iter_mut().zip(last_weights).zip(last) {
-        *strand = A::subtract(*strand, weight, element);
-    }
+    each!(n < const { W / STRANDS } => { A::subtract_products(&mut own, &weights[n], &row[n]); });
+    each!(n < const { W % STRANDS } => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
     *strands = own;
 }

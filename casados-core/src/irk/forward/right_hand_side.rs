@@ -10,7 +10,7 @@ use crate::irk::jacobian_entries::entry;
 use crate::irk::kinematic::{Forward, dependence, minus_c};
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
 use crate::model::{Dae, Dependent};
-use crate::scalar::Lanes;
+use crate::scalar::{Lanes, each};
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
 
@@ -37,11 +37,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
         let nk = M::Shape::NK;
         let (begin, width) = panel_of::<E>(column, D::COUNT, S);
         let place = begin * nk * S + (column - begin);
-        for (stage, &value) in values.iter().enumerate() {
-            if let Some(to) = self.dy.get_mut(place + (slot * S + stage) * width) {
-                *to = *to - value;
+        each!(i < S => {
+            if let Some(to) = self.dy.get_mut(place + (slot * S + i) * width) {
+                *to = *to - values[i];
             }
-        }
+        });
     }
 }
 
@@ -89,10 +89,10 @@ fn through<M: Dae, E: Lanes, const S: usize>(
     let Some(kinematic) = kinematic::<M>(of.state as usize) else { return None };
     let Some(minus_c) = minus_c::<M, E, S>(kinematic, jacobian) else { return None };
     let Some((slot, &(mut products), derivative)) = dependence::<M, E, S>(of, jacobian) else { return None };
-    for (product, &node) in products.iter_mut().zip(nodes) {
-        let factor = if derivative { minus_c } else { node * minus_c };
-        *product = -(*product * factor);
-    }
+    each!(i < S => {
+        let factor = if derivative { minus_c } else { nodes[i] * minus_c };
+        products[i] = -(products[i] * factor);
+    });
     Some((slot, kinematic.velocity as usize, products))
 }
 
@@ -234,15 +234,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     fn subtract<A: Arithmetic>(&self, packet: &mut Packet<E, S, W>, state: usize, values: &[E; S]) {
         if kinematic::<M>(state).is_some() {
             let Some(x) = self.dy.get(state) else { return };
-            for ((row, &value), x) in packet.iter_mut().zip(values).zip(x) {
-                A::subtract_row(row, value, x);
-            }
+            each!(i < S => { A::subtract_row(&mut packet[i], values[i], &x[i]); });
             return;
         }
         let Some(v) = self.kinematic.v.get(state) else { return };
-        for (row, &value) in packet.iter_mut().zip(values) {
-            A::subtract_row(row, value, v);
-        }
+        each!(i < S => { A::subtract_row(&mut packet[i], values[i], v); });
     }
 
     /// The equation that follows that of the entry before this one.

@@ -25,7 +25,7 @@ use crate::linalg::{
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae, Dependent, Kinematic};
-use crate::scalar::Lanes;
+use crate::scalar::{Lanes, each};
 use crate::shape::{Plain, Shape};
 
 /// How many rows the table of kinematic states has.
@@ -354,9 +354,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, co
                     packet = [*v; S];
                     subtract::<A, E, S, W>(&mut packet, minus_ha, dk);
                 }
-                for element in packet.as_flattened_mut() {
-                    *element = -(minus_c * *element);
-                }
+                each!(i < S => {
+                    each!(w < W => { packet[i][w] = -(minus_c * packet[i][w]); });
+                });
             }
             _ => packet = [forward.own::<A>(of); S],
         }

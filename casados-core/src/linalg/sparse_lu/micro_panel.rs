@@ -2,7 +2,7 @@
 
 use crate::linalg::block::{Packet, subtract};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
-use crate::scalar::Field;
+use crate::scalar::{Field, each};
 use crate::shape::{Array, Plain};
 
 /// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
@@ -14,11 +14,11 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
 ) -> Packet<E, S, W> {
     let mut packet = [[E::from_f64(0.0); W]; S];
     if let Some(row) = rows.get(slot) {
-        for (packet, row) in packet.iter_mut().zip(row) {
-            if let Some(columns) = row.chunk(column) {
-                *packet = *columns;
+        each!(i < S => {
+            if let Some(columns) = row[i].chunk(column) {
+                packet[i] = *columns;
             }
-        }
+        });
     }
     packet
 }
@@ -36,12 +36,11 @@ pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize,
         subtract::<A, E, S, W>(packet, block, &other);
         return;
     }
-    for (elements, other) in block.iter().zip(other) {
-        let Some(other) = other.chunk(column) else { continue };
-        for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
-            A::subtract_row(packet, element, other);
+    each!(k < S => {
+        if let Some(other) = other[k].chunk(column) {
+            each!(i < S => { A::subtract_row(&mut packet[i], block[k][i], other); });
         }
-    }
+    });
 }
 
 /// In loops: a closure would be compiled for every machine.
@@ -69,10 +68,10 @@ pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     packet: &Packet<E, S, W>,
 ) {
     if let Some(row) = rows.get_mut(slot) {
-        for (packet, row) in packet.iter().zip(row) {
-            if let Some(columns) = row.chunk_mut(column) {
-                *columns = *packet;
+        each!(i < S => {
+            if let Some(columns) = row[i].chunk_mut(column) {
+                *columns = packet[i];
             }
-        }
+        });
     }
 }

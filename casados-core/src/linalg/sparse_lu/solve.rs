@@ -291,9 +291,6 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for (block, other) in beside(*factors, pivot.upper()) {
-            if other >= rows.len() {
-                continue;
-            }
             let Some(other) = rows.get(other) else { continue };
             subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
         }

@@ -118,15 +118,20 @@ macro_rules! blocks {
                 }
                 return;
             }
+            if const { W == $more } {
+                let (t, a, b) = (Register::<W>::load(target), Register::<W>::load(a), Register::<W>::load(b));
+                return t.subtract_product(a, b).store(target);
+            }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<$more>(), b.as_chunks::<$more>());
-            for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
-                let (t, a, b) =
-                    (Register::<$more>::load(target), Register::<$more>::load(a), Register::<$more>::load(b));
-                t.subtract_product(a, b).store(target);
-            }
-            for ((target, &a), &b) in target_rest.iter_mut().zip(a_rest).zip(b_rest) {
-                *target = target.subtract_product(a, b);
+            crate::scalar::each!(n < const { W / $more } => {
+                let (t, a, b) = (Register::<$more>::load(&target[n]), Register::load(&a[n]), Register::load(&b[n]));
+                t.subtract_product(a, b).store(&mut target[n]);
+            });
+            if const { !W.is_multiple_of($more) } {
+                for ((target, &a), &b) in target_rest.iter_mut().zip(a_rest).zip(b_rest) {
+                    *target = target.subtract_product(a, b);
+                }
             }
         }
         #[inline(always)]
@@ -173,13 +178,11 @@ macro_rules! blocks {
             }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let (row, row_rest) = row.as_chunks::<$more>();
-            if const { W > $more } {
-                let factor = Register::<$more>::splat(factor);
-                for (target, row) in target.iter_mut().zip(row) {
-                    let (t, r) = (Register::<$more>::load(target), Register::<$more>::load(row));
-                    t.subtract_product(factor, r).store(target);
-                }
-            }
+            let factor_of_each = Register::<$more>::splat(factor);
+            crate::scalar::each!(n < const { W / $more } => {
+                let (t, r) = (Register::<$more>::load(&target[n]), Register::<$more>::load(&row[n]));
+                t.subtract_product(factor_of_each, r).store(&mut target[n]);
+            });
             if const { !W.is_multiple_of($more) } {
                 for (target, &element) in target_rest.iter_mut().zip(row_rest) {
                     *target = target.subtract_product(factor, element);
