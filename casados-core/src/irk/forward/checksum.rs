@@ -87,7 +87,7 @@ pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
     // In registers: the optimiser cannot know that they do not overlap.
     let mut own = *strands;
-    each!(n < const { W / STRANDS } => { A::subtract_products(&mut own, &weights[n], &row[n]); });
-    each!(n < const { W % STRANDS } => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
+    each!(n < W / STRANDS => { A::subtract_products(&mut own, &weights[n], &row[n]); });
+    each!(n < W % STRANDS => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
     *strands = own;
 }

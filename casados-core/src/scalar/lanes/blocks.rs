@@ -124,7 +124,7 @@ macro_rules! blocks {
             }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<$more>(), b.as_chunks::<$more>());
-            crate::scalar::each!(n < const { W / $more } => {
+            crate::scalar::each!(n < W / $more => {
                 let (t, a, b) = (Register::<$more>::load(&target[n]), Register::load(&a[n]), Register::load(&b[n]));
                 t.subtract_product(a, b).store(&mut target[n]);
             });
@@ -179,7 +179,7 @@ macro_rules! blocks {
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let (row, row_rest) = row.as_chunks::<$more>();
             let factor_of_each = Register::<$more>::splat(factor);
-            crate::scalar::each!(n < const { W / $more } => {
+            crate::scalar::each!(n < W / $more => {
                 let (t, r) = (Register::<$more>::load(&target[n]), Register::<$more>::load(&row[n]));
                 t.subtract_product(factor_of_each, r).store(&mut target[n]);
             });
