@@ -22,8 +22,8 @@ pub(crate) fn entries<'a, V>(
 #[inline(always)]
 pub(crate) fn entry<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Option<(usize, usize, &V)> {
     let Pattern { rows, columns } = M::STRUCTURE.jacobian;
-    let Some(&row) = rows.get(index) else { return None };
-    let Some(&column) = columns.get(index) else { return None };
-    let Some(value) = jacobian.as_ref().get(index) else { return None };
+    let &row = rows.get(index)?;
+    let &column = columns.get(index)?;
+    let value = jacobian.as_ref().get(index)?;
     Some((row as usize, column as usize, value))
 }

@@ -86,9 +86,9 @@ fn through<M: Dae, E: Lanes, const S: usize>(
     nodes: &[E; S],
     of: &Dependent,
 ) -> Option<(usize, usize, [E; S])> {
-    let Some(kinematic) = kinematic::<M>(of.state as usize) else { return None };
-    let Some(minus_c) = minus_c::<M, E, S>(kinematic, jacobian) else { return None };
-    let Some((slot, &(mut products), derivative)) = dependence::<M, E, S>(of, jacobian) else { return None };
+    let kinematic = kinematic::<M>(of.state as usize)?;
+    let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
+    let (slot, &(mut products), derivative) = dependence::<M, E, S>(of, jacobian)?;
     each!(i < S => {
         let factor = if derivative { minus_c } else { nodes[i] * minus_c };
         products[i] = -(products[i] * factor);

@@ -11,8 +11,8 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, coupling, dispatch, is_long,
-    is_short, kernels, sweeps,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, coupling, dispatch, is_long, is_short, kernels,
+    sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -337,14 +337,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         let (jacobian, directions) = (self.jacobian, self.directions);
         let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
         let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
-        if const { Self::sums_late::<A>() } {
-            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
-            sums.all::<A>(dy);
-        } else if self.phase == Phase::After {
-            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
-            sums.all::<A>(dy);
-        } else {
+        if const { !Self::sums_late::<A>() } && self.phase != Phase::After {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
+        } else {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
+            sums.all::<A>(dy);
         }
         let unit = self.first && D::SPARSE;
         if !unit {

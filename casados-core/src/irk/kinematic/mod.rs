@@ -66,7 +66,7 @@ pub(super) fn dependence<'a, M: Dae, E: Plain, const S: usize>(
     jacobian: &'a M::Jacobian<[E; S]>,
 ) -> Option<(usize, &'a [E; S], bool)> {
     let index = of.entry as usize;
-    let Some((row, _, values)) = entry::<M, _>(jacobian, index) else { return None };
+    let (row, _, values) = entry::<M, _>(jacobian, index)?;
     Some((slot::<M>(row), values, index < M::STRUCTURE.blocks[1]))
 }
 

@@ -15,9 +15,6 @@ mod lines;
 /// Whether there are lines at all.
 const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
-/// So many rows are left to the optimiser to unroll: as often it looks what constants simplify.
-const CHUNK: usize = 10;
-
 /// So many chunks, and so many pivots, can be written one after the other.
 const MOST: usize = 48;
 

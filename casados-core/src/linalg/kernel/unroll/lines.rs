@@ -4,10 +4,13 @@
 //! their constants: without optimisation that took most of its time.
 #![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
 
-use super::{AtPivot, AtRow, CHUNK, updates_of};
+use super::{AtPivot, AtRow, updates_of};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Dae, Elimination, Pivot, Update};
 use core::marker::PhantomData;
+
+/// So many rows are left to the optimiser to unroll: as often it looks what constants simplify.
+const CHUNK: usize = 10;
 
 /// One expression for each number from zero on, or down to zero.
 macro_rules! forwards {
