@@ -13,6 +13,7 @@ mod lost;
 mod models {
     pub mod awe;
     pub mod chain;
+    pub mod heat;
     pub mod pendulum;
 }
 
@@ -21,6 +22,7 @@ mod analytic;
 mod erk;
 mod erk_reference;
 mod examples;
+mod heat;
 mod kinematic;
 mod panels;
 mod tube;
