@@ -1,6 +1,9 @@
 //! A problem on a horizon is made, in memory of its own or in given one.
 
+use super::constraint::ConstraintsOf;
+use super::cost::CostOf;
 use super::data;
+use super::dynamics::Dynamics;
 use super::error::{OcpError, Part};
 use super::horizon::Horizon;
 #[cfg(feature = "alloc")]
@@ -22,7 +25,11 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
-        Self: Formulation<T>,
+        D: Dynamics<T>,
+        L: CostOf<D, T>,
+        E: CostOf<D, T>,
+        G: ConstraintsOf<D, T>,
+        H: ConstraintsOf<D, T>,
     {
         let intervals = horizon.intervals();
         let mut dims = Vec::new();
@@ -79,7 +86,11 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         memory: &'a mut [T],
     ) -> Result<Ocp<Self, T, &'a [StageDims], &'a mut [T]>, OcpError>
     where
-        Self: Formulation<T>,
+        D: Dynamics<T>,
+        L: CostOf<D, T>,
+        E: CostOf<D, T>,
+        G: ConstraintsOf<D, T>,
+        H: ConstraintsOf<D, T>,
     {
         let intervals = horizon.intervals();
         let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));

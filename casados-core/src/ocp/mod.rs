@@ -139,9 +139,13 @@ mod wrapped;
 pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
+#[doc(hidden)]
+pub use constraint::ConstraintsOf;
 pub use constraint::{Constraint, Constraints};
 pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
 pub use convexify::Convexification;
+#[doc(hidden)]
+pub use cost::CostOf;
 pub use cost::{Cost, GeneralCost};
 pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
 pub use dynamics::{Dynamics, SecondOrder};
