@@ -115,8 +115,8 @@ fn rod_by_the_exponential() -> Test {
     let mut irk = Irk::<Rod<N>, RadauIIA<5>>::new(options(40))?;
     irk.set_parameters(&vector![AIR])?;
     let forward = irk.forward(&x0, &vector![u], h)?;
-    // |eᶻ − R(z)| ≤ c |z|¹⁰ with c = 5! 4! / (9! 10!) in each step, for z ≤ 0; and rounding: of sums
-    // of N terms by vectors that are off by N units, and of each step.
+    // |eᶻ − R(z)| ≤ c |z|¹⁰ with c = 5! 4! / (9! 10!) in each step, for z ≤ 0; and rounding: of
+    // sums of N terms by vectors that are off by N units, and of each step.
     let z = h / 40.0 * values.amax();
     let tolerance = 40.0 * 2.2e-9 * z.powi(10) + ((N * N) as f64 + 40.0) * f64::EPSILON;
     let state = (forward.x - end).amax() / end.amax();

@@ -66,8 +66,8 @@ pub trait Constraints<S: Shape, T: Real> {
     fn name(row: usize) -> (&'static str, usize);
 }
 
-/// Constraints of the variables that dynamics have. It names the dynamics in messages of the compiler,
-/// where the other trait has dimensions as numbers.
+/// Constraints of the variables that dynamics have. Messages of the compiler name the dynamics,
+/// where those of the other trait have dimensions as numbers.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a constraint for this model with numbers `{T}`",
     label = "its function has other arguments than the model",

@@ -106,8 +106,8 @@ pub struct At<'a, T> {
     pub(super) from: &'a [T],
 }
 
-/// A cost of the variables that dynamics have. It names the dynamics in messages of the compiler,
-/// where the other trait has dimensions as numbers.
+/// A cost of the variables that dynamics have. Messages of the compiler name the dynamics, where
+/// those of the other trait have dimensions as numbers.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a cost for this model with numbers `{T}`",
     label = "its function has other arguments than the model",
