@@ -233,6 +233,23 @@ pub enum Error {
 }
 
 /// Why a step was refused.
+///
+/// ```
+/// # use casados::error::Refusal;
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// The tangent: it has a pole at π/2.
+/// # #[ode]
+/// # fn tangent(x: f64) -> f64 { 1.0 + x * x }
+/// // x = tan t has a pole at π/2, which steps approach until none is short enough.
+/// let options = AdaptiveOptions { max_steps: 100_000, ..Default::default() };
+/// let mut radau = Adaptive::<Tangent, Radau>::new(options)?;
+/// let error = radau.solve(&vector![0.0], &vector![], 2.0).unwrap_err();
+/// let Error::StepSizeUnderflow { t, reason, .. } = error else { panic!("{error}") };
+/// assert!((t - core::f64::consts::FRAC_PI_2).abs() < 1e-3);
+/// println!("{reason:?}");
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -249,6 +266,24 @@ pub enum Refusal {
 }
 
 /// An algebraic state, and where Newton's method started for it.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// An acid: of its ions z the logarithm is needed.
+/// # #[dae]
+/// # fn acid(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot + z, z.ln() - x] }
+/// // No start value is given, and `z.ln()` has no value at zero.
+/// let mut irk = Irk::<Acid, RadauIIA<2>>::new(Options::default())?;
+/// let error = irk.solve(&vector![1.0], &vector![], 0.1).unwrap_err();
+/// let Error::NonFiniteStart { started, .. } = error else { panic!("{error}") };
+/// assert_eq!((started.unknown, started.value), ("z", 0.0));
+/// // With one there is a solution.
+/// irk.set_start(&vector![0.0], &vector![1.0])?;
+/// let z0 = irk.solve(&vector![1.0], &vector![], 1e-3)?.z0[0];
+/// assert!((z0 - 1.0_f64.exp()).abs() < 1e-4);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Started {
     /// Its name.
@@ -258,6 +293,22 @@ pub struct Started {
 }
 
 /// Where in a run: all counted from zero.
+///
+/// ```
+/// # use casados::error::{Place, Quantity};
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// It has no value below zero, where it arrives soon.
+/// # #[ode]
+/// # fn tank(x: f64) -> f64 { -x.sqrt() - 1.0 }
+/// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// // Of two steps of 0.5 s, with four stages each, the first one goes below zero.
+/// let error = erk.solve(&vector![0.4], &vector![], 1.0).unwrap_err();
+/// let Error::NonFiniteModel { at: Place { step, stage, iteration }, .. } = error else { panic!() };
+/// assert_eq!((step, iteration), (0, 0));
+/// assert!((1..4).contains(&stage));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The step of the interval.
@@ -269,6 +320,21 @@ pub struct Place {
 }
 
 /// An argument of a call.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::error::Argument;
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let error = irk.solve(&vector![0.0, 0.0], &vector![f64::INFINITY], 0.5).unwrap_err();
+/// assert!(matches!(error, Error::NonFiniteInput { argument: Argument::U, index: 0, .. }));
+/// let error = irk.solve(&vector![0.0, 0.0], &vector![1.0], f64::NAN).unwrap_err();
+/// assert!(matches!(error, Error::NonFiniteInput { argument: Argument::H, .. }));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Argument {
@@ -299,6 +365,19 @@ pub enum Argument {
 }
 
 /// What a model was asked for.
+///
+/// ```
+/// # use casados::error::{Place, Quantity};
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// It has no value below zero, where it arrives soon.
+/// # #[ode]
+/// # fn tank(x: f64) -> f64 { -x.sqrt() - 1.0 }
+/// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let error = erk.solve(&vector![-0.4], &vector![], 1.0).unwrap_err();
+/// assert!(matches!(error, Error::NonFiniteModel { quantity: Quantity::Residual, equation: 0, .. }));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quantity {

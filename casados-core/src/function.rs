@@ -23,16 +23,97 @@ pub type ArrayY<F, T> = <<F as Function>::Outputs as Outputs>::ArrayY<T>;
 /// `[T; NV]` of a function: one element for each variable `(ẋ, x, z, u, p, t)` of its model.
 pub type ArrayV<F, T> = <<F as Function>::Shape as Shape>::ArrayV<T>;
 /// `SVector<T, NY>` of a function.
+///
+/// ```
+/// # use casados::function::*;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// A mass on a spring: position m, velocity m/s; force N; stiffness N/m.
+/// # #[ode]
+/// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// # /// Kinetic and potential energy, J.
+/// # #[function]
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// let mut mean = Quadrature::<Energy>::new();
+/// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
+/// irk.set_parameters(&vector![4.0])?;
+/// irk.with(&mut mean).forward(&vector![1.0, 0.0], &vector![0.0], 0.1)?;
+/// // Two outputs: half of 4 J after a tenth of a second, nearly all of it potential.
+/// let q: VectorY<Energy, f64> = mean.q;
+/// assert!((q[0] + q[1] - 0.1 * 2.0).abs() < 1e-8 && q[0] < q[1]);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type VectorY<F, T> = <<F as Function>::Outputs as Outputs>::VectorY<T>;
 /// `SMatrix<T, NY, NY>` of a function.
 pub type MatrixYY<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYY<T>;
 /// `SMatrix<T, NY, NX>` of a function.
+///
+/// ```
+/// # use casados::function::*;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// A mass on a spring: position m, velocity m/s; force N; stiffness N/m.
+/// # #[ode]
+/// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// # /// Kinetic and potential energy, J.
+/// # #[function]
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// let mut mean = Quadrature::<Energy>::new();
+/// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
+/// irk.set_parameters(&vector![4.0])?;
+/// irk.with(&mut mean).forward(&vector![1.0, 0.0], &vector![0.0], 0.1)?;
+/// // Two outputs by two states; the energy 2 x₀² is conserved, and so is its derivative.
+/// let by_start: MatrixYX<Energy, f64> = mean.dq_dx0;
+/// assert_eq!(by_start.shape(), (2, 2));
+/// assert!((by_start[(0, 0)] + by_start[(1, 0)] - 0.1 * 4.0).abs() < 1e-6);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixYX<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYX<<F as Function>::Shape, T>;
 /// `SMatrix<T, NY, NZ>` of a function.
 pub type MatrixYZ<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYZ<<F as Function>::Shape, T>;
 /// `SMatrix<T, NY, NU>` of a function.
+///
+/// ```
+/// # use casados::function::*;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// A mass on a spring: position m, velocity m/s; force N; stiffness N/m.
+/// # #[ode]
+/// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// # /// Kinetic and potential energy, J.
+/// # #[function]
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// let mut mean = Quadrature::<Energy>::new();
+/// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
+/// irk.set_parameters(&vector![4.0])?;
+/// irk.with(&mut mean).forward(&vector![1.0, 0.0], &vector![0.0], 0.1)?;
+/// // Two outputs by one control.
+/// let by_control: MatrixYU<Energy, f64> = mean.dq_du;
+/// assert_eq!(by_control.shape(), (2, 1));
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixYU<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYU<<F as Function>::Shape, T>;
 /// `SMatrix<T, NY, NP>` of a function.
+///
+/// ```
+/// # use casados::function::*;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// A mass on a spring: position m, velocity m/s; force N; stiffness N/m.
+/// # #[ode]
+/// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// # /// Kinetic and potential energy, J.
+/// # #[function]
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// let mut mean = Quadrature::<Energy>::new();
+/// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
+/// irk.set_parameters(&vector![4.0])?;
+/// irk.with(&mut mean).forward(&vector![1.0, 0.0], &vector![0.0], 0.1)?;
+/// // Two outputs by one parameter: of the energy p x₀²/2.
+/// let by_stiffness: MatrixYP<Energy, f64> = mean.dq_dp;
+/// assert!((by_stiffness[0] + by_stiffness[1] - 0.1 * 0.5).abs() < 1e-7);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as Function>::Shape, T>;
 
 /// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by
@@ -125,6 +206,25 @@ pub trait GraphFunction: Function {
 }
 
 /// What is known about a function before it runs.
+///
+/// ```
+/// # use casados::function::*;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// A mass on a spring: position m, velocity m/s; force N; stiffness N/m.
+/// # #[ode]
+/// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// # /// Kinetic and potential energy, J.
+/// # #[function]
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// let structure = &Energy::STRUCTURE;
+/// assert_eq!((structure.name, structure.x, structure.p), ("Energy", &["x[0]", "x[1]"][..], &["p"][..]));
+/// // The first output by x[1]; the second by x[0] and p. Columns count (ẋ, x, z, u, p).
+/// let entries: Vec<_> = structure.jacobian.iter().collect();
+/// assert_eq!(entries, [(0, 3), (1, 2), (1, 5)]);
+/// assert!(structure.linear.iter().all(|linear| !linear));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FunctionStructure {
     /// Name of the function.

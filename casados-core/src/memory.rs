@@ -51,18 +51,70 @@ pub trait Family: 'static {
 /// What the memory of an [`Inline`] integrator is for. Every mode contains `solve`.
 pub mod mode {
     /// `solve`
+    ///
+    /// ```
+    /// # use casados::prelude::*;
+    /// # use nalgebra::vector;
+    /// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+    /// # #[ode]
+    /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// # use casados::mode;
+    /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Nominal>>::inline(Options::default())?;
+    /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
+    /// assert!((irk.solve(&x0, &u, 1.0)?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+    /// # Ok::<(), casados::Error>(())
+    /// ```
     #[derive(Clone, Copy, Debug)]
     pub struct Nominal;
     /// `forward`, `forward_adjoint` and `dense_forward`
+    ///
+    /// ```
+    /// # use casados::prelude::*;
+    /// # use nalgebra::vector;
+    /// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+    /// # #[ode]
+    /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// # use casados::mode;
+    /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Forward>>::inline(Options::default())?;
+    /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
+    /// assert!((irk.forward(&x0, &u, 1.0)?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+    /// # Ok::<(), casados::Error>(())
+    /// ```
     #[derive(Clone, Copy, Debug)]
     pub struct Forward;
     /// `directional` with `C` directions
     #[derive(Clone, Copy, Debug)]
     pub struct Directional<const C: usize>;
     /// `adjoint`, with `C` seeds
+    ///
+    /// ```
+    /// # use casados::prelude::*;
+    /// # use nalgebra::vector;
+    /// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+    /// # #[ode]
+    /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// # use casados::mode;
+    /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Adjoint>>::inline(Options::default())?;
+    /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
+    /// assert!((irk.adjoint(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+    /// # Ok::<(), casados::Error>(())
+    /// ```
     #[derive(Clone, Copy, Debug)]
     pub struct Adjoint<const C: usize = 1>;
     /// `hessian` and all that `Forward` has
+    ///
+    /// ```
+    /// # use casados::prelude::*;
+    /// # use nalgebra::vector;
+    /// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+    /// # #[ode]
+    /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// # use casados::mode;
+    /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Hessian>>::inline(Options::default())?;
+    /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
+    /// assert!((irk.hessian(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+    /// # Ok::<(), casados::Error>(())
+    /// ```
     #[derive(Clone, Copy, Debug)]
     pub struct Hessian;
 }
@@ -72,6 +124,26 @@ mod sealed {
 }
 
 /// Where memory is: [`Heap`] or [`Inline`].
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::{memory::Memory, mode};
+/// /// Works in any memory that has a place for it.
+/// fn position<W: Memory>(irk: &mut Irk<Cart, Gauss<2>, f64, W>) -> Result<f64, Error> {
+///     Ok(irk.solve(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0])
+/// }
+///
+/// let (mut heap, mut inline) = (
+///     Irk::<Cart, Gauss<2>>::new(Options::default())?,
+///     Irk::<Cart, Gauss<2>, f64, Inline<mode::Nominal>>::inline(Options::default())?,
+/// );
+/// assert_eq!(position(&mut heap)?, position(&mut inline)?);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub trait Memory: sealed::Sealed + 'static {
     /// A place for what every call needs.
     type Nominal<V: Stored>: Default + Send + Sync;
@@ -107,6 +179,26 @@ pub trait Memory: sealed::Sealed + 'static {
 }
 
 /// Memory with a place for forward sensitivities.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::{memory::WithForward, mode};
+/// /// Works in any memory that has a place for it.
+/// fn gain<W: WithForward>(irk: &mut Irk<Cart, Gauss<2>, f64, W>) -> Result<f64, Error> {
+///     Ok(irk.forward(&vector![0.0, 0.0], &vector![2.0], 1.0)?.dx_du[0])
+/// }
+///
+/// let (mut heap, mut inline) = (
+///     Irk::<Cart, Gauss<2>>::new(Options::default())?,
+///     Irk::<Cart, Gauss<2>, f64, Inline<mode::Forward>>::inline(Options::default())?,
+/// );
+/// assert_eq!(gain(&mut heap)?, gain(&mut inline)?);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "this memory has no place for forward sensitivities",
     note = "use `Heap`, `Inline<mode::Forward>` or `Inline<mode::Hessian>`"
@@ -133,6 +225,26 @@ pub trait WithDirectional<const C: usize>: Memory {
 }
 
 /// Memory with a place for the adjoint of `C` seeds.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::{memory::WithAdjoint, mode};
+/// /// Works in any memory that has a place for it.
+/// fn slope<W: WithAdjoint<1>>(irk: &mut Irk<Cart, Gauss<2>, f64, W>) -> Result<f64, Error> {
+///     Ok(irk.adjoint(&vector![0.0, 0.0], &vector![2.0], 1.0, &vector![1.0, 0.0])?.grad_u[0])
+/// }
+///
+/// let (mut heap, mut inline) = (
+///     Irk::<Cart, Gauss<2>>::new(Options::default())?,
+///     Irk::<Cart, Gauss<2>, f64, Inline<mode::Adjoint>>::inline(Options::default())?,
+/// );
+/// assert_eq!(slope(&mut heap)?, slope(&mut inline)?);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "this memory has no place for the adjoint of {C} seeds",
     note = "use `Heap` or `Inline<mode::Adjoint<{C}>>`"
@@ -146,6 +258,26 @@ pub trait WithAdjoint<const C: usize>: Memory {
 }
 
 /// Memory with a place for second-order sensitivities.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::{memory::WithHessian, mode};
+/// /// Works in any memory that has a place for it.
+/// fn bend<W: WithHessian>(irk: &mut Irk<Cart, Gauss<2>, f64, W>) -> Result<f64, Error> {
+///     Ok(irk.hessian(&vector![0.0, 0.0], &vector![2.0], 1.0, &vector![1.0, 0.0])?.h_uu[0])
+/// }
+///
+/// let (mut heap, mut inline) = (
+///     Irk::<Cart, Gauss<2>>::new(Options::default())?,
+///     Irk::<Cart, Gauss<2>, f64, Inline<mode::Hessian>>::inline(Options::default())?,
+/// );
+/// assert_eq!(bend(&mut heap)?, bend(&mut inline)?);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "this memory has no place for second-order sensitivities",
     note = "use `Heap` or `Inline<mode::Hessian>`"

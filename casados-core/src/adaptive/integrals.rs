@@ -22,6 +22,27 @@ use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
 /// The derivatives of the integrals of [`Quadrature`] over several intervals.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// // q = ∫ x dt of no growth in the first second, and of growth by u in the second.
+/// let mut integral = Quadrature::<Amount>::new();
+/// let (x0, controls, ends) = (vector![2.0], [vector![0.0], vector![0.0]], [1.0, 2.0]);
+/// let (_, derivatives) = horizon.with(&mut integral).forward(&x0, &controls, &ends)?;
+/// assert!((integral.q[0] - 4.0).abs() < 1e-6);
+/// // NY × NX, and NY × NU for each interval: ∂x(t)/∂u_0 is 2 t, later on 2; ∂x(t)/∂u_1 is 2 (t − 1).
+/// assert!((derivatives.dq_dx0[0] - 2.0).abs() < 1e-6);
+/// assert!((derivatives.dq_du[0][0] - 3.0).abs() < 1e-6);
+/// assert!((derivatives.dq_du[1][0] - 1.0).abs() < 1e-6);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub struct PiecewiseQuadrature<F: Function, T: Plain = f64> {
     /// `∂q/∂x₀`
     pub dq_dx0: MatrixYX<F, T>,
@@ -32,6 +53,25 @@ pub struct PiecewiseQuadrature<F: Function, T: Plain = f64> {
 }
 
 /// The derivatives of [`LeastSquares`] over several intervals, with the matrix of Gauss and Newton.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// // φ = ½ ∫ x² dt where x = 2: H is the integral of squares of derivatives of x.
+/// let mut squares = LeastSquares::<Amount>::new(&vector![1.0]); // weights W
+/// let (x0, controls, ends) = (vector![2.0], [vector![0.0]], [1.0]);
+/// let (_, derivatives) = horizon.with(&mut squares).forward(&x0, &controls, &ends)?;
+/// assert!((derivatives.grad_x0[0] - 2.0).abs() < 1e-6); // ∫ x ∂x/∂x₀ dt
+/// assert!((derivatives.h_xx[0] - 1.0).abs() < 1e-6); // ∫ (∂x/∂x₀)² dt
+/// assert!((derivatives.h_uu[0][0] - 4.0 / 3.0).abs() < 1e-5); // ∫ (2 t)² dt
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub struct PiecewiseLeastSquares<M: Dae, T: Real = f64> {
     /// `∇φ` with respect to `x₀`
     pub grad_x0: VectorX<M, T>,
@@ -58,6 +98,26 @@ listed!([M: Dae, T: Real] PiecewiseLeastSquares<M, T> { grad_x0, grad_u, grad_p,
 
 /// An integrand whose derivatives over several intervals have a form of their own: [`Quadrature`]
 /// and [`LeastSquares`].
+///
+/// ```
+/// # use casados::adaptive::{PiecewiseQuadrature, Spanning};
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// /// What `with(&mut integrand).forward(..)` returns beside the derivatives of the solution.
+/// type Found = <Quadrature<Amount> as Spanning<Growth, f64>>::Derivatives;
+/// let mut integral = Quadrature::<Amount>::new();
+/// let (_, found): (_, Found) =
+///     horizon.with(&mut integral).forward(&vector![2.0], &[vector![0.0]], &[1.0])?;
+/// let found: PiecewiseQuadrature<Amount> = found;
+/// assert!((found.dq_dx0[0] - 1.0).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub trait Spanning<M: Dae, T: Real>: Integrand<M, T> {
     /// That form.
     type Derivatives;

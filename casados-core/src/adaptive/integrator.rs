@@ -39,6 +39,21 @@ use core::marker::PhantomData;
 /// finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
 /// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until
 /// a call succeeds there is no dense output and nothing to be frozen, [`Error::NoResult`].
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let mut cart = Adaptive::<Cart, Radau>::new(AdaptiveOptions::default())?;
+/// cart.set_time(10.0)?;
+/// // From rest, with 2 m/s², for 3 s: from t = 10 s to 13 s.
+/// let end = cart.solve(&vector![0.0, 0.0], &vector![2.0], 3.0)?;
+/// assert!((end.x - vector![9.0, 6.0]).norm() < 1e-9);
+/// assert!((cart.dense(11.0)?.x - vector![1.0, 2.0]).norm() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
     pub(super) base: Box<Base<M, T>>,

@@ -50,6 +50,22 @@ pub enum BatchError {
 }
 
 /// A slice that a batch is given.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::batch::Slice;
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// let intervals = Intervals { x0: &[vector![0.0, 0.0]], u: &[vector![1.0]], h: &[0.1], ..Default::default() };
+/// let mut results = vec![casados::result::Nominal::default(); 3];
+/// // One interval, but places for three results.
+/// let Err(BatchError::Length { slice, .. }) = batch.solve(&intervals, &mut results) else { panic!() };
+/// assert!(slice != Slice::Results || slice.to_string() == "results");
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Slice {

@@ -33,6 +33,24 @@ type Given<I> =
 /// # Errors
 /// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
 /// [`BatchError::Intervals`] if intervals failed.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// // Four intervals of 0.5 s, each with a start and an acceleration of its own.
+/// let x0 = [0.0, 1.0, 2.0, 3.0].map(|speed| vector![0.0, speed]);
+/// let u = [4.0, 2.0, 0.0, -2.0].map(|u| vector![u]);
+/// let mut ends = vec![casados::result::Nominal::default(); 4];
+/// batch.solve(&Intervals { x0: &x0, u: &u, h: &[0.5], ..Default::default() }, &mut ends)?;
+/// for ((x0, u), end) in x0.iter().zip(&u).zip(&ends) {
+///     assert!((end.x[1] - (x0[1] + 0.5 * u[0])).abs() < 1e-14);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Integrator<I: Single> {
     options: Options,
     tableau: I::Tableau,

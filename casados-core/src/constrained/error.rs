@@ -4,6 +4,30 @@ use crate::error::Argument;
 use core::fmt;
 
 /// Why [`Consistent`](super::Consistent) found no values.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use casados::{Consistent, Constrained, Inconsistent};
+/// # use nalgebra::vector;
+/// # /// A pendulum of 1 m in Cartesian coordinates: positions, velocities; z is the tension.
+/// # #[dae(index_reduction(baumgarte = 2.0))]
+/// # fn pendulum(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+/// #     [
+/// #         xdot[0] - x[2],
+/// #         xdot[1] - x[3],
+/// #         xdot[2] + z * x[0],
+/// #         xdot[3] + z * x[1] + 9.81,
+/// #         x[0] * x[0] + x[1] * x[1] - 1.0,
+/// #     ]
+/// # }
+/// let start = Consistent::<Pendulum>::new();
+/// assert!(matches!(start.clone().hold("x[7]"), Err(Inconsistent::NoSuchState { name: "x[7]" })));
+/// let guess = vector![f64::NAN, -0.8, 0.0, 0.0];
+/// let error = start.solve(&guess, &vector![], 0.0).unwrap_err();
+/// assert!(matches!(error, Inconsistent::NonFiniteInput { name: "x[0]", .. }));
+/// println!("{error}");
+/// # Ok::<(), casados::Inconsistent>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Inconsistent {

@@ -17,6 +17,32 @@ pub use projected::Projected;
 ///
 /// Start values have to satisfy the invariants: [`Consistent`] finds such values. In a problem of
 /// optimal control they are imposed at one node.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use casados::{Consistent, Constrained, Inconsistent};
+/// # use nalgebra::vector;
+/// # /// A pendulum of 1 m in Cartesian coordinates: positions, velocities; z is the tension.
+/// # #[dae(index_reduction(baumgarte = 2.0))]
+/// # fn pendulum(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+/// #     [
+/// #         xdot[0] - x[2],
+/// #         xdot[1] - x[3],
+/// #         xdot[2] + z * x[0],
+/// #         xdot[3] + z * x[1] + 9.81,
+/// #         x[0] * x[0] + x[1] * x[1] - 1.0,
+/// #     ]
+/// # }
+/// // Of a pendulum of 1 m: the length, and that the velocity is across the rod.
+/// type Invariants = <Pendulum as Constrained>::Invariants;
+/// assert_eq!(Pendulum::STRUCTURE.reduction.map(|reduction| reduction.invariants()), Some(2));
+/// // v = (ẋ, x, z, t), in a state that has both at zero.
+/// let v = [0.0, 0.0, 0.0, 0.0, 0.6, -0.8, 0.8, 0.6, 0.0, 0.0];
+/// let mut y = [1.0; 2];
+/// Invariants::value::<f64>(&v, &mut y);
+/// assert!(y.iter().all(|y| y.abs() < 1e-15));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no invariants",
     note = "those of a `#[dae(index_reduction)]` are its constraints and their derivatives"

@@ -40,6 +40,20 @@ use crate::scalar::Real;
 use crate::tableau::{Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Heun, Midpoint, Rk4};
 
 /// An explicit method.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let mut rk4 = Erk::<Cart, Rk4>::new(Options::default())?;
+/// let mut euler = Erk::<Cart, Euler>::new(Options { steps: 4, ..Default::default() })?;
+/// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
+/// assert!((rk4.solve(&x0, &u, 1.0)?.x[0] - 1.0).abs() < 1e-14);
+/// assert!((euler.solve(&x0, &u, 1.0)?.x[0] - 0.75).abs() < 1e-14); // of order one
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an explicit method",
     label = "`Erk` needs an explicit Runge-Kutta method",

@@ -8,6 +8,23 @@ use crate::result::{Adjoint, Forward, Hessian, Nominal};
 
 /// An integrator with an integrand: its calls are those of the integrator, and gradients and
 /// Hessians those of `λᵀx + νᵀq`; see [`Integrand`].
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # /// Power of a mass of one, W.
+/// # #[function]
+/// # fn power(x: [f64; 2], u: f64) -> f64 { u * x[1] }
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut work = Quadrature::<Power>::new();
+/// // q = ∫ u v dt beside the state: what it has as kinetic energy after 2 s.
+/// let end = irk.with(&mut work).solve(&vector![0.0, 0.0], &vector![3.0], 2.0)?;
+/// assert!((work.q[0] - 0.5 * end.x[1] * end.x[1]).abs() < 1e-12);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub struct With<'a, 'b, I, Q: ?Sized> {
     pub(crate) integrator: &'a mut I,
     pub(crate) integrand: &'b mut Q,

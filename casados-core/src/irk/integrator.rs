@@ -42,6 +42,20 @@ use core::marker::PhantomData;
 /// [`Error::NotConverged`], [`Error::Overflow`], and [`Error::OutOfMemory`] of the first call of
 /// its kind. Then the integrator is as it was before the call: usable, with the same warm start and
 /// the same dense output.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;
+/// let (x0, u, h) = (vector![0.0, 1.0], vector![2.0], 0.5);
+/// let step = irk.forward(&x0, &u, h)?;
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// assert!((step.dx_du - vector![0.5 * h * h, h]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
     pub(super) run: Run<M, T, S, W>,
     pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,

@@ -12,6 +12,34 @@ use core::fmt;
 
 /// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their
 /// sum.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// /// A cart with any cost, or a pair of them.
+/// fn effortless<C>(cost: C) -> Result<f64, Box<dyn std::error::Error>>
+/// where
+///     C: CostOf<Irk<Cart, Gauss<2>>, f64>,
+/// {
+///     let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+///     let mut ocp = Problem::new(irk).stage_cost(cost).on(Horizon::uniform(2, 0.5))?;
+///     ocp.fix_initial_state(&[1.0, 0.0])?.guess(&[1.0, 0.0], &[3.0])?;
+///     HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
+///     Ok(ocp.stage(0)?.u[0])
+/// }
+/// let least = || LeastSquaresCost::<Effort>::diagonal(&[1.0]);
+/// assert!(effortless(least())?.abs() < 1e-7 && effortless((least(), least()))?.abs() < 1e-7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Cost<S: Shape, T: Real> {
     /// How many numbers a reference has.
     const REFERENCES: usize;

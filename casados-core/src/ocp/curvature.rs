@@ -97,6 +97,23 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Slopes {
 }
 
 /// How a Hessian learns from a step `s` and the difference `y` of gradients.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::RankOne)?;
+/// assert!(sqp.solve(&mut ocp)?.is_converged());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Update {
@@ -111,6 +128,24 @@ pub enum Update {
 
 /// The Hessian of the Lagrangian, learned from its gradients
 /// ([`Sqp::secant`](super::Sqp::secant)).
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::default())?;
+/// let _: Secant = sqp.curvature; // instead of `Exact`
+/// assert!(sqp.solve(&mut ocp)?.is_converged());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Secant(pub(super) Update);
 

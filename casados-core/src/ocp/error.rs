@@ -6,6 +6,25 @@ use crate::qp::{QpError, QpField, Side};
 use core::fmt;
 
 /// A part of a problem.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// // Two states, but one number.
+/// let error = ocp.fix_initial_state(&[0.0]).unwrap_err();
+/// assert!(matches!(error, OcpError::Length { part: Part::InitialState, expected: 2, found: 1, .. }));
+/// println!("{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Part {

@@ -70,6 +70,25 @@ adjoints!(erk, Ode, WithForward);
 /// H. G. Bock, M. Diehl, E. Kostina, J. P. Schlöder, "Constrained optimal feedback control of
 /// systems governed by large differential algebraic equations", 2007; L. Wirsching, H. G. Bock,
 /// M. Diehl, "Fast NMPC of a chain of masses connected by springs", 2006.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?.keep_jacobians();
+/// sqp.curvature.contraction = 0.3;
+/// assert!(sqp.solve(&mut ocp)?.is_converged());
+/// println!("{} times all Jacobians", sqp.curvature.jacobians());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeptJacobians {
     /// A step is to be shorter than this part of the one before, or Jacobians are computed again.

@@ -10,6 +10,13 @@ use alloc::vec::Vec;
 use std::path::Path;
 
 /// What a figure is made of: a [`Panel`], a [`Space`] or a [`Sparsity`].
+///
+/// ```
+/// # use casados::plot::{Cell, Figure, Panel};
+/// let line = |k: f64| Panel::new("x").line("x", [(0.0, 0.0), (1.0, k)]);
+/// let cells: Vec<Cell> = vec![line(1.0).into(), line(2.0).into()];
+/// assert!(Figure::new().with_all(cells).to_svg().starts_with("<svg"));
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Cell {

@@ -20,6 +20,15 @@ const IDENTITY: Kind = ("pivot that is the identity", Colour::GREEN);
 const PIVOT: Kind = ("other pivot", Colour::INK);
 
 /// The entries of a matrix.
+///
+/// ```
+/// # use casados::plot::{Figure, Sparsity};
+/// # use casados::prelude::*;
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let figure = Figure::new().with(Sparsity::jacobian(Cart::describe()));
+/// assert!(figure.to_svg().contains("Cart: Jacobian, 4 non-zeros"));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sparsity {
     title: String,

@@ -22,6 +22,26 @@ impl Shape {
 }
 
 /// A matrix that can be read.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // A of the first stage, NX × NX, read.
+/// let stage = qp.view().stages().next().unwrap();
+/// assert_eq!((stage.a().shape(), stage.a().get(0, 0), stage.a().get(1, 0)), ((1, 1), Some(1.0), None));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Block<'a, T> {
     pub(super) data: &'a [T],
@@ -29,6 +49,28 @@ pub struct Block<'a, T> {
 }
 
 /// A matrix that can be read and written.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// for mut stage in qp.stages_mut() {
+///     stage.q_mut().set_diagonal([2.0]);
+///     stage.a_mut().fill_with(|row, column| if row == column { 0.5 } else { 0.0 });
+/// }
+/// assert_eq!(qp.view().stages().filter_map(|stage| stage.q().get(0, 0)).sum::<f64>(), 8.0);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Debug)]
 pub struct BlockMut<'a, T> {
     pub(super) data: &'a mut [T],

@@ -7,6 +7,26 @@ use crate::scalar::Real;
 ///
 /// A violation `e` of a soft bound costs `linear · e + ½ quadratic · e²`. A bound whose linear
 /// penalty is infinite, as that of every new QP, is hard.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let stage = qp.view().stages().next().unwrap();
+/// assert_eq!((stage.u_bounds().lower, stage.u_bounds().upper), (&[-0.4][..], &[0.4][..]));
+/// assert!(stage.u_bounds().lower_linear[0].is_infinite()); // hard
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds<'a, T> {
     /// −∞ where there is none.
@@ -24,6 +44,30 @@ pub struct Bounds<'a, T> {
 }
 
 /// As [`Bounds`], to be written.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // Of the last state: not above 0.1, or a penalty of 5 s + ½ 2 s² for the excess s.
+/// let mut last = qp.stages_mut().last().unwrap();
+/// last.x_bounds_mut().set(0, f64::NEG_INFINITY, 0.1);
+/// last.x_bounds_mut().soften_side(0, Side::Upper, 5.0, 2.0);
+/// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// assert!(solution.stage(3).unwrap().x[0] < 0.1 + 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Debug)]
 pub struct BoundsMut<'a, T> {
     /// −∞ where there is none.

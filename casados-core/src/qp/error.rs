@@ -56,6 +56,28 @@ pub enum QpField {
 }
 
 /// The side of a constraint.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // Bounds that no number satisfies are refused, with their side if a penalty is meant.
+/// let mut stage = qp.stages_mut().next().unwrap();
+/// stage.u_bounds_mut().soften_side(0, Side::Lower, 1.0, 1.0);
+/// let stage = qp.view().stages().next().unwrap();
+/// assert_eq!((stage.u_bounds().lower_linear[0], stage.u_bounds().upper_linear[0]), (1.0, f64::INFINITY));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The lower bound.

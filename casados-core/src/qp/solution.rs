@@ -35,6 +35,27 @@ pub struct Solution<T, D, M> {
 }
 
 /// A solution with its memory on the heap.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let states: Vec<f64> = solution.stages().map(|stage| stage.x[0]).collect();
+/// assert!((states[0] - 1.0).abs() < 1e-9 && (states[1] - 0.6).abs() < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[cfg(feature = "alloc")]
 pub type HeapSolution<T = f64> = Solution<T, Vec<StageDims>, Vec<T>>;
 
@@ -98,6 +119,32 @@ pub struct SolutionStage<'a, T> {
 }
 
 /// As [`SolutionStage`], to be written.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // A guess: at rest everywhere.
+/// let mut guess = HeapSolution::<f64>::new(&dims)?;
+/// for k in 0..4 {
+///     let stage = guess.stage_mut(k).unwrap();
+///     stage.x.fill(1.0);
+///     stage.u.fill(0.0);
+/// }
+/// HeapInteriorPoint::new().solve(qp.view(), QpStart::Warm, guess.view_mut())?;
+/// assert!((guess.stage(0).unwrap().u[0] + 0.4).abs() < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Debug)]
 pub struct SolutionStageMut<'a, T> {
     /// `x`

@@ -7,6 +7,27 @@ use super::layout::{Place, StageDims, part, part_mut, take_mut};
 use crate::scalar::Real;
 
 /// The data of one stage.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // ½ vᵀ [Q Sᵀ; S R] v + qᵀx + rᵀu, x₊ = A x + B u + b.
+/// let stage = qp.view().stages().next().unwrap();
+/// assert_eq!((stage.dims().nx, stage.dims().nu), (1, 1));
+/// assert_eq!((stage.r().get(0, 0), stage.b().get(0, 0)), (Some(0.1), Some(1.0)));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a, T> {
     pub(super) place: Place,
@@ -14,6 +35,27 @@ pub struct Stage<'a, T> {
 }
 
 /// The data of one stage, to be written.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// for mut stage in qp.stages_mut() {
+///     stage.q_mut().set(0, 0, 3.0); // the weight of the state
+/// }
+/// assert_eq!(qp.view().stages().filter_map(|stage| stage.q().get(0, 0)).sum::<f64>(), 12.0);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Debug)]
 pub struct StageMut<'a, T> {
     pub(super) place: Place,

@@ -10,6 +10,19 @@ use super::{Kinematic, Structure};
 /// `2s² − s` and subtracted `2s²`. What a machine does beside it (loads, selections in pivoting, a
 /// fused multiply-add that is one instruction) is not in it: costs compare models and methods, they
 /// are no times. Evaluations are zero where operations are not known (dual models).
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// // Two stages cost more than one; all of it is known before the program runs.
+/// let (one, two) = (Cart::STRUCTURE.cost(1), Cart::STRUCTURE.cost(2));
+/// assert_eq!(two.residual, 2 * one.residual);
+/// assert!(two.iteration > one.iteration);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product

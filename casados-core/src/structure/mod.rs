@@ -119,6 +119,21 @@ pub struct Structure {
 }
 
 /// Positions of structural non-zeros, in the order of their values.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// // f = (ẋ₀ − x₁, ẋ₁ − u): columns count (ẋ, x, z, u, p).
+/// let jacobian = Cart::STRUCTURE.jacobian;
+/// assert_eq!(jacobian.len(), 4);
+/// let mut entries: Vec<_> = jacobian.iter().collect();
+/// entries.sort();
+/// assert_eq!(entries, [(0, 0), (0, 3), (1, 1), (1, 4)]);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pattern {
     /// Row of each entry.
@@ -161,6 +176,18 @@ impl Pattern {
 
 /// Numbers of arithmetic operations of one evaluation; an elementary function counts as one.
 /// Zero where it is not known (dual models).
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let operations = Cart::STRUCTURE.operations;
+/// // Two subtractions; all derivatives are constant.
+/// assert_eq!((operations.residual, operations.residual_jacobian, operations.hessian), (2, 2, 0));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
     /// `f`

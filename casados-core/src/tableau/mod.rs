@@ -219,6 +219,15 @@ impl<const S: usize> Tableau<S> {
 }
 
 /// Why a user's own tableau was refused.
+///
+/// ```
+/// # use casados::{Tableau, TableauError};
+/// // Nodes have to be sums of rows, and weights sum up to one.
+/// let node = Tableau::new([[0.5]], [1.0], [0.4]);
+/// assert!(matches!(node, Err(TableauError::RowSum { stage: 0, sum: 0.5, node: 0.4 })));
+/// let weight = Tableau::new([[f64::NAN]], [1.0], [0.5]);
+/// println!("{}", weight.unwrap_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TableauError {

@@ -18,6 +18,18 @@ use std::vec::Vec;
 
 /// An exact solution: the end state and, as far as they are known, its derivatives by
 /// `w = (x₀, u, p)`.
+///
+/// ```
+/// # use casados::testing::Exact;
+/// // x₊ = x₀ e^(−p h) of `ẋ = −p x` at x₀ = 2, p = 0.5, h = 1, by w = (x₀, p).
+/// let e = (-0.5_f64).exp();
+/// let exact = Exact {
+///     states: vec![2.0 * e],
+///     first: vec![vec![e, -2.0 * e]],
+///     ..Exact::default() // second derivatives are not known
+/// };
+/// assert_eq!(exact.first[0].len(), 2);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Exact {
     /// `x` at the end of the interval, and after it `z` if that is known.

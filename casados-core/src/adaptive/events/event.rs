@@ -7,6 +7,28 @@ use crate::shape::{Outputs, Shape};
 use bytemuck::Zeroable;
 
 /// In which direction a function crosses zero.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// // Thrown up, it passes two metres on its way up, and again on its way down.
+/// # #[function]
+/// # fn two_metres(x: [f64; 2]) -> f64 { x[0] - 2.0 }
+/// let time = |crossing| {
+///     let event = Event::terminal::<TwoMetres>(crossing);
+///     let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[event])?;
+///     Ok::<f64, Error>(ball.solve(&vector![0.0, 7.0], &vector![], 2.0)?.t)
+/// };
+/// assert!((time(Crossing::Rising)? - 0.4).abs() < 1e-9);
+/// assert!((time(Crossing::Falling)? - 1.0).abs() < 1e-9);
+/// assert_eq!(time(Crossing::Any)?, time(Crossing::Rising)?);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
     /// From below.

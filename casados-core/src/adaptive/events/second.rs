@@ -32,6 +32,27 @@ use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A ball that falls: height m, velocity m/s.
+/// # #[ode]
+/// # fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// # #[function]
+/// # fn height(x: [f64; 2]) -> f64 { x[0] }
+/// # #[function]
+/// # fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+/// # let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// # let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// # let mut ball = Hybrid::new(adaptive, &[bounces])?;
+/// let end = ball.hessian(&vector![5.0, 0.0], &vector![], 1.5, &vector![0.0, 1.0])?;
+/// // It hits the ground at τ = √(y/5); afterwards the velocity is 8 τ − 10 (1.5 − τ) = 18 τ − 15.
+/// let exact = -18.0 * 0.25 / 25.0; // 18 d²τ/dy² at y = 5
+/// assert!((end.h_xx[(0, 0)] - exact).abs() < 1e-8);
+/// assert!((end.adjoint.grad_x0[0] - 18.0 * 0.1).abs() < 1e-8);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[non_exhaustive]
 pub struct HybridHessian<M: Dae, T: Real = f64> {
     /// The solution and its derivatives.
