@@ -8,13 +8,15 @@
 //! | `parameters` | what parameters change of the conditions |
 
 mod active;
+mod answers;
 mod border;
 mod column;
 mod factors;
 mod parameters;
 mod recursion;
 
-pub use factors::{SolutionAdjoint, SolutionFactors, ValueHessian};
+pub use answers::{SolutionAdjoint, ValueHessian};
+pub use factors::SolutionFactors;
 
 use super::curvature::Curvature;
 use super::data::get;
