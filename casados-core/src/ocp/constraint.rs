@@ -1,7 +1,6 @@
 //! Constraints at the nodes.
 
 use super::check::Labels;
-use super::dynamics::Dynamics;
 use super::error::{OcpError, Part};
 use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite_outputs, is_algebraic, parameter, position};
@@ -65,19 +64,6 @@ pub trait Constraints<S: Shape, T: Real> {
     #[doc(hidden)]
     fn name(row: usize) -> (&'static str, usize);
 }
-
-/// Constraints of the variables that dynamics have. Messages of the compiler name the dynamics,
-/// where those of the other trait have dimensions as numbers.
-#[diagnostic::on_unimplemented(
-    message = "`{Self}` is not a constraint for this model with numbers `{T}`",
-    label = "its function has other arguments than the model",
-    note = "a `#[function]` takes the arguments of the model, as long as there (unused ones with an underscore): `x`, `z`, `u`, `p`, `t`",
-    note = "constraints are `Constraint<F>`, and pairs of constraints"
-)]
-pub trait ConstraintsOf<D: Dynamics<T>, T: Real>: Constraints<D::Shape, T> {}
-
-#[diagnostic::do_not_recommend]
-impl<D: Dynamics<T>, T: Real, C: Constraints<D::Shape, T>> ConstraintsOf<D, T> for C {}
 
 impl<S: Shape, T: Real> Constraints<S, T> for () {
     const ROWS: usize = 0;

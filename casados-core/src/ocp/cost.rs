@@ -1,6 +1,5 @@
 //! Costs at the nodes.
 
-use super::dynamics::Dynamics;
 use super::error::OcpError;
 use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
@@ -133,19 +132,6 @@ pub struct At<'a, T> {
     /// the Hessian `H` that is added, which is [convex](Cost::CONVEX). Else it is empty.
     pub(super) from: &'a [T],
 }
-
-/// A cost of the variables that dynamics have. Messages of the compiler name the dynamics, where
-/// those of the other trait have dimensions as numbers.
-#[diagnostic::on_unimplemented(
-    message = "`{Self}` is not a cost for this model with numbers `{T}`",
-    label = "its function has other arguments than the model",
-    note = "a `#[function]` takes the arguments of the model, as long as there (unused ones with an underscore): `x`, `z`, `u`, `p`, `t`",
-    note = "costs are `LeastSquaresCost<F>`, `GeneralCost<F>`, `ConvexCost<F, _>`, and pairs of costs"
-)]
-pub trait CostOf<D: Dynamics<T>, T: Real>: Cost<D::Shape, T> {}
-
-#[diagnostic::do_not_recommend]
-impl<D: Dynamics<T>, T: Real, C: Cost<D::Shape, T>> CostOf<D, T> for C {}
 
 impl<S: Shape, T: Real> Cost<S, T> for () {
     const REFERENCES: usize = 0;

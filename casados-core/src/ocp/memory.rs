@@ -1,10 +1,9 @@
 //! A problem on a horizon is made, in memory of its own or in given one.
 
-use super::constraint::ConstraintsOf;
-use super::cost::CostOf;
 use super::data;
 use super::dynamics::Dynamics;
 use super::error::{OcpError, Part};
+use super::fits::{ConstraintsOf, CostOf};
 use super::horizon::Horizon;
 #[cfg(feature = "alloc")]
 use super::instance::HeapOcp;

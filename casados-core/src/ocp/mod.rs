@@ -94,6 +94,7 @@ mod dynamics;
 mod elastic;
 mod error;
 mod filter;
+mod fits;
 mod guess;
 mod horizon;
 #[cfg(feature = "alloc")]
@@ -139,19 +140,17 @@ mod wrapped;
 pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
-#[doc(hidden)]
-pub use constraint::ConstraintsOf;
 pub use constraint::{Constraint, Constraints};
 pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
 pub use convexify::Convexification;
-#[doc(hidden)]
-pub use cost::CostOf;
 pub use cost::{Cost, GeneralCost};
 pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
 pub use dynamics::{Dynamics, SecondOrder};
 #[doc(hidden)]
 pub use dynamics::{IntegralTerms, Interval, Nodes, Sink, StageAction, Step};
 pub use error::{ConstraintName, OcpError, Part, Text};
+#[doc(hidden)]
+pub use fits::{ConstraintsOf, CostOf};
 pub use horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use instance::HeapOcp;
