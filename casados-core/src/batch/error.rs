@@ -63,7 +63,8 @@ pub enum BatchError {
 /// let mut results = vec![casados::result::Nominal::default(); 3];
 /// // One interval, but places for three results.
 /// let Err(BatchError::Length { slice, .. }) = batch.solve(&intervals, &mut results) else { panic!() };
-/// assert!(slice != Slice::Results || slice.to_string() == "results");
+/// assert_eq!(slice, Slice::Results);
+/// assert_eq!(slice.to_string(), "results");
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
