@@ -48,6 +48,7 @@ fn waste_beside_rates(x: [f64; 2], _z: [f64; 2], _u: [f64; 1]) -> f64 {
 /// The batch reactor as a differential-algebraic model and as an ordinary one, both by Gauss'
 /// method of two stages.
 #[allow(clippy::type_complexity)]
+#[allow(dead_code)] // Benchmarks solve the ODE alone.
 pub fn batch_reactors(
     grid: Grid,
 ) -> Result<
