@@ -38,9 +38,11 @@ pub fn product<A: Arithmetic, E: Field, const S: usize>(
 /// `−packet`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S, W>) {
-    each!(i < S => {
-        each!(w < W => { packet[i][w] = -packet[i][w]; });
-    });
+    for row in packet {
+        for element in row {
+            *element = -*element;
+        }
+    }
 }
 
 /// `packet − block · other`

@@ -14,11 +14,11 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
 ) -> Packet<E, S, W> {
     let mut packet = [[E::from_f64(0.0); W]; S];
     if let Some(row) = rows.get(slot) {
-        each!(i < S => {
-            if let Some(columns) = row[i].chunk(column) {
-                packet[i] = *columns;
+        for (packet, row) in packet.iter_mut().zip(row) {
+            if let Some(columns) = row.chunk(column) {
+                *packet = *columns;
             }
-        });
+        }
     }
     packet
 }
@@ -68,10 +68,10 @@ pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     packet: &Packet<E, S, W>,
 ) {
     if let Some(row) = rows.get_mut(slot) {
-        each!(i < S => {
-            if let Some(columns) = row[i].chunk_mut(column) {
-                *columns = packet[i];
+        for (packet, row) in packet.iter().zip(row) {
+            if let Some(columns) = row.chunk_mut(column) {
+                *columns = *packet;
             }
-        });
+        }
     }
 }
