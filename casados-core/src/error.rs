@@ -304,7 +304,8 @@ pub struct Started {
 /// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
 /// // Of two steps of 0.5 s, with four stages each, the first one goes below zero.
 /// let error = erk.solve(&vector![0.4], &vector![], 1.0).unwrap_err();
-/// let Error::NonFiniteModel { at: Place { step, stage, iteration }, .. } = error else { panic!() };
+/// let Error::NonFiniteModel { at, .. } = error else { panic!() };
+/// let Place { step, stage, iteration } = at;
 /// assert_eq!((step, iteration), (0, 0));
 /// assert!((1..4).contains(&stage));
 /// # Ok::<(), casados::Error>(())
@@ -375,7 +376,8 @@ pub enum Argument {
 /// # fn tank(x: f64) -> f64 { -x.sqrt() - 1.0 }
 /// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
 /// let error = erk.solve(&vector![-0.4], &vector![], 1.0).unwrap_err();
-/// assert!(matches!(error, Error::NonFiniteModel { quantity: Quantity::Residual, equation: 0, .. }));
+/// let Error::NonFiniteModel { quantity, equation, .. } = error else { panic!() };
+/// assert_eq!((quantity, equation), (Quantity::Residual, 0));
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

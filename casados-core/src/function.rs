@@ -33,7 +33,9 @@ pub type ArrayV<F, T> = <<F as Function>::Shape as Shape>::ArrayV<T>;
 /// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
 /// # /// Kinetic and potential energy, J.
 /// # #[function]
-/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] {
+/// #     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// # }
 /// let mut mean = Quadrature::<Energy>::new();
 /// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
 /// irk.set_parameters(&vector![4.0])?;
@@ -57,7 +59,9 @@ pub type MatrixYY<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYY<T>;
 /// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
 /// # /// Kinetic and potential energy, J.
 /// # #[function]
-/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] {
+/// #     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// # }
 /// let mut mean = Quadrature::<Energy>::new();
 /// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
 /// irk.set_parameters(&vector![4.0])?;
@@ -82,7 +86,9 @@ pub type MatrixYZ<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYZ<<F as 
 /// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
 /// # /// Kinetic and potential energy, J.
 /// # #[function]
-/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] {
+/// #     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// # }
 /// let mut mean = Quadrature::<Energy>::new();
 /// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
 /// irk.set_parameters(&vector![4.0])?;
@@ -104,7 +110,9 @@ pub type MatrixYU<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYU<<F as 
 /// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
 /// # /// Kinetic and potential energy, J.
 /// # #[function]
-/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] {
+/// #     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// # }
 /// let mut mean = Quadrature::<Energy>::new();
 /// let mut irk = Irk::<Spring, Gauss<3>>::new(Options::default())?;
 /// irk.set_parameters(&vector![4.0])?;
@@ -216,9 +224,12 @@ pub trait GraphFunction: Function {
 /// # fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
 /// # /// Kinetic and potential energy, J.
 /// # #[function]
-/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] { [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]] }
+/// # fn energy(x: [f64; 2], _u: f64, p: f64) -> [f64; 2] {
+/// #     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// # }
 /// let structure = &Energy::STRUCTURE;
-/// assert_eq!((structure.name, structure.x, structure.p), ("Energy", &["x[0]", "x[1]"][..], &["p"][..]));
+/// assert_eq!(structure.name, "Energy");
+/// assert_eq!((structure.x, structure.p), (&["x[0]", "x[1]"][..], &["p"][..]));
 /// // The first output by x[1]; the second by x[0] and p. Columns count (ẋ, x, z, u, p).
 /// let entries: Vec<_> = structure.jacobian.iter().collect();
 /// assert_eq!(entries, [(0, 3), (1, 2), (1, 5)]);

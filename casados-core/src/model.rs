@@ -27,7 +27,7 @@ pub type ArrayW<M, T> = <<M as Dae>::Shape as Shape>::ArrayW<T>;
 /// # use casados::model::VectorX;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -46,7 +46,7 @@ pub type VectorX<M, T> = <<M as Dae>::Shape as Shape>::VectorX<T>;
 /// # use casados::model::VectorZ;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -65,7 +65,7 @@ pub type VectorZ<M, T> = <<M as Dae>::Shape as Shape>::VectorZ<T>;
 /// # use casados::model::VectorU;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -74,7 +74,8 @@ pub type VectorZ<M, T> = <<M as Dae>::Shape as Shape>::VectorZ<T>;
 /// # irk.set_parameters(&vector![4.0, 0.1])?;
 /// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
 /// let lambda = vector![1.0, 0.0];
-/// let by_force: VectorU<Spring, f64> = irk.adjoint(&x0, &u, h, &lambda)?.grad_u; // SVector<f64, 1>
+/// // SVector<f64, 1>
+/// let by_force: VectorU<Spring, f64> = irk.adjoint(&x0, &u, h, &lambda)?.grad_u;
 /// assert!((by_force[0] - 0.5 * h * h).abs() < 1e-4);
 /// # Ok::<(), casados::Error>(())
 /// ```
@@ -85,7 +86,7 @@ pub type VectorU<M, T> = <<M as Dae>::Shape as Shape>::VectorU<T>;
 /// # use casados::model::VectorP;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -104,7 +105,7 @@ pub type VectorP<M, T> = <<M as Dae>::Shape as Shape>::VectorP<T>;
 /// # use casados::model::MatrixXX;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -123,7 +124,7 @@ pub type MatrixXX<M, T> = <<M as Dae>::Shape as Shape>::MatrixXX<T>;
 /// # use casados::model::MatrixXU;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -142,7 +143,7 @@ pub type MatrixXU<M, T> = <<M as Dae>::Shape as Shape>::MatrixXU<T>;
 /// # use casados::model::MatrixXP;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -162,7 +163,7 @@ pub type MatrixXP<M, T> = <<M as Dae>::Shape as Shape>::MatrixXP<T>;
 /// # use casados::model::MatrixZX;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
@@ -185,7 +186,7 @@ pub type MatrixZP<M, T> = <<M as Dae>::Shape as Shape>::MatrixZP<T>;
 /// # use casados::model::MatrixUU;
 /// # use casados::prelude::*;
 /// # use nalgebra::{SMatrix, vector};
-/// # /// An oscillator with a force z: two states, one algebraic state, one control, two parameters.
+/// # /// An oscillator with a force z: two states, one control, two parameters.
 /// # #[dae]
 /// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
 /// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]

@@ -1,6 +1,7 @@
 //! A bound of a state that dynamics alone determine: its multiplier holds a slack that is shorter
 //! than the distance, and lets it go.
 
+use super::ocps::line;
 use super::{Test, change_by_residuals};
 use casados::ocp::{Exact, GeneralCost, HeapIpm, Horizon, Problem};
 use casados::prelude::*;
@@ -42,11 +43,7 @@ fn a_state_at_its_bound() -> Test {
         .on(Horizon::uniform(n, 15.0 / n as f64))?;
     ocp.fix_initial_state(&[0.0, 0.0, 1.0, 5.0, 1.0])?.bound("u", .., 0.0, 2.0)?;
     ocp.bound("x", .., 0.0, f64::INFINITY)?.bound("x[4]", .., 1.0, 30.0)?;
-    for k in 0..=n {
-        let part = k as f64 / n as f64;
-        let x = [part, part, 1.0 + 2.0 * part, 5.0 - 4.0 * part, 1.0 + 9.0 * part];
-        ocp.guess_stage(k, &x, if k < n { &[0.6] } else { &[] })?;
-    }
+    line(&mut ocp, &[0.0, 0.0, 1.0, 5.0, 1.0], &[1.0, 1.0, 3.0, 1.0, 10.0], &[0.6])?;
     let mut ipm = HeapIpm::new(&ocp)?;
     let outcome = ipm.solve(&mut ocp)?;
     println!("{}{outcome}", ipm.log());

@@ -1,21 +1,11 @@
 //! Problems in units of engineers: states are millions, and small numbers beside them.
 
+use super::ocps::line;
 use super::{Test, solve};
 use casados::ocp::{Formulation, GeneralCost, HeapOcp, Horizon, Problem};
 use casados::prelude::*;
 use casados::{Erk, Rk4};
 use std::f64::consts::PI;
-
-/// The guess: a line between two states, and a control.
-fn guess<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, from: &[f64], to: &[f64], u: &[f64]) -> Test {
-    let n = ocp.intervals();
-    for k in 0..=n {
-        let part = k as f64 / n as f64;
-        let x: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + part * (b - a)).collect();
-        ocp.guess_stage(k, &x, if k < n { u } else { &[] })?;
-    }
-    Ok(())
-}
 
 /// Components of the state at a stage.
 fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[(usize, f64)]) -> Test {
@@ -93,7 +83,7 @@ fn shuttle_in_feet() -> Test {
     fix(&mut ocp, 0, &values)?;
     fix(&mut ocp, n, &[(0, 80000.0), (3, 2500.0), (4, -5.0 * degree)])?;
     let end = [80000.0, 1.0, 0.5, 2500.0, -5.0 * degree, 0.1, 2000.0];
-    guess(&mut ocp, &start, &end, &[17.0, -0.7])?;
+    line(&mut ocp, &start, &end, &[17.0, -0.7])?;
     is_solved(&mut ocp, -0.5958546686713527, 25)
 }
 
@@ -130,6 +120,6 @@ fn satellite_in_metres() -> Test {
     let [(low, fast), (high, slow)] = [7e6, 8e6].map(|r: f64| (r, (3.986004418e14 / r).sqrt()));
     fix(&mut ocp, 0, &[(0, low), (1, 0.0), (2, fast), (3, 1000.0)])?;
     fix(&mut ocp, n, &[(0, high), (1, 0.0), (2, slow)])?;
-    guess(&mut ocp, &[low, 0.0, fast, 1000.0, 5000.0], &[high, 0.0, slow, 850.0, 5000.0], &[0.0])?;
+    line(&mut ocp, &[low, 0.0, fast, 1000.0, 5000.0], &[high, 0.0, slow, 850.0, 5000.0], &[0.0])?;
     is_solved(&mut ocp, 5158.556192072234, 25)
 }

@@ -37,7 +37,8 @@ use bytemuck::Zeroable;
 /// let (x0, controls, ends) = (vector![2.0], [vector![0.0], vector![0.0]], [1.0, 2.0]);
 /// let (_, derivatives) = horizon.with(&mut integral).forward(&x0, &controls, &ends)?;
 /// assert!((integral.q[0] - 4.0).abs() < 1e-6);
-/// // NY × NX, and NY × NU for each interval: ∂x(t)/∂u_0 is 2 t, later on 2; ∂x(t)/∂u_1 is 2 (t − 1).
+/// // NY × NX, and NY × NU for each interval: ∂x(t)/∂u_0 is 2 t, later on 2; ∂x(t)/∂u_1 is
+/// // 2 (t − 1).
 /// assert!((derivatives.dq_dx0[0] - 2.0).abs() < 1e-6);
 /// assert!((derivatives.dq_du[0][0] - 3.0).abs() < 1e-6);
 /// assert!((derivatives.dq_du[1][0] - 1.0).abs() < 1e-6);

@@ -59,11 +59,13 @@ pub enum BatchError {
 /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
 /// # use casados::batch::Slice;
 /// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
-/// let intervals = Intervals { x0: &[vector![0.0, 0.0]], u: &[vector![1.0]], h: &[0.1], ..Default::default() };
+/// let (x0, u) = ([vector![0.0, 0.0]], [vector![1.0]]);
+/// let intervals = Intervals { x0: &x0, u: &u, h: &[0.1], ..Default::default() };
 /// let mut results = vec![casados::result::Nominal::default(); 3];
 /// // One interval, but places for three results.
-/// let Err(BatchError::Length { slice, .. }) = batch.solve(&intervals, &mut results) else { panic!() };
-/// assert_eq!(slice, Slice::Results);
+/// let error = batch.solve(&intervals, &mut results);
+/// let (slice, length) = (Slice::Results, 3);
+/// assert_eq!(error, Err(BatchError::Length { slice, length, intervals: 1 }));
 /// assert_eq!(slice.to_string(), "results");
 /// # Ok::<(), casados::Error>(())
 /// ```

@@ -17,7 +17,8 @@ use core::any::Any;
 /// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
 /// # #[ode]
 /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
-/// // What integrators have if nothing is said: memory of derivatives is there once they are asked for.
+/// // What integrators have if nothing is said: memory of derivatives is there once they are asked
+/// // for.
 /// let mut irk = Irk::<Cart, Gauss<2>, f64, Heap>::new(Options::default())?;
 /// irk.reserve_forward()?; // now, and not in the first call
 /// assert!((irk.forward(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0] - 1.0).abs() < 1e-14);

@@ -46,7 +46,8 @@ pub struct Directional<const C: usize>;
 /// # use casados::mode;
 /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Adjoint>>::inline(Options::default())?;
 /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
-/// assert!((irk.adjoint(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+/// // Nothing is allocated.
+/// assert!((irk.adjoint(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14);
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +63,8 @@ pub struct Adjoint<const C: usize = 1>;
 /// # use casados::mode;
 /// let mut irk = Irk::<Cart, Gauss<2>, f64, Inline<mode::Hessian>>::inline(Options::default())?;
 /// let (x0, u) = (vector![0.0, 0.0], vector![2.0]);
-/// assert!((irk.hessian(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14); // nothing is allocated
+/// // Nothing is allocated.
+/// assert!((irk.hessian(&x0, &u, 1.0, &vector![1.0, 0.0])?.x[0] - 1.0).abs() < 1e-14);
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

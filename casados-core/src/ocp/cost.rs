@@ -23,7 +23,8 @@ use core::fmt;
 /// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
 /// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
 /// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
 /// /// A cart with any cost, or a pair of them.
 /// fn effortless<C>(cost: C) -> Result<f64, Box<dyn std::error::Error>>
 /// where

@@ -109,7 +109,8 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Slopes {
 /// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
 /// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
 /// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
 /// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::RankOne)?;
 /// assert!(sqp.solve(&mut ocp)?.is_converged());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -140,7 +141,8 @@ pub enum Update {
 /// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
 /// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
 /// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
 /// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::default())?;
 /// let _: Secant = sqp.curvature; // instead of `Exact`
 /// assert!(sqp.solve(&mut ocp)?.is_converged());

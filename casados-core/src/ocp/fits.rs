@@ -1,4 +1,4 @@
-//! Costs and constraints that fit to dynamics.
+//! Costs and constraints of the variables that dynamics have, for messages of the compiler.
 
 use super::constraint::Constraints;
 use super::cost::Cost;

@@ -39,7 +39,8 @@ impl Shape {
 /// # qp.fix_initial_state(&[1.0])?;
 /// // A of the first stage, NX × NX, read.
 /// let stage = qp.view().stages().next().unwrap();
-/// assert_eq!((stage.a().shape(), stage.a().get(0, 0), stage.a().get(1, 0)), ((1, 1), Some(1.0), None));
+/// assert_eq!(stage.a().shape(), (1, 1));
+/// assert_eq!((stage.a().get(0, 0), stage.a().get(1, 0)), (Some(1.0), None));
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

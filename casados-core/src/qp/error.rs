@@ -75,7 +75,8 @@ pub enum QpField {
 /// let mut stage = qp.stages_mut().next().unwrap();
 /// stage.u_bounds_mut().soften_side(0, Side::Lower, 1.0, 1.0);
 /// let stage = qp.view().stages().next().unwrap();
-/// assert_eq!((stage.u_bounds().lower_linear[0], stage.u_bounds().upper_linear[0]), (1.0, f64::INFINITY));
+/// let bounds = stage.u_bounds();
+/// assert_eq!((bounds.lower_linear[0], bounds.upper_linear[0]), (1.0, f64::INFINITY));
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,6 +12,7 @@ mod complex;
 mod double;
 #[cfg(feature = "num-dual")]
 mod dual;
+mod each;
 mod field;
 mod float;
 pub(crate) mod lanes;
@@ -22,6 +23,7 @@ mod single;
 mod strided;
 mod tangent;
 
+pub(crate) use each::each;
 pub use field::Field;
 pub(crate) use field::{transposed, two_sum};
 #[doc(hidden)]
@@ -35,20 +37,6 @@ pub use tangent::Tangent;
 
 use crate::shape::Plain;
 use bytemuck::Zeroable;
-
-/// A loop over indices from zero on, for kernels: iterators over arrays would be inlined into each,
-/// and simplified there again, which takes most of the time to compile it. `continue` in its body
-/// goes round for ever.
-macro_rules! each {
-    ($index:ident < $count:expr => $body:block) => {{
-        let mut $index = 0;
-        while $index < $count {
-            $body
-            $index += 1;
-        }
-    }};
-}
-pub(crate) use each;
 
 /// A number that lies in memory as itself.
 macro_rules! own_cell {

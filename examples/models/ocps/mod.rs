@@ -43,7 +43,7 @@ fn rk4<M: Ode>(steps: usize) -> Result<Erk<M, Rk4>, Error> {
 }
 
 /// The straight line between two states, and a constant control, as the guess.
-fn line<P: Formulation<f64>>(
+pub fn line<P: Formulation<f64>>(
     ocp: &mut HeapOcp<P>,
     from: &[f64],
     to: &[f64],

@@ -21,7 +21,8 @@ use bytemuck::Zeroable;
 /// # fn two_metres(x: [f64; 2]) -> f64 { x[0] - 2.0 }
 /// let time = |crossing| {
 ///     let event = Event::terminal::<TwoMetres>(crossing);
-///     let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[event])?;
+///     let adaptive = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+///     let mut ball = Hybrid::new(adaptive, &[event])?;
 ///     Ok::<f64, Error>(ball.solve(&vector![0.0, 7.0], &vector![], 2.0)?.t)
 /// };
 /// assert!((time(Crossing::Rising)? - 0.4).abs() < 1e-9);

@@ -24,7 +24,8 @@ use alloc::vec::Vec;
 /// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
 /// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
 /// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
 /// let mut ipm = HeapIpm::new(&ocp)?;
 /// let outcome = ipm.solve(&mut ocp)?;
 /// assert!(outcome.is_converged(), "{outcome}");

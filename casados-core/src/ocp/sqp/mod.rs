@@ -118,10 +118,12 @@ pub struct Sqp<S, C, T, D, M> {
 /// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
 /// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
 /// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
 /// let mut sqp = HeapSqp::new(&ocp)?; // exact Hessians; `.gauss_newton()` after it takes others
 /// assert!(sqp.solve(&mut ocp)?.is_converged());
-/// // The velocity at the end is free: the push falls along a line, from 20/7 in the first interval.
+/// // The velocity at the end is free: the push falls along a line, from 20/7 in the first
+/// // interval.
 /// assert!((ocp.stage(0)?.u[0] - 20.0 / 7.0).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -21,7 +21,7 @@ use crate::scalar::Real;
 
 /// Units of single precision are no larger: squares of them are numbers.
 const FARTHEST: f64 = 8192.0;
-/// What is below the leading digit of a number.
+/// The bits of a number below its leading digit: without them it is a power of two.
 const DIGITS: u64 = (1 << 52) - 1;
 
 /// How many numbers are units of rows.
@@ -156,9 +156,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The QP, the iterate and the solution, into units or back.
     pub(super) fn scale<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>, way: Way) {
-        let Some(sizes) = state.sizes else { return };
-        let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
-        let scale = Scale { units: Units { sizes, rows }, way, judges: false };
+        let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
+        let scale = Scale { units, way, judges: false };
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());
         scale.point(self.solution.view_mut());
@@ -171,9 +170,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state: &State<T>,
         way: Way,
     ) {
-        let Some(sizes) = state.sizes else { return };
-        let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
-        let scale = Scale { units: Units { sizes, rows }, way, judges: false };
+        let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
+        let scale = Scale { units, way, judges: false };
         scale.multipliers(self.solution.view_mut());
         scale.multipliers(self.weights.view_mut());
     }
@@ -185,9 +183,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state: &State<T>,
         residuals: &Residuals,
     ) -> f64 {
-        let Some(sizes) = state.sizes else { return residuals.largest() };
-        let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
-        let mut scale = Scale { units: Units { sizes, rows }, way: Way::Into, judges: true };
+        let Some(units) = units(self.work.as_ref(), ocp, state) else { return residuals.largest() };
+        let mut scale = Scale { units, way: Way::Into, judges: true };
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());
         let (judged, _) = ocp.residuals();
@@ -211,6 +208,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         });
         Worst { violation: worst.violation * unit, ..worst }
     }
+}
+
+/// The units in the memory of a run, where they are not all one.
+fn units<'s, P, T, D, M>(work: &'s [T], ocp: &Ocp<P, T, D, M>, state: &State<T>) -> Option<Units<'s, T>>
+where
+    P: Formulation<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+{
+    let rows = work.get(penalties_end(ocp)..).unwrap_or_default();
+    state.sizes.map(|sizes| Units { sizes, rows })
 }
 
 /// The linear penalties that are remembered, in the memory of a run.
