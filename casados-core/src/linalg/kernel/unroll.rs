@@ -73,54 +73,47 @@ pub trait AtPivot {
     const INSTRUCTIONS: usize;
     /// Whether it is done for each update, or for each block.
     const UPDATES: bool = false;
-    /// Whether it looks at the pivots that follow, on the way from the last to the first.
-    const OTHERS: bool = false;
-    /// With the pivots that follow in the plan. To be `#[inline(always)]`.
-    fn at<A: Arithmetic>(
-        &mut self,
-        pivot: &'static Pivot,
-        others: &'static [Pivot],
-        updates: &'static [Update],
-    );
+    /// With the updates of the pivot, on the way from the first to the last. To be
+    /// `#[inline(always)]`.
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [Update]);
 }
 
 /// From the first pivot to the last.
 #[inline(always)]
 pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
-    if const { is_short_plan::<A, M, V>() } {
+    if const { is_short_plan::<A, M>(V::UPDATES, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::from_first::<A, M, V>(visit);
     }
-    let (mut pivots, mut updates) = (M::STRUCTURE.elimination.pivots, M::STRUCTURE.elimination.updates);
-    while let Some((pivot, others)) = pivots.split_first() {
+    let mut updates = M::STRUCTURE.elimination.updates;
+    for pivot in M::STRUCTURE.elimination.pivots {
         let Some((own, rest)) = updates.split_at_checked(updates_of(pivot)) else { return };
-        (pivots, updates) = (others, rest);
-        visit.at::<A>(pivot, others, own);
+        updates = rest;
+        visit.at::<A>(pivot, own);
     }
 }
 
-/// From the last pivot to the first, without updates; with those that follow where they are asked
-/// for.
+/// From the last pivot to the first, without updates.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
-    if const { is_short_plan::<A, M, V>() } {
+    if const { is_short_plan::<A, M>(V::UPDATES, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::from_last::<A, M, V>(visit);
     }
     let all = M::STRUCTURE.elimination.pivots;
     // The optimiser unrolls a loop over indices where a plan is short, as in firmware, but not one
     // that goes backwards through a slice, which is faster where it stays a loop.
-    if const { !V::OTHERS && cfg!(feature = "std") } {
+    if const { cfg!(feature = "std") } {
         for pivot in all.iter().rev() {
-            visit.at::<A>(pivot, &[], &[]);
+            visit.at::<A>(pivot, &[]);
         }
         return;
     }
     let mut index = all.len();
     while index > 0 {
         index -= 1;
-        if let Some((pivot, others)) = all.get(index..).and_then(|pivots| pivots.split_first()) {
-            visit.at::<A>(pivot, others, &[]);
+        if let Some(pivot) = all.get(index) {
+            visit.at::<A>(pivot, &[]);
         }
     }
 }
@@ -137,32 +130,15 @@ pub trait AtSupernode {
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]);
 }
 
-/// At the turn of its first pivot.
-struct AtFirst<'a, V>(&'a mut V);
-
-impl<V: AtSupernode> AtPivot for AtFirst<'_, V> {
-    const INSTRUCTIONS: usize = V::INSTRUCTIONS;
-    const OTHERS: bool = true;
-    #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [Update]) {
-        if const { !GROUPED } {
-            return self.0.at::<A, 1>([pivot]);
-        }
-        match (pivot.supernode, others) {
-            (4, [second, third, fourth, ..]) => self.0.at::<A, 4>([pivot, second, third, fourth]),
-            (3, [second, third, ..]) => self.0.at::<A, 3>([pivot, second, third]),
-            (2, [second, ..]) => self.0.at::<A, 2>([pivot, second]),
-            (1, _) => self.0.at::<A, 1>([pivot]),
-            _ => {}
-        }
-    }
-}
-
 /// From the first supernode to the last.
 #[inline(always)]
 pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
-    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
-        return from_first::<A, M, _>(&mut AtFirst(visit));
+    if const { is_short_plan::<A, M>(false, V::INSTRUCTIONS) } {
+        #[cfg(all(feature = "std", not(debug_assertions)))]
+        return lines::supernodes_from_first::<A, M, V>(visit);
+    }
+    if const { !GROUPED } {
+        return from_first::<A, M, _>(&mut Single(visit));
     }
     for supernode in M::STRUCTURE.elimination.supernodes {
         at_supernode::<A, M, V>(visit, supernode);
@@ -172,19 +148,38 @@ pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut 
 /// From the last supernode to the first.
 #[inline(always)]
 pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
-    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
-        return from_last::<A, M, _>(&mut AtFirst(visit));
+    if const { is_short_plan::<A, M>(false, V::INSTRUCTIONS) } {
+        #[cfg(all(feature = "std", not(debug_assertions)))]
+        return lines::supernodes_from_last::<A, M, V>(visit);
+    }
+    if const { !GROUPED } {
+        return from_last::<A, M, _>(&mut Single(visit));
     }
     for supernode in M::STRUCTURE.elimination.supernodes.iter().rev() {
         at_supernode::<A, M, V>(visit, supernode);
     }
 }
 
+/// Each pivot is a supernode.
+struct Single<'a, V>(&'a mut V);
+
+impl<V: AtSupernode> AtPivot for Single<'_, V> {
+    const INSTRUCTIONS: usize = V::INSTRUCTIONS;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Update]) {
+        self.0.at::<A, 1>([pivot]);
+    }
+}
+
 #[inline(always)]
 fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode: &'static Supernode) {
-    let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..);
-    if let Some((pivot, others)) = pivots.and_then(|pivots| pivots.split_first()) {
-        AtFirst(visit).at::<A>(pivot, others, &[]);
+    let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..).unwrap_or_default();
+    match (supernode.count, pivots) {
+        (4, [a, b, c, d, ..]) => visit.at::<A, 4>([a, b, c, d]),
+        (3, [a, b, c, ..]) => visit.at::<A, 3>([a, b, c]),
+        (2, [a, b, ..]) => visit.at::<A, 2>([a, b]),
+        (1, [a, ..]) => visit.at::<A, 1>([a]),
+        _ => {}
     }
 }
 
@@ -194,12 +189,14 @@ pub const fn is_long<M: Dae, const S: usize>() -> bool {
     M::STRUCTURE.elimination.slots.len() * S * S > 250
 }
 
-const fn is_short_plan<A: Arithmetic, M: Dae, V: AtPivot>() -> bool {
+/// Whether the pivots of a plan are unrolled, with so many instructions for each block, or for each
+/// update of one.
+const fn is_short_plan<A: Arithmetic, M: Dae>(updates: bool, instructions: usize) -> bool {
     let plan = &M::STRUCTURE.elimination;
-    let few = V::UPDATES && V::INSTRUCTIONS <= FEW;
+    let few = updates && instructions <= FEW;
     let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
-    let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
-    WANTED && A::FUSED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= most
+    let count = if updates { plan.updates.len() } else { plan.slots.len() };
+    WANTED && A::FUSED && plan.pivots.len() <= MOST && count * instructions <= most
 }
 
 /// How many blocks a pivot updates.

@@ -66,7 +66,7 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [Update]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [Update]) {
         let blocks = &mut *self.blocks;
         if !pivot.identity {
             let Some(block) = blocks.get_mut(pivot.block as usize) else { return };

@@ -183,7 +183,7 @@ impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, cons
         4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
     };
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], _: &'static [Update]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Update]) {
         Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot);
         self.0.visitor.pass();
     }

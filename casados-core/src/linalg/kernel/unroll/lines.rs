@@ -4,7 +4,7 @@
 //! their constants: without optimisation that took most of its time.
 #![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
 
-use super::{AtPivot, AtRow, updates_of};
+use super::{AtPivot, AtRow, AtSupernode, updates_of};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Dae, Elimination, Pivot, Update};
 use core::marker::PhantomData;
@@ -49,8 +49,24 @@ pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
 /// A pivot.
 macro_rules! pivot {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
-        $(if const { Nth::<$M, $n>::EXISTS } && let Some((pivot, others, updates)) = Nth::<$M, $n>::PIVOT {
-            $visit.at::<$A>(pivot, others, updates);
+        $(if const { Nth::<$M, $n>::EXISTS } && let Some((pivot, updates)) = Nth::<$M, $n>::PIVOT {
+            $visit.at::<$A>(pivot, updates);
+        })*
+    };
+}
+
+/// A supernode, at the turn of its first pivot. There is the code for its own size alone.
+macro_rules! supernode {
+    ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
+        $(sizes!($A, $M, $visit, $n: 1 2 3 4);)*
+    };
+}
+macro_rules! sizes {
+    ($A:ty, $M:ty, $visit:ident, $n:literal: $($size:literal)*) => {
+        $(if const { NthSupernode::<$M, $n, $size>::EXISTS }
+            && let Some(pivots) = NthSupernode::<$M, $n, $size>::PIVOTS
+        {
+            $visit.at::<$A, $size>(pivots);
         })*
     };
 }
@@ -61,13 +77,11 @@ struct Nth<M, const N: usize>(PhantomData<M>);
 
 impl<M: Dae, const N: usize> Nth<M, N> {
     const EXISTS: bool = Self::PIVOT.is_some();
-    const PIVOT: Option<At> = nth(&M::STRUCTURE.elimination, N);
+    const PIVOT: Option<(&'static Pivot, &'static [Update])> = nth(&M::STRUCTURE.elimination, N);
 }
 
-/// A pivot, those that follow, and its updates.
-type At = (&'static Pivot, &'static [Pivot], &'static [Update]);
-
-const fn nth(plan: &Elimination, n: usize) -> Option<At> {
+/// A pivot and its updates.
+const fn nth(plan: &Elimination, n: usize) -> Option<(&'static Pivot, &'static [Update])> {
     if n >= plan.pivots.len() {
         return None;
     }
@@ -77,8 +91,27 @@ const fn nth(plan: &Elimination, n: usize) -> Option<At> {
         index += 1;
     }
     let pivot = &plan.pivots[n];
-    let updates = plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0;
-    Some((pivot, plan.pivots.split_at(n + 1).1, updates))
+    Some((pivot, plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0))
+}
+
+/// The supernode that begins with a pivot, if it has so many.
+struct NthSupernode<M, const N: usize, const SIZE: usize>(PhantomData<M>);
+
+impl<M: Dae, const N: usize, const SIZE: usize> NthSupernode<M, N, SIZE> {
+    const EXISTS: bool = Self::PIVOTS.is_some();
+    const PIVOTS: Option<[&'static Pivot; SIZE]> = supernode(M::STRUCTURE.elimination.pivots, N);
+}
+
+const fn supernode<const SIZE: usize>(pivots: &[Pivot], n: usize) -> Option<[&Pivot; SIZE]> {
+    if n >= pivots.len() || pivots[n].supernode as usize != SIZE {
+        return None;
+    }
+    let (mut all, mut index) = ([&pivots[n]; SIZE], 1);
+    while index < SIZE {
+        all[index] = &pivots[n + index];
+        index += 1;
+    }
+    Some(all)
 }
 
 #[inline(always)]
@@ -89,6 +122,16 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     backwards!(pivot!(A, M, visit));
+}
+
+#[inline(always)]
+pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    forwards!(supernode!(A, M, visit));
+}
+
+#[inline(always)]
+pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    backwards!(supernode!(A, M, visit));
 }
 
 #[cfg(all(test, feature = "alloc"))]
