@@ -141,16 +141,9 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         // registers of AVX-512, with which drivers compute only after detection; see the head of
         // `lanes`.
         unsafe { avx512::run(&mut kernel) }
-    } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
+    } else if const { align_of::<K::Number>() == 32 } {
         // SAFETY: the same of AVX2.
         unsafe { avx2::run(&mut kernel) }
-    } else if const { align_of::<K::Number>() == 32 } {
-        match level() {
-            // SAFETY: `level` says what the machine has.
-            Level::Avx512 => unsafe { avx512::run(&mut kernel) },
-            // SAFETY: as above.
-            _ => unsafe { avx2::run(&mut kernel) },
-        }
     } else if const { K::WIDE } {
         match level() {
             // SAFETY: `level` says what the machine has.

@@ -53,7 +53,7 @@ pub(in crate::linalg) struct Factor<'a, M, E, const S: usize> {
 impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = S.is_multiple_of(4) && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         if has_all::<M, _>(self.blocks) {

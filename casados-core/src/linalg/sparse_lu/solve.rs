@@ -65,7 +65,7 @@ struct Solve<'a, M, E, R, const S: usize> {
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         packets!(Down, Up: self);
@@ -85,7 +85,7 @@ struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         packets!(TransposedDown, TransposedUp: self.0);

@@ -27,7 +27,7 @@ pub struct Solve<'a, M: Dae, E: Lanes, const S: usize> {
 impl<M: Dae, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, 1>();
+    const WIDE: bool = S >= 8 && is_long::<M, 1>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { basis, f, blocks, rows, solution } = self;
