@@ -16,6 +16,7 @@ mod hard;
 mod known;
 #[cfg(feature = "clarabel")]
 mod random;
+mod unstable;
 
 use casados::qp::{
     HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, QpStatistics, Residuals, residuals,

@@ -53,7 +53,7 @@ impl<T: Real> Iterate<'_, T> {
         self.evaluate_values::<E>();
         self.sides.take_multipliers(solution);
         self.sides.guess();
-        self.evaluate_gradient::<E>(solution.dynamics);
+        self.first_gradient::<E>(limits, solution.dynamics);
         self.regularise(false);
         let (mut factor, mut changes) = (true, usize::MAX);
         loop {

@@ -52,13 +52,14 @@ pub struct Iterate<'a, T> {
 /// Where the multipliers `π` of the dynamics come from when a gradient is computed.
 #[derive(Clone, Copy)]
 pub enum Costates {
-    /// The adjoint recursion: the gradient in the states vanishes.
-    Adjoint,
-    /// The adjoint recursion of the controlled system, with the last factors: where the gradient in
-    /// the controls vanishes both are the same, and errors decay where the adjoint recursion lets
-    /// them grow. With the changes of multipliers of periodic states.
+    /// The adjoint recursion of the controlled system, `(A + B K)ᵀ` in place of `Aᵀ`, with the
+    /// feedback `K` of the last factors: `Kᵀ` times the gradient in the controls is added, which
+    /// vanishes at the solution. Errors decay where the recursion of the dynamics alone lets them
+    /// grow. Without factors it is that one.
     Controlled,
-    /// They are given.
+    /// The same after a step, with the changes of multipliers of periodic states.
+    AfterStep,
+    /// They are given. Newton's step does not depend on them.
     Given,
 }
 
@@ -145,11 +146,11 @@ impl<'a, T: Real> Iterate<'a, T> {
         self.proximal = if proximal { small * stiffness.max(T::from_f64(1e-4)) } else { T::ZERO };
     }
 
-    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π`
-    /// that make the gradient of the Lagrangian in `x` zero, and the gradient in `u`. Returns the
+    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` by
+    /// the recursion of the controlled system, and the gradient of the Lagrangian. Returns the
     /// objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
-        self.evaluate_parts::<E>(true, Some(multipliers), Costates::Adjoint)
+        self.evaluate_parts::<E>(true, Some(multipliers), Costates::Controlled)
     }
 
     /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is
@@ -158,21 +159,26 @@ impl<'a, T: Real> Iterate<'a, T> {
         let _ = self.evaluate_parts::<E>(true, Some(multipliers), Costates::Given);
     }
 
-    /// The multipliers `π` at the point, by the recursion of the controlled system.
+    /// The multipliers `π` after a step, by the recursion of the controlled system.
     pub fn controlled_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled);
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::AfterStep);
     }
 
     /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are
     /// in `scratch` afterwards.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
-        let _ = self.evaluate_parts::<E>(true, None, Costates::Adjoint);
+        let _ = self.evaluate_parts::<E>(true, None, Costates::Given);
     }
 
     /// What is left of [`evaluate`](Self::evaluate) after
     /// [`evaluate_values`](Self::evaluate_values).
     pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Adjoint);
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled);
+    }
+
+    /// The same with given multipliers.
+    pub fn evaluate_gradient_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Given);
     }
 
     #[inline(always)]
@@ -190,7 +196,7 @@ impl<'a, T: Real> Iterate<'a, T> {
 
     /// Forces of the constraints, by rows.
     #[inline(always)]
-    fn write_forces(&mut self, controlled: bool) {
+    fn write_forces(&mut self, after_step: bool) {
         let sides = &mut self.sides;
         let forces = &mut *self.gradient;
         forces.fill(T::ZERO);
@@ -199,7 +205,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
-        if controlled {
+        if after_step {
             // What keeps variables near where they are belongs to the step, not to the problem.
             for place in Places::<T>::new(self.qp.dims) {
                 let step = part(self.step, place.row, place.n);
@@ -209,15 +215,15 @@ impl<'a, T: Real> Iterate<'a, T> {
             }
         }
         if let Some(coupling) = &self.coupling {
-            coupling.push(self.qp, controlled, forces);
+            coupling.push(self.qp, after_step, forces);
         }
     }
 
-    /// The multipliers `π`, the gradient in `u`, and the objective.
+    /// The multipliers `π`, the gradient of the Lagrangian, and the objective.
     #[inline(always)]
     fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
-        let controlled = matches!(costates, Costates::Controlled);
-        self.write_forces(controlled);
+        let after_step = matches!(costates, Costates::AfterStep);
+        self.write_forces(after_step);
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
         largest = larger::<T, E>(largest, self.gradient);
@@ -251,12 +257,6 @@ impl<'a, T: Real> Iterate<'a, T> {
                 *minus = -force;
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
-            if controlled {
-                let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
-                let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
-                let y = part_mut(self.riccati.y, place.v + nx, place.nu);
-                eliminate::<T, E>(g, panel, ld, inverse, y, nx);
-            }
             if place.stage > 0 && matches!(costates, Costates::Given) {
                 let before = place.dynamics.saturating_sub(pad::<T>(nx));
                 let pi = part(multipliers, before, nx);
@@ -265,12 +265,18 @@ impl<'a, T: Real> Iterate<'a, T> {
                 }
                 largest = larger::<T, E>(largest, pi);
             } else if place.stage > 0 {
-                // π is what makes this part zero.
+                // π is what elimination of the controls leaves, g what it takes.
+                let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
+                let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
+                let y = part_mut(self.riccati.y, place.v + nx, place.nu);
+                let left = part_mut(self.riccati.g, 0, ld);
+                assign(left, g);
+                eliminate::<T, E>(left, panel, ld, inverse, y, nx);
                 let before = place.dynamics.saturating_sub(pad::<T>(nx));
                 let pi = part_mut(multipliers, before, nx);
-                for (pi, g) in pi.iter_mut().zip(part_mut(g, 0, nx)) {
-                    *pi = *g;
-                    *g = T::ZERO;
+                assign(pi, left);
+                for (g, &pi) in g.iter_mut().zip(&*pi) {
+                    *g = *g - pi;
                 }
                 largest = larger::<T, E>(largest, pi);
             } else if self.first == First::Fixed {
@@ -281,7 +287,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 given.iter_mut().for_each(|g| *g = T::ZERO * *g);
             }
         }
-        if let Some(coupling) = self.coupling.as_mut().filter(|_| !controlled) {
+        if let Some(coupling) = self.coupling.as_mut().filter(|_| !after_step) {
             coupling.fold(self.qp, self.stationarity);
             if self.first == First::Fixed {
                 // What the last state pushes a given first one with belongs to its multiplier, too.

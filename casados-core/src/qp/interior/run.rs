@@ -63,7 +63,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                 if tries > 0 {
                     attempt.statistics = statistics;
                 }
-                iterate.begin::<E>(options, &attempt, solution);
+                iterate.begin::<E>(options, &attempt, &limits, solution);
                 iterate.iterations::<E>(&attempt, &limits, over, solution)
             }
         };
@@ -142,6 +142,7 @@ impl<T: Real> Iterate<'_, T> {
         &mut self,
         options: &InteriorPointOptions,
         attempt: &Attempt,
+        limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
     ) {
         let start = attempt.start;
@@ -162,8 +163,24 @@ impl<T: Real> Iterate<'_, T> {
         };
         self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
-        let _ = self.evaluate::<E>(solution.dynamics);
+        self.evaluate_values::<E>();
+        self.first_gradient::<E>(limits, solution.dynamics);
         self.regularise(attempt.proximal);
+    }
+
+    /// The gradient before the first step. No step depends on the multipliers of the dynamics:
+    /// where the recursion, still without feedback, lets them grow so large that a gradient that
+    /// should vanish is not seen among their rounding errors, they are zero.
+    #[inline(always)]
+    pub fn first_gradient<E: Packed<T>>(&mut self, limits: &Limits<T>, multipliers: &mut [T]) {
+        self.evaluate_gradient::<E>(multipliers);
+        let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
+        // NaN is not small either.
+        let is_seen = rounding <= limits.of(self.terms).forces;
+        if !is_seen {
+            multipliers.fill(T::ZERO);
+            self.evaluate_gradient_at::<E>(multipliers);
+        }
     }
 
     #[inline(always)]
