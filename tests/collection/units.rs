@@ -2,7 +2,7 @@
 
 use super::ocps::line;
 use super::{Test, solve};
-use casados::ocp::{Formulation, GeneralCost, HeapOcp, Horizon, Problem};
+use casados::ocp::{Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Problem, SecondOrder, Status};
 use casados::prelude::*;
 use casados::{Erk, Rk4};
 use std::f64::consts::PI;
@@ -106,10 +106,9 @@ fn duration(x: [f64; 5], _u: [f64; 1]) -> f64 {
     x[4]
 }
 
-/// From a circular orbit to one that is 1000 km higher, in the shortest time. IPOPT takes 273
-/// iterations.
-#[test]
-fn satellite_in_metres() -> Test {
+/// From a circular orbit to one that is 1000 km higher, in the shortest time.
+fn transfer() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>>
+{
     let n = 60;
     let erk = Erk::<Satellite, Rk4>::new(Options { steps: 2, ..Options::default() })?;
     let mut ocp = Problem::new(erk)
@@ -121,5 +120,21 @@ fn satellite_in_metres() -> Test {
     fix(&mut ocp, 0, &[(0, low), (1, 0.0), (2, fast), (3, 1000.0)])?;
     fix(&mut ocp, n, &[(0, high), (1, 0.0), (2, slow)])?;
     line(&mut ocp, &[low, 0.0, fast, 1000.0, 5000.0], &[high, 0.0, slow, 850.0, 5000.0], &[0.0])?;
-    is_solved(&mut ocp, 5158.556192072234, 25)
+    Ok(ocp)
+}
+
+/// IPOPT takes 273 iterations.
+#[test]
+fn satellite_in_metres() -> Test {
+    is_solved(&mut transfer()?, 5158.556192072234, 25)
+}
+
+/// Small penalties leave the satellite where it is, since that takes no time. The interior point
+/// does not solve the problem, and does not say that there is no solution.
+#[test]
+fn satellite_by_interior_point() -> Test {
+    let mut ocp = transfer()?;
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    assert!(!matches!(outcome.status, Status::Infeasible { .. }), "{outcome}");
+    Ok(())
 }

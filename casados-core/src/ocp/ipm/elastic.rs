@@ -27,17 +27,21 @@ pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<
     state.elastic.and_then(|_| ocp.worst(given).0)
 }
 
-/// The end of a run at a stationary point; nothing where penalties stand for bounds and larger ones
-/// may help.
+/// The end of a run at a stationary point, where violations cost so much; nothing where penalties
+/// stand for bounds and larger ones may help. Near a minimum `v̄` of `f + ρ θ` a point without
+/// violation has an objective of `f(v̄) + ρ θ(v̄)` at least: a violation that costs less than the
+/// objective has changed by on the way may be there because it pays.
 pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
     (given, units): (&[T], &[T]),
+    cost: f64,
     options: &IpmOptions,
 ) -> Option<Status> {
     let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
-    let stays = worst.violation > STAYS * state.stationary_violation;
+    let stays = worst.violation > STAYS * state.stationary_violation
+        && cost >= (ocp.objective.to_f64() - state.first_objective).abs();
     if stays || penalty >= LARGEST * options.elastic_penalty {
         return Some(ocp.status_of_worst(&worst));
     }

@@ -207,7 +207,8 @@ where
     ) -> Next {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         if state.error <= self.options.tolerance {
-            let end = elastic::verdict(ocp, state, (work.penalties, work.units), &self.options);
+            let cost = row.objective - ocp.objective.to_f64();
+            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
             return end.map_or(Next::NewPenalties, Next::End);
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {

@@ -126,6 +126,7 @@ where
             regularisation: Regularisation::default(),
             delta: 0.0,
             elastic: None,
+            first_objective: ocp.objective.to_f64(),
             stationary_violation: f64::INFINITY,
             acceptable: 0,
             held: 0,

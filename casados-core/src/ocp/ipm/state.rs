@@ -37,6 +37,8 @@ pub(super) struct State<'c> {
     pub delta: f64,
     /// The penalty, if bounds are soft.
     pub elastic: Option<f64>,
+    /// The objective at the first iterate.
+    pub first_objective: f64,
     /// The violation that the last penalty left.
     pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
