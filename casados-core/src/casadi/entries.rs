@@ -1,14 +1,22 @@
 //! Matrices of a problem as sums of numbers of its stages: the lists by which they are written.
 
 use super::sparsity::Sparsity;
-use crate::qp::QpView;
 use alloc::vec::Vec;
 
-/// A number that is added to an entry: where it is in the matrix of a stage, or its value.
+/// A number that is added to an entry: where it is among those of a stage, or its value.
 #[derive(Clone, Copy, Debug)]
 pub enum Slot {
-    /// A number of the matrix of a stage.
-    Entry {
+    /// A number of a block of an interval.
+    Interval {
+        /// The stage at its start.
+        stage: usize,
+        /// Which of the blocks: see [`Blocks`].
+        block: usize,
+        /// The place in it.
+        index: usize,
+    },
+    /// A number of the matrix at a node.
+    Node {
         /// The stage.
         stage: usize,
         /// The place in its matrix.
@@ -18,17 +26,24 @@ pub enum Slot {
     Constant(f64),
 }
 
+/// Derivatives of an interval, column after column: those of its end by `x` and `u`, and the blocks
+/// `xx`, `xu` and `uu` of second derivatives. What was not asked for is empty.
+pub type Blocks<'a> = [&'a [f64]; 5];
+
 /// A number that is added to an entry, with the row and the column of this.
 pub type Term = ([usize; 2], Slot);
 
-/// A matrix as a sum: what is added to which entry.
+/// A matrix as a sum: what is added to which entry. First come the numbers of all intervals, then
+/// those of nodes and constants.
 #[derive(Debug, Default)]
 pub struct Entries {
     /// The entries.
     pub sparsity: Sparsity,
-    /// Numbers of the matrices of each stage.
-    stages: Vec<Vec<Run>>,
-    constants: Vec<(u32, f64)>,
+    /// Numbers of each interval.
+    intervals: Vec<Vec<Run>>,
+    /// Numbers of the matrix at each node.
+    nodes: Vec<Vec<Run>>,
+    constants: Vec<Constant>,
 }
 
 /// Entries one behind the other, whose numbers are at equal distances.
@@ -37,86 +52,117 @@ struct Run {
     /// The first entry.
     entry: u32,
     /// Where its number is.
+    block: u32,
     place: u32,
     /// How far the next one is.
     stride: u32,
     count: u32,
-    /// Whether these entries have numbers of earlier stages, to which these are added.
+    /// Whether these entries have earlier numbers, to which these are added.
+    adds: bool,
+}
+
+/// An entry that has a constant, besides other numbers or alone.
+#[derive(Debug)]
+struct Constant {
+    entry: u32,
+    value: f64,
     adds: bool,
 }
 
 impl Run {
     /// Takes the next entry, if it is where the run goes on.
-    fn take(&mut self, entry: u32, place: u32, adds: bool) -> bool {
-        let Some(stride) = place.checked_sub(self.place + self.stride * (self.count - 1)) else {
+    fn take(&mut self, next: &Self) -> bool {
+        let Some(stride) = next.place.checked_sub(self.place + self.stride * (self.count - 1)) else {
             return false;
         };
-        let goes_on = self.entry + self.count == entry && self.adds == adds;
-        if !goes_on || stride == 0 || self.count > 1 && stride != self.stride {
+        let goes_on = self.entry + self.count == next.entry && self.block == next.block;
+        if !goes_on || self.adds != next.adds || stride == 0 || self.count > 1 && stride != self.stride {
             return false;
         }
         (self.stride, self.count) = (stride, self.count + 1);
         true
+    }
+
+    /// Its entries, times `factor`, out of its block.
+    fn write(&self, block: &[f64], factor: f64, to: &mut [f64]) {
+        let &Self { entry, place, stride, count, adds, .. } = self;
+        let to = &mut to[entry as usize..(entry + count) as usize];
+        let (place, stride) = (place as usize, stride as usize);
+        let from = block.get(place..).unwrap_or_default();
+        if !adds && from.is_empty() {
+            to.fill(0.0);
+        } else if stride == 1 && !adds {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = factor * from);
+        } else if adds {
+            to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, from)| *to += factor * from);
+        } else {
+            to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, from)| *to = factor * from);
+        }
     }
 }
 
 impl Entries {
     /// The matrix of these terms.
     pub fn new(rows: usize, columns: usize, mut terms: Vec<Term>) -> Self {
-        // Constants behind the numbers of stages, which are in order.
-        terms.sort_by_key(|&([row, column], slot)| (column, row, matches!(slot, Slot::Constant(_))));
+        let rank = |slot| match slot {
+            Slot::Interval { .. } => 0,
+            Slot::Node { .. } => 1,
+            Slot::Constant(_) => 2,
+        };
+        // Those of stages stay in order.
+        terms.sort_by_key(|&([row, column], slot)| (column, row, rank(slot)));
         let mut entries: Vec<(usize, usize)> = Vec::new();
-        let (mut stages, mut constants) = (Vec::<Vec<Run>>::new(), Vec::new());
+        let mut matrix = Self::default();
         for ([row, column], slot) in terms {
             let adds = entries.last() == Some(&(row, column));
             if !adds {
                 entries.push((row, column));
             }
             let entry = entries.len() as u32 - 1;
-            match slot {
-                Slot::Entry { stage, index } => {
-                    if stages.len() <= stage {
-                        stages.resize_with(stage + 1, Vec::new);
-                    }
-                    let (runs, place) = (&mut stages[stage], index as u32);
-                    if !runs.last_mut().is_some_and(|run| run.take(entry, place, adds)) {
-                        runs.push(Run { entry, place, stride: 1, count: 1, adds });
-                    }
+            let (list, stage, [block, index]) = match slot {
+                Slot::Interval { stage, block, index } => (&mut matrix.intervals, stage, [block, index]),
+                Slot::Node { stage, index } => (&mut matrix.nodes, stage, [0, index]),
+                Slot::Constant(value) => {
+                    matrix.constants.push(Constant { entry, value, adds });
+                    continue;
                 }
-                Slot::Constant(value) => constants.push((entry, value)),
+            };
+            if list.len() <= stage {
+                list.resize_with(stage + 1, Vec::new);
+            }
+            let run = Run { entry, block: block as u32, place: index as u32, stride: 1, count: 1, adds };
+            if !list[stage].last_mut().is_some_and(|last| last.take(&run)) {
+                list[stage].push(run);
             }
         }
-        let sparsity = Sparsity::from_entries(rows, columns, entries);
-        Self { sparsity, stages, constants }
+        matrix.sparsity = Sparsity::from_entries(rows, columns, entries);
+        matrix
     }
 
-    /// The values of the entries, times `factor`, out of the matrices of the stages: the rows of
-    /// constraints or the Hessian, as `choose` says.
-    pub fn write<'a>(
-        &self,
-        qp: &QpView<'a, f64>,
-        choose: impl Fn((&'a [f64], &'a [f64])) -> &'a [f64],
-        factor: f64,
-        to: &mut [f64],
-    ) {
-        for &(entry, _) in &self.constants {
-            to[entry as usize] = 0.0;
+    /// The numbers of an interval, times `factor`.
+    pub fn write_interval(&self, stage: usize, blocks: &Blocks<'_>, factor: f64, to: &mut [f64]) {
+        for run in self.intervals.get(stage).into_iter().flatten() {
+            run.write(blocks.get(run.block as usize).copied().unwrap_or_default(), factor, to);
         }
-        for (stage, runs) in qp.stages().zip(&self.stages) {
-            let arrays = stage.arrays();
-            let matrix = choose((arrays.matrix, arrays.hessian));
-            for &Run { entry, place, stride, count, adds } in runs {
-                let to = &mut to[entry as usize..(entry + count) as usize];
-                let from = matrix[place as usize..].iter().step_by(stride as usize);
-                if adds {
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
-                } else {
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to = factor * from);
-                }
-            }
+    }
+
+    /// The numbers of the matrices at all nodes and constants, times `factor`, after those of
+    /// intervals.
+    pub fn write_nodes<'a>(&self, matrices: impl Iterator<Item = &'a [f64]>, factor: f64, to: &mut [f64]) {
+        for (matrix, runs) in matrices.zip(&self.nodes) {
+            runs.iter().for_each(|run| run.write(matrix, factor, to));
         }
-        for &(entry, value) in &self.constants {
-            to[entry as usize] += factor * value;
+        for &Constant { entry, value, adds } in &self.constants {
+            let to = &mut to[entry as usize];
+            *to = factor * value + if adds { *to } else { 0.0 };
+        }
+    }
+
+    /// Makes the numbers of the matrix at a node zero.
+    pub fn clear_node(&self, stage: usize, matrix: &mut [f64]) {
+        for &Run { place, stride, count, .. } in self.nodes.get(stage).into_iter().flatten() {
+            let places = matrix[place as usize..].iter_mut().step_by(stride as usize);
+            places.take(count as usize).for_each(|number| *number = 0.0);
         }
     }
 }

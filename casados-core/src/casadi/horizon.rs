@@ -182,6 +182,7 @@ impl<B: Horizon> Client for Horizons<B> {
     }
 
     fn worker(&self) -> Result<Worker<B>, Failure> {
+        self.settings.check()?;
         Ok(Worker {
             batch: B::build(&self.settings.options)?,
             inputs: vec![0.0; self.count * Self::NW],

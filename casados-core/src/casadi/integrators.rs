@@ -26,7 +26,7 @@ use std::sync::{Mutex, PoisonError};
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Settings<O> {
-    /// The length of the interval.
+    /// The length of the interval; of a negative one the model runs backwards in time.
     pub interval: f64,
     /// The options of the integrator.
     pub options: O,
@@ -46,6 +46,11 @@ impl<O: Default> Settings<O> {
     #[must_use]
     pub fn new(interval: f64) -> Self {
         Self { interval, options: O::default(), time: 0.0, algebraic: false, cache: 512, steps_at: &[] }
+    }
+
+    /// Whether the interval has a length: one without ends where it begins, whatever the model is.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if self.interval == 0.0 { Err(Failure("`interval` has no length".into())) } else { Ok(()) }
     }
 }
 
@@ -318,6 +323,7 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
     }
 
     fn worker(&self) -> Result<Self::Worker, Failure> {
+        self.settings.check()?;
         if self.settings.algebraic && Self::NZ > 0 && !I::CONSISTENT {
             return Err(Failure("`algebraic` is for implicit methods with steps of equal size".into()));
         }

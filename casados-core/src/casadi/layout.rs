@@ -10,7 +10,8 @@
 
 use super::entries::{Entries, Slot, Term};
 use super::program::{Limit, Program};
-use crate::qp::{QpView, StageDims, add_symmetric};
+use super::sparsity::Sparsity;
+use crate::qp::{QpView, StageDims};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -28,9 +29,11 @@ pub struct Layout {
     /// The variables with soft bounds.
     soft: Vec<usize>,
     pub jacobian: Entries,
-    pub hessian: Entries,
     /// The upper triangle of the Hessian.
     pub upper: Entries,
+    /// All of it, and where its entries are among those of the upper triangle.
+    pub hessian: Sparsity,
+    pub mirrored: Vec<usize>,
     /// Bounds of variables, and of constraints.
     pub bounds: [Vec<[f64; 2]>; 2],
 }
@@ -48,6 +51,7 @@ struct Slack {
 struct Draft {
     layout: Layout,
     jacobian: Vec<Term>,
+    /// Of the upper triangle.
     hessian: Vec<Term>,
 }
 
@@ -70,9 +74,8 @@ impl Layout {
         let Draft { mut layout, jacobian, hessian } = draft;
         let (n, m) = (layout.variables, layout.constraints);
         layout.jacobian = Entries::new(m, n, jacobian);
-        let upper = hessian.iter().copied().filter(|([row, column], _)| row <= column).collect();
-        layout.hessian = Entries::new(n, n, hessian);
-        layout.upper = Entries::new(n, n, upper);
+        layout.upper = Entries::new(n, n, hessian);
+        (layout.hessian, layout.mirrored) = layout.upper.sparsity.symmetric();
         layout
     }
 
@@ -123,24 +126,15 @@ impl Layout {
         }
     }
 
-    /// `∇f`: that of the QP at the point, and of the penalties.
-    pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], v: &[f64], to: &mut Vec<f64>) {
-        to.clear();
-        to.resize(self.variables, 0.0);
-        let (mut begin, mut here, mut product) = (0, Vec::new(), Vec::new());
+    /// `∇f`: those of all stages, and of the penalties.
+    pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], to: &mut [f64]) {
+        to.fill(0.0);
+        let mut columns = self.columns.iter();
         for stage in qp.stages() {
             let arrays = stage.arrays();
-            let columns = &self.columns[begin..begin + arrays.n];
-            for part in [&mut here, &mut product] {
-                part.clear();
-                part.resize(arrays.ld, 0.0);
+            for (gradient, &column) in arrays.gradient[..arrays.n].iter().zip(columns.by_ref()) {
+                to[column] += gradient;
             }
-            here[..arrays.n].copy_from_slice(&v[begin..begin + arrays.n]);
-            add_symmetric(&mut product, arrays.hessian, arrays.ld, &here, arrays.n);
-            for ((&column, gradient), product) in columns.iter().zip(arrays.gradient).zip(&product) {
-                to[column] += gradient + product;
-            }
-            begin += arrays.n;
         }
         for slack in &self.slacks {
             to[slack.variable] += slack.linear + slack.quadratic * x[slack.variable];
@@ -160,11 +154,27 @@ impl Draft {
             let pattern = program.pattern(stage);
             for (j, &column) in columns[begin..begin + n].iter().enumerate() {
                 for i in (0..rows).filter(|&i| pattern.jacobian.has(i, j)) {
-                    self.jacobian.push(([row + i, column], Slot::Entry { stage, index: i * ld + j }));
+                    let slot = match i.checked_sub(next) {
+                        None if j < nx => Slot::Interval { stage, block: 0, index: i + j * next },
+                        None => Slot::Interval { stage, block: 1, index: i + (j - nx) * next },
+                        Some(_) => Slot::Node { stage, index: i * ld + j },
+                    };
+                    self.jacobian.push(([row + i, column], slot));
                 }
-                for i in (0..n).filter(|&i| pattern.hessian.has(i, j)) {
-                    let index = i.min(j) * ld + i.max(j);
-                    self.hessian.push(([columns[begin + i], column], Slot::Entry { stage, index }));
+                for i in (0..n).filter(|&i| columns[begin + i] <= column) {
+                    let entry = [columns[begin + i], column];
+                    let (one, other) = (i.min(j), i.max(j));
+                    if pattern.interval.has(i, j) {
+                        let (block, index) = match (one.checked_sub(nx), other.checked_sub(nx)) {
+                            (Some(one), Some(other)) => (4, one + other * nu),
+                            (None, Some(other)) => (3, one + other * nx),
+                            _ => (2, one + other * nx),
+                        };
+                        self.hessian.push((entry, Slot::Interval { stage, block, index }));
+                    }
+                    if pattern.node.has(i, j) {
+                        self.hessian.push((entry, Slot::Node { stage, index: one * ld + other }));
+                    }
                 }
             }
             for (i, &column) in columns[begin + n..].iter().take(next).enumerate() {

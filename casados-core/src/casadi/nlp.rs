@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 /// Inputs and outputs of all functions.
 pub fn signatures(layout: &Layout, groups: &[Group], transposed: Sparsity) -> Vec<Signature> {
-    let [jacobian, hessian] = [&layout.jacobian.sparsity, &layout.hessian.sparsity];
+    let [jacobian, upper] = [&layout.jacobian.sparsity, &layout.upper.sparsity];
     let (n, m) = (layout.variables, layout.constraints);
     let last = layout.dims.len().saturating_sub(1);
     let (nx, nu) = layout.dims.first().map_or((0, 0), |first| (first.nx, first.nu));
@@ -37,7 +37,7 @@ pub fn signatures(layout: &Layout, groups: &[Group], transposed: Sparsity) -> Ve
         of_point(vec![g.clone()]),
         of_point(vec![f.clone(), port(c"grad_f_x", n)]),
         of_point(vec![g.clone(), jac_g.clone()]),
-        of_lagrangian(vec![Port::new(c"triu_hess_gamma_x_x", hessian.upper())]),
+        of_lagrangian(vec![Port::new(c"triu_hess_gamma_x_x", upper.clone())]),
         of_lagrangian(vec![f, g, port(c"grad_gamma_x", n), port(c"grad_gamma_p", 0)]),
         Signature {
             inputs: Vec::new(),
@@ -56,7 +56,7 @@ pub fn signatures(layout: &Layout, groups: &[Group], transposed: Sparsity) -> Ve
         Signature {
             inputs: second,
             outputs: vec![
-                Port::new(c"jac_adj_x_x", hessian.clone()),
+                Port::new(c"jac_adj_x_x", layout.hessian.clone()),
                 zero(c"jac_adj_x_p", n, 0),
                 zero(c"jac_adj_x_out_f", n, 1),
                 zero(c"jac_adj_x_out_g", n, m),

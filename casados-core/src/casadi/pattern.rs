@@ -12,8 +12,10 @@ use crate::structure::Pattern;
 pub struct StagePattern {
     /// Of the end of the interval, then of the constraints.
     pub jacobian: Relation,
-    /// Of the Lagrangian.
-    pub hessian: Relation,
+    /// Of what the interval adds to the Hessian of the Lagrangian.
+    pub interval: Relation,
+    /// Of what costs and constraints at the node do.
+    pub node: Relation,
 }
 
 /// What a stage has.
@@ -28,16 +30,16 @@ struct Stage {
 impl Stage {
     /// What a function at the node says about itself; everything if it says nothing.
     fn add(&mut self, first: usize, tell: impl FnOnce(&mut dyn FnMut(Entry)) -> bool) {
-        let Self { pattern: StagePattern { jacobian, hessian }, variables, .. } = self;
+        let Self { pattern: StagePattern { jacobian, node, .. }, variables, .. } = self;
         let is_known = tell(&mut |entry| match entry {
             Entry::Slope(row, variable) => {
                 jacobian.join(first + row, variables, variable);
             }
-            Entry::Curvature(one, other) => hessian.join_products(variables, one, other),
+            Entry::Curvature(one, other) => node.join_products(variables, one, other),
         });
         if !is_known {
             (first..jacobian.rows()).for_each(|row| jacobian.fill(row));
-            (0..hessian.rows()).for_each(|row| hessian.fill(row));
+            (0..node.rows()).for_each(|row| node.fill(row));
         }
     }
 
@@ -47,7 +49,7 @@ impl Stage {
         match origin {
             Origin::Unknown => {
                 (0..self.next).for_each(|row| self.pattern.jacobian.fill(row));
-                (0..nx + controls).for_each(|row| self.pattern.hessian.fill(row));
+                (0..nx + controls).for_each(|row| self.pattern.interval.fill(row));
                 (0..nz).for_each(|row| self.variables.fill(nx + controls + row));
             }
             Origin::Equations(jacobian, hessian) => {
@@ -59,7 +61,7 @@ impl Stage {
                     self.variables.join(nx + controls + row, &on, 2 * nx + row);
                 }
                 for (one, other) in hessian.iter() {
-                    self.pattern.hessian.join_products(&on, one, other);
+                    self.pattern.interval.join_products(&on, one, other);
                 }
             }
             Origin::Map(jacobian, hessian) => self.map(jacobian, hessian, dimensions, controls),
@@ -79,7 +81,7 @@ impl Stage {
         }
         for (one, other) in hessian.iter() {
             if let (Some(one), Some(other)) = (position(one), position(other)) {
-                self.pattern.hessian.join_products(&self.variables, one, other);
+                self.pattern.interval.join_products(&self.variables, one, other);
             }
         }
     }
@@ -92,7 +94,8 @@ pub fn of_stage<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize
     let n = nx + nu;
     let mut variables = Relation::zero(n + nz, n);
     (0..n).for_each(|variable| variables.set(variable, variable));
-    let pattern = StagePattern { jacobian: Relation::zero(next + rows, n), hessian: Relation::zero(n, n) };
+    let [interval, node] = [Relation::zero(n, n), Relation::zero(n, n)];
+    let pattern = StagePattern { jacobian: Relation::zero(next + rows, n), interval, node };
     let mut stage = Stage { pattern, variables, next };
     let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
     if is_last {

@@ -9,7 +9,7 @@ use super::groups::{Group, groups};
 use super::layout::Layout;
 use super::library::{Client, Failure};
 use super::nlp::signatures;
-use super::program::{Program, Trial};
+use super::program::{Derivatives, Program, Trial};
 use crate::ocp::OcpError;
 use crate::qp::{Solution, StageDims};
 use alloc::boxed::Box;
@@ -34,8 +34,6 @@ pub struct Problems {
     groups: Vec<Group>,
     /// Where the entries of the transposed Jacobian are among those of the Jacobian.
     transposed: Vec<usize>,
-    /// Where those of the upper triangle are among those of the Hessian.
-    upper: Vec<usize>,
     /// What was wrong with the problem when it was made first.
     wrong: Option<String>,
     integrations: AtomicU64,
@@ -57,22 +55,21 @@ pub struct Worker {
     objective: f64,
     ends: Vec<f64>,
     gradient: Vec<f64>,
-    /// The Hessian where `σ` is zero.
-    difference: Vec<f64>,
-    /// Room for a point, for multipliers over `σ`, and for a Jacobian.
+    jacobian: Vec<f64>,
+    /// The upper triangle of the Hessian.
+    hessian: Vec<f64>,
+    /// Room for a point, and for multipliers over `σ`.
     room: Trial,
     scaled: Vec<f64>,
-    jacobian: Vec<f64>,
 }
 
 /// What is known at the last point.
 #[derive(Clone, Copy, Default)]
 struct Known {
     value: bool,
-    /// Whether the QP of the program is linearised there.
+    /// Gradient and Jacobian.
     first: bool,
-    gradient: bool,
-    /// Whether it has the Hessian of the last multipliers.
+    /// The Hessian, with the last multipliers.
     second: bool,
 }
 
@@ -93,9 +90,7 @@ impl Problems {
         };
         let (transposed_pattern, transposed) = layout.jacobian.sparsity.transposed();
         let signatures = signatures(&layout, &groups, transposed_pattern);
-        let entries = layout.hessian.sparsity.entries().iter().enumerate();
-        let upper = entries.filter(|(_, (row, column))| row <= column).map(|(entry, _)| entry).collect();
-        Self { make, layout, signatures, groups, transposed, upper, wrong, integrations: AtomicU64::new(0) }
+        Self { make, layout, signatures, groups, transposed, wrong, integrations: AtomicU64::new(0) }
     }
 
     /// What comes before intervals are integrated, or differentiated where they were.
@@ -127,22 +122,26 @@ impl Problems {
         if !worker.known.first {
             // What an error interrupts is known no more.
             let known = core::mem::take(&mut worker.known).value;
-            let Worker { program, v, ends, .. } = worker;
+            let Worker { program, v, ends, jacobian, .. } = worker;
             self.begin(program.as_mut(), known);
-            worker.objective = program.first(v, ends)?;
+            let to = Derivatives {
+                clear: &|stage, matrix| self.layout.upper.clear_node(stage, matrix),
+                interval: &mut |stage, blocks| {
+                    self.layout.jacobian.write_interval(stage, blocks, 1.0, jacobian);
+                },
+            };
+            worker.objective = program.first(v, ends, to)?;
+            self.complete_first(worker);
             (worker.known.value, worker.known.first) = (true, true);
         }
         Ok(())
     }
 
-    fn gradient(&self, worker: &mut Worker) -> Result<(), OcpError> {
-        self.first(worker)?;
-        let Worker { program, x, v, gradient, known, .. } = worker;
-        if !known.gradient {
-            self.layout.gradient(&program.qp(), x, v, gradient);
-            known.gradient = true;
-        }
-        Ok(())
+    /// What costs and constraints add to gradient and Jacobian.
+    fn complete_first(&self, Worker { program, x, gradient, jacobian, .. }: &mut Worker) {
+        let qp = program.qp();
+        self.layout.jacobian.write_nodes(qp.stages().map(|stage| stage.arrays().matrix), 1.0, jacobian);
+        self.layout.gradient(&qp, x, gradient);
     }
 
     /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
@@ -151,26 +150,43 @@ impl Problems {
             return Ok(());
         }
         let known = core::mem::take(&mut worker.known);
-        let Worker { program, v, ends, multipliers, scaled, difference, .. } = worker;
-        let Some((&sigma, mu)) = multipliers.split_first() else { return Ok(()) };
+        let Some((&sigma, mu)) = worker.multipliers.split_first() else { return Ok(()) };
         let factor = if sigma == 0.0 { 1.0 } else { sigma };
-        scaled.clear();
-        scaled.extend(mu.iter().take(self.layout.functions).map(|mu| mu / factor));
-        self.begin(program.as_mut(), known.value);
-        worker.objective = program.second(v, scaled, ends)?;
-        if sigma == 0.0 {
-            let mut objective = vec![0.0; self.layout.hessian.sparsity.entries().len()];
-            difference.resize(objective.len(), 0.0);
-            self.layout.hessian.write(&program.qp(), |stage| stage.1, 1.0, difference);
-            scaled.fill(0.0);
-            self.begin(program.as_mut(), true);
-            program.second(v, scaled, ends)?;
-            self.layout.hessian.write(&program.qp(), |stage| stage.1, 1.0, &mut objective);
-            for (value, objective) in difference.iter_mut().zip(&objective) {
-                *value -= objective;
-            }
+        worker.scaled.clear();
+        worker.scaled.extend(mu.iter().take(self.layout.functions).map(|mu| mu / factor));
+        self.begin(worker.program.as_mut(), known.value);
+        self.curvature(worker, factor, !known.first)?;
+        if !known.first {
+            self.complete_first(worker);
         }
-        worker.known = Known { value: true, first: true, second: true, ..known };
+        if sigma == 0.0 {
+            let mut whole = core::mem::take(&mut worker.hessian);
+            worker.hessian.resize(whole.len(), 0.0);
+            worker.scaled.fill(0.0);
+            self.begin(worker.program.as_mut(), true);
+            self.curvature(worker, 1.0, false)?;
+            whole.iter_mut().zip(&worker.hessian).for_each(|(whole, objective)| *whole -= objective);
+            worker.hessian = whole;
+        }
+        worker.known = Known { value: true, first: true, second: true };
+        Ok(())
+    }
+
+    /// The Hessian times `factor`; and the Jacobian of intervals, if it is asked for.
+    fn curvature(&self, worker: &mut Worker, factor: f64, first: bool) -> Result<(), OcpError> {
+        let Layout { jacobian: slopes, upper, .. } = &self.layout;
+        let Worker { program, v, scaled, ends, jacobian, hessian, .. } = worker;
+        let to = Derivatives {
+            clear: &|stage, matrix| upper.clear_node(stage, matrix),
+            interval: &mut |stage, blocks| {
+                if first {
+                    slopes.write_interval(stage, blocks, 1.0, jacobian);
+                }
+                upper.write_interval(stage, blocks, factor, hessian);
+            },
+        };
+        worker.objective = program.second(v, scaled, ends, to)?;
+        upper.write_nodes(program.qp().stages().map(|stage| stage.arrays().hessian), factor, hessian);
         Ok(())
     }
 }
@@ -202,11 +218,11 @@ impl Client for Problems {
             follows: false,
             objective: 0.0,
             ends: Vec::new(),
-            gradient: Vec::new(),
-            difference: Vec::new(),
+            gradient: vec![0.0; n],
+            jacobian: vec![0.0; self.transposed.len()],
+            hessian: vec![0.0; self.layout.upper.sparsity.entries().len()],
             room: Solution::new(&self.layout.dims).map_err(|error| Failure(error.to_string()))?,
             scaled: Vec::new(),
-            jacobian: vec![0.0; self.transposed.len()],
         })
     }
 
@@ -259,17 +275,13 @@ impl Problems {
     fn compute(&self, worker: &mut Worker, port: &Port) -> Result<(), OcpError> {
         match port.name.to_bytes() {
             b"f" | b"g" => self.value(worker),
-            b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => self.gradient(worker),
-            b"jac_g_x" => self.first(worker),
-            b"jac_adj_x_adj_g" => self.first(worker).map(|()| self.jacobian(worker)),
-            b"grad_gamma_x" | b"adj_x" => self.gradient(worker).map(|()| self.jacobian(worker)),
+            b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" | b"jac_g_x" | b"jac_adj_x_adj_g" => {
+                self.first(worker)
+            }
+            b"grad_gamma_x" | b"adj_x" => self.first(worker),
             b"triu_hess_gamma_x_x" | b"jac_adj_x_x" => self.second(worker),
             _ => Ok(()),
         }
-    }
-
-    fn jacobian(&self, Worker { program, jacobian, .. }: &mut Worker) {
-        self.layout.jacobian.write(&program.qp(), |stage| stage.0, 1.0, jacobian);
     }
 
     /// An output; those of other names have no entries.
@@ -279,22 +291,10 @@ impl Problems {
             b"f" => to.fill(worker.objective + self.layout.penalty(&worker.x)),
             b"g" => self.layout.constraints(&worker.x, &worker.v, &worker.ends, to),
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => to.copy_from_slice(&worker.gradient),
-            b"jac_g_x" => self.layout.jacobian.write(&worker.program.qp(), |stage| stage.0, 1.0, to),
-            b"jac_adj_x_adj_g" => {
-                for (to, &entry) in to.iter_mut().zip(&self.transposed) {
-                    *to = worker.jacobian[entry];
-                }
-            }
-            b"jac_adj_x_x" if sigma == 0.0 => to.copy_from_slice(&worker.difference),
-            b"triu_hess_gamma_x_x" if sigma == 0.0 => {
-                for (to, &entry) in to.iter_mut().zip(&self.upper) {
-                    *to = worker.difference[entry];
-                }
-            }
-            b"jac_adj_x_x" => self.layout.hessian.write(&worker.program.qp(), |stage| stage.1, sigma, to),
-            b"triu_hess_gamma_x_x" => {
-                self.layout.upper.write(&worker.program.qp(), |stage| stage.1, sigma, to);
-            }
+            b"jac_g_x" => to.copy_from_slice(&worker.jacobian),
+            b"jac_adj_x_adj_g" => choose(&worker.jacobian, &self.transposed, to),
+            b"jac_adj_x_x" => choose(&worker.hessian, &self.layout.mirrored, to),
+            b"triu_hess_gamma_x_x" => to.copy_from_slice(&worker.hessian),
             b"grad_gamma_x" | b"adj_x" => {
                 for (to, gradient) in to.iter_mut().zip(&worker.gradient) {
                     *to = sigma * gradient;
@@ -340,5 +340,12 @@ impl Problems {
                 to.copy_from_slice(from);
             }
         }
+    }
+}
+
+/// Some of the numbers.
+fn choose(from: &[f64], places: &[usize], to: &mut [f64]) {
+    for (to, &place) in to.iter_mut().zip(places) {
+        *to = from[place];
     }
 }

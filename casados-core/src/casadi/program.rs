@@ -1,5 +1,6 @@
 //! A problem of optimal control as a nonlinear program: what is asked of it.
 
+use super::entries::Blocks;
 use super::pattern::{StagePattern, of_stage};
 use crate::ocp::{
     Convexification, Curvature, Dynamics, Exact, Formulation, GaussNewton, HeapOcp, OcpError, SecondOrder,
@@ -45,18 +46,33 @@ pub trait Program: Send {
     /// # Errors
     /// Those of functions and integrators.
     fn value(&mut self, v: &[f64], room: &mut Trial, ends: &mut Vec<f64>) -> Result<f64, OcpError>;
-    /// The same from the problem linearised there, which [`Program::qp`] is then.
+    /// The same with derivatives.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
+    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>, to: Derivatives<'_>) -> Result<f64, OcpError>;
     /// The same with the Hessian of the Lagrangian, where `multipliers` are those of `φ` and `g`.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn second(&mut self, v: &[f64], multipliers: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
-    /// The problem linearised.
+    fn second(
+        &mut self,
+        v: &[f64],
+        multipliers: &[f64],
+        ends: &mut Vec<f64>,
+        to: Derivatives<'_>,
+    ) -> Result<f64, OcpError>;
+    /// Derivatives of costs and constraints at the last point: matrices of these, Hessians, and the
+    /// gradient of the objective.
     fn qp(&self) -> QpView<'_, f64>;
+}
+
+/// Where derivatives go that are not in [`Program::qp`].
+pub struct Derivatives<'a> {
+    /// Makes zero what the Hessian at a node had.
+    pub clear: &'a dyn Fn(usize, &mut [f64]),
+    /// Takes those of every interval.
+    pub interval: &'a mut dyn FnMut(usize, &Blocks<'_>),
 }
 
 /// A point of all stages.
@@ -114,7 +130,7 @@ where
         let mut pattern = of_stage(self.problem(), is_last, rows);
         if stage == 0 && self.has_arrival_cost() {
             let nx = self.names().x.len();
-            (0..nx).for_each(|i| (0..nx).for_each(|j| pattern.hessian.set(i, j)));
+            (0..nx).for_each(|i| (0..nx).for_each(|j| pattern.node.set(i, j)));
         }
         pattern
     }
@@ -153,14 +169,20 @@ where
         self.evaluate(room, ends)
     }
 
-    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>, to: Derivatives<'_>) -> Result<f64, OcpError> {
         write(self.iterate_mut(), v, &[]);
-        linearise(self, GaussNewton { convexification: Convexification::None }, ends)
+        linearise(self, GaussNewton { convexification: Convexification::None }, ends, to)
     }
 
-    fn second(&mut self, v: &[f64], multipliers: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+    fn second(
+        &mut self,
+        v: &[f64],
+        multipliers: &[f64],
+        ends: &mut Vec<f64>,
+        to: Derivatives<'_>,
+    ) -> Result<f64, OcpError> {
         write(self.iterate_mut(), v, multipliers);
-        linearise(self, Exact { convexification: Convexification::None }, ends)
+        linearise(self, Exact { convexification: Convexification::None }, ends, to)
     }
 
     fn qp(&self) -> QpView<'_, f64> {
@@ -168,31 +190,38 @@ where
     }
 }
 
-/// Linearises at the iterate: the objective, and `φ` and `g` in `ends`.
+/// Derivatives at the iterate: the objective, and `φ` and `g` in `ends`.
 fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
     ocp: &mut HeapOcp<P, f64>,
     curvature: C,
     ends: &mut Vec<f64>,
+    Derivatives { clear, interval }: Derivatives<'_>,
 ) -> Result<f64, OcpError> {
     ends.clear();
-    ocp.linearise_watched(curvature, |_, step| ends.extend(step.x))?;
+    ocp.linearise_apart(curvature, clear, &mut |k, step| {
+        ends.extend(step.x);
+        let [xx, xu, uu] = step.hessian;
+        interval(k, &[step.dx, step.du, xx, xu, uu]);
+    })?;
     let phi = ends.len();
     ends.resize(ocp.ends(), 0.0);
     ocp.constraints(ends.get_mut(phi..).unwrap_or_default())
 }
 
 /// States, controls and multipliers to where the problem reads them.
-fn write(to: &mut Trial, v: &[f64], multipliers: &[f64]) {
-    let (mut v, mut multipliers) = (v.iter(), multipliers.iter());
-    let stages = to.dims().len();
-    for stage in 0..stages {
-        let Some(stage) = to.stage_mut(stage) else { return };
-        for to in stage.x.iter_mut().chain(stage.u) {
-            *to = v.next().copied().unwrap_or(0.0);
-        }
-        for to in stage.dynamics.iter_mut().chain(stage.g_upper) {
-            *to = multipliers.next().copied().unwrap_or(0.0);
-        }
+fn write(to: &mut Trial, mut v: &[f64], mut multipliers: &[f64]) {
+    let take = |from: &mut &[f64], to: &mut [f64]| {
+        let (here, behind) = from.split_at(to.len().min(from.len()));
+        *from = behind;
+        let (to, rest) = to.split_at_mut(here.len());
+        to.copy_from_slice(here);
+        rest.fill(0.0);
+    };
+    to.each_stage_mut(|stage| {
+        take(&mut v, stage.x);
+        take(&mut v, stage.u);
+        take(&mut multipliers, stage.dynamics);
+        take(&mut multipliers, stage.g_upper);
         stage.g_lower.fill(0.0);
-    }
+    });
 }

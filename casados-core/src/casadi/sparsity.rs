@@ -56,11 +56,18 @@ impl Sparsity {
         (Self::from_entries(columns, rows, swapped(entries)), order)
     }
 
-    /// The pattern of the upper triangle.
-    pub fn upper(&self) -> Self {
+    /// The pattern of the symmetric matrix with this upper triangle, and where its entries are among
+    /// those of this one.
+    pub fn symmetric(&self) -> (Self, Vec<usize>) {
         let [rows, columns] = self.dimensions();
-        let entries = self.entries.iter().copied().filter(|(row, column)| row <= column).collect();
-        Self::from_entries(rows, columns, entries)
+        let entries = self.entries.iter().enumerate();
+        let mut both: Vec<((usize, usize), usize)> = entries
+            .flat_map(|(entry, &(row, column))| [((column, row), entry), ((row, column), entry)])
+            .collect();
+        both.sort_unstable();
+        both.dedup();
+        let (entries, places) = both.into_iter().unzip();
+        (Self::from_entries(rows, columns, swapped(entries)), places)
     }
 
     /// This pattern so many times along the diagonal.

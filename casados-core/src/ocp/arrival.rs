@@ -93,9 +93,11 @@ pub(super) fn cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     T::from_f64(0.5) * twice
 }
 
-/// Adds it to a QP, whose variables are not changes: `W` and `−W x̄`.
+/// Adds it to a QP, whose variables are not changes: `W` and `−W x̄`; or with the gradient at a
+/// state, `W (x − x̄)`.
 pub(super) fn add<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
+    at: &[T],
     qp: &mut Qp<T, D, M>,
 ) {
     let nx = qp.dims().first().map_or(0, |first| first.nx);
@@ -110,6 +112,10 @@ pub(super) fn add<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         for (h, &w) in column.iter_mut().zip(weight).skip(j) {
             *h = *h + w;
         }
-        *gradient = weight.iter().zip(mean).fold(*gradient, |sum, (&w, &mean)| sum - w * mean);
+        let at = at.iter().copied().chain(core::iter::repeat(T::ZERO));
+        *gradient = weight
+            .iter()
+            .zip(mean.iter().zip(at))
+            .fold(*gradient, |sum, (&w, (&mean, x))| sum - w * (mean - x));
     }
 }

@@ -7,7 +7,7 @@ use super::convexify::convexify;
 use super::cost::{At, Cost};
 use super::curvature::Curvature;
 use super::data::{Node, inputs, split};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, Step, add_stages, larger};
+use super::dynamics::{Dynamics, IntegralTerms, Nodes, Sink, Step, add_stages, larger};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, add_blocks, read};
@@ -25,24 +25,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
-        self.linearise_watched(curvature, |_, _| {})
+        self.linearise_watched(curvature, false, &mut |_, _| {})
     }
 
-    /// [`Ocp::linearise`], and shows every interval to `watch`.
+    /// [`Ocp::linearise`], and shows every interval to `watch`. With `apart` derivatives of intervals
+    /// are shown alone: the QP, whose Hessians and gradients were zero, has those of costs and
+    /// constraints, with `∇f` itself as the gradient.
     pub(crate) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        watch: impl FnMut(usize, &Step<'_, T>),
+        apart: bool,
+        watch: Sink<'_, T>,
     ) -> Result<(), OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
-        let intervals = self.linearise_intervals(curvature, watch)?;
+        let intervals = self.linearise_intervals(curvature, apart, watch)?;
         let costs = self.linearise_functions::<C>(&intervals)?;
-        self.complete_gradients(curvature, &intervals);
+        if !apart {
+            self.complete_gradients(curvature, &intervals);
+        }
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        arrival::add(data.arrival, &mut self.qp);
+        let x0 = self.iterate.stages().next().map_or(&[][..], |first| first.x);
+        arrival::add(data.arrival, if apart { x0 } else { &[] }, &mut self.qp);
         self.objective = intervals.objective + costs + arrival::cost(data.arrival, &self.iterate);
         self.stages = intervals.stages;
         Ok(())
@@ -52,15 +58,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut watch: impl FnMut(usize, &Step<'_, T>),
+        apart: bool,
+        watch: Sink<'_, T>,
     ) -> Result<Intervals<T>, OcpError> {
         let intervals = self.intervals();
         let (nx, n) = (P::Shape::NX, inputs::<P::Shape>());
         let Self { problem, qp, iterate, data, along, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
         let (v, multipliers) = iterate.vectors();
-        let mut result =
-            Intervals { objective: T::ZERO, plain: !C::EXACT, adding: false, stages: [T::ZERO; 2] };
+        let (objective, plain, left) = (T::ZERO, !C::EXACT && !apart, [T::ZERO; 2]);
+        let mut result = Intervals { objective, plain, adding: apart, apart, stages: left };
         let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
@@ -72,7 +79,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
             let keeps = C::KEEPS && step.dx.is_empty();
-            if keeps {
+            if apart {
+                // They are not wanted here.
+            } else if keeps {
                 shift_kept(matrix, ld, offset, step.x, part(point, 0, n));
             } else {
                 Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
@@ -83,22 +92,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             result.objective = result.objective + value;
+            let mut terms = Terms { gradient, hessian, ld };
+            let slopes = x.iter().chain(u).enumerate();
+            if apart {
+                // The Hessian of what is integrated along is in that of the interval.
+                slopes.for_each(|(i, &slope)| terms.slope(i, slope));
+                return;
+            }
             result.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
             if result.plain && x.is_empty() && u.is_empty() {
                 return;
             }
             result.adding = true;
-            hessian.fill(T::ZERO);
-            gradient.fill(T::ZERO);
-            let mut terms = Terms { gradient, hessian, ld };
-            for (i, &slope) in x.iter().chain(u).enumerate() {
-                terms.slope(i, slope);
-            }
+            terms.hessian.fill(T::ZERO);
+            terms.gradient.fill(T::ZERO);
+            slopes.for_each(|(i, &slope)| terms.slope(i, slope));
             add_blocks(&mut terms, nx, blocks);
             add_blocks(&mut terms, nx, step.hessian);
             if keeps {
                 let of_interval = part(multipliers, k * pad::<T>(nx), nx);
-                correct_kept(gradient, matrix, ld, of_interval);
+                correct_kept(terms.gradient, matrix, ld, of_interval);
             }
         })?;
         Ok(result)
@@ -118,7 +131,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            if !of.adding || k == intervals {
+            if !(of.apart || of.adding && k < intervals) {
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
             }
@@ -303,15 +316,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             shift_limits(columns, [n, ld], here, [lower, upper], given);
         }
     }
-
-    /// Bounds of a general constraint of a stage, as they were given.
-    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
-        let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
-        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
-        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
-    }
 }
 
 /// What intervals have left.
@@ -323,6 +327,8 @@ struct Intervals<T> {
     /// Whether they add to costs: all of them do, or none. Then these are cleared where those at
     /// nodes are added.
     adding: bool,
+    /// Whether the QP has no derivatives of intervals, and was cleared before.
+    apart: bool,
     /// What is left of the equations of lifted stages.
     stages: [T; 2],
 }

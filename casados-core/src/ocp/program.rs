@@ -3,17 +3,44 @@
 
 use super::algebraic;
 use super::constraint::Constraints;
+use super::cost::Cost;
+#[cfg(feature = "casadi")]
+use super::curvature::Curvature;
 use super::data::{Node, split};
+#[cfg(feature = "casadi")]
+use super::dynamics::Sink;
 use super::error::OcpError;
 use super::instance::Ocp;
 use super::point::read;
 use super::problem::{Formulation, Problem};
+#[cfg(feature = "casadi")]
+use crate::qp::Arrays;
 use crate::qp::{StageDims, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Derivatives at the iterate: those of intervals go to `watch`, those of costs and constraints
+    /// to the QP, with `∇f` as its gradient. `clear` makes zero what the Hessian of a stage has.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::linearise`].
+    #[cfg(feature = "casadi")]
+    pub(crate) fn linearise_apart<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        clear: &dyn Fn(usize, &mut [T]),
+        watch: Sink<'_, T>,
+    ) -> Result<(), OcpError> {
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let Arrays { hessian, gradient, .. } = stage.arrays();
+            clear(k, hessian);
+            gradient.fill(T::ZERO);
+        }
+        self.linearise_watched(curvature, true, watch)
+    }
+
     /// Where algebraic states are those of the iterate: `g` of every stage in `values`, and after
     /// [`Ocp::linearise`] the objective without penalties.
     ///
@@ -36,5 +63,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         Ok(self.objective)
+    }
+
+    /// Bounds of a general constraint of a stage, as they were given.
+    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+        let intervals = self.intervals();
+        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 }

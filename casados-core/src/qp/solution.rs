@@ -294,6 +294,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(self.view_mut().into_stage(place))
     }
+    /// All stages, in order, to be written.
+    #[cfg(feature = "casadi")]
+    pub(crate) fn each_stage_mut(&mut self, mut write: impl FnMut(SolutionStageMut<'_, T>)) {
+        let mut view = self.view_mut();
+        for place in Places::<T>::new(view.dims) {
+            write(view.reborrow().into_stage(place));
+        }
+    }
     /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last
     /// stages stay as they are. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {

@@ -392,6 +392,18 @@ class Failures(unittest.TestCase):
         with self.assertRaises(RuntimeError):
             external("broken")(X0, U, column([]))
 
+    def test_intervals_without_length(self):
+        with self.assertRaises(RuntimeError):
+            external("standing")(X0, U, column([]))
+        with self.assertRaises(RuntimeError):
+            external("standings")(np.tile(X0, (7, 1)).T, np.tile(U, (7, 1)).T, casadi.DM(0, 7))
+
+    def test_backwards_in_time(self):
+        """Methods of Gauss are symmetric: a step back leads to where the step began."""
+        end = external("pendulum")(X0, U, column([]))
+        start = full(external("backwards")(end, U, column([]))).ravel()
+        np.testing.assert_allclose(start, X0, rtol=0, atol=1e-14)
+
     def test_a_panic_stays_inside(self):
         evaluate = RUST.panicking
         self.assertEqual(RUST.panicking_n_in(), 0)

@@ -72,6 +72,9 @@ casados::casadi::export! {
     adaptive = Adaptive<Pendulum, Radau>, interval = 0.5,
     options = AdaptiveOptions { rtol: 1e-9, atol: 1e-9, ..Default::default() }, steps_at = &[0.0, 0.5, 0.0, 0.0, 1.0]
 }
+casados::casadi::export! { standing = Irk<Pendulum, Gauss<2>>, interval = 0.0 }
+casados::casadi::export_horizon! { standings = Batch<Pendulum, Gauss<2>>, interval = 0.0, intervals = 7 }
+casados::casadi::export! { backwards = Irk<Pendulum, Gauss<2>>, interval = -0.05, options = steps(2) }
 casados::casadi::export! { broken = Irk<Pendulum, Gauss<2>>, interval = 0.05, options = steps(0) }
 casados::casadi::export! { panicking = Irk<Pendulum, Gauss<2>>, interval = panics() }
 
