@@ -144,20 +144,14 @@ pub fn write(numbers: &Numbers<'_>, outputs: &[Output], call: &mut dyn Call) {
     }
 }
 
-fn join(parts: [&[f64]; 3], to: &mut [f64]) {
-    for (to, from) in to.iter_mut().zip(parts.into_iter().flatten()) {
-        *to = *from;
+/// Blocks, one behind the other.
+pub fn join(blocks: &[&[f64]], to: &mut [f64]) {
+    let mut rest = to;
+    for block in blocks {
+        let (to, behind) = rest.split_at_mut(block.len());
+        to.copy_from_slice(block);
+        rest = behind;
     }
-}
-
-/// Over `(x₀, u, p)`.
-pub fn gradient<M: Dae>(result: &Adjoint<M>, to: &mut [f64]) {
-    join(of_adjoint(result), to);
-}
-
-/// Over `(x₀, u, p)`.
-pub fn gradient_of<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    join(of_gradient(result), to);
 }
 
 /// The blocks of `∇(λᵀx)`.
@@ -173,12 +167,7 @@ pub fn of_gradient<M: Dae>(result: &Hessian<M>) -> [&[f64]; 3] {
 /// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
 pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
     if count > 0 && count == rows {
-        let mut rest = to;
-        for block in blocks {
-            let (to, behind) = rest.split_at_mut(block.len());
-            to.copy_from_slice(block);
-            rest = behind;
-        }
+        join(&blocks, to);
     } else if count > 0 {
         let columns = blocks.into_iter().flat_map(|block| block.chunks_exact(count));
         for (column, to) in columns.zip(to.chunks_exact_mut(rows)) {
@@ -207,16 +196,6 @@ pub fn of_hessian<M: Dae>(result: &Hessian<M>) -> [&[f64]; 6] {
         result.h_up.as_slice(),
         result.h_pp.as_slice(),
     ]
-}
-
-/// The blocks, one behind the other.
-pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    let mut rest = to;
-    for block in of_hessian(result) {
-        let (to, behind) = rest.split_at_mut(block.len());
-        to.copy_from_slice(block);
-        rest = behind;
-    }
 }
 
 /// Where those of a model are.

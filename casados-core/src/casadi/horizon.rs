@@ -2,7 +2,8 @@
 //! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{
-    Numbers, Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, second, write,
+    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_hessian, read_inputs, read_multipliers,
+    second, write,
 };
 use super::cache::{Answer, Cache, Given, key};
 use super::dependence::{self, Dimensions};
@@ -77,8 +78,8 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
             for (result, ((value, slope), (first, second))) in results.iter().zip(places) {
                 value.copy_from_slice(result.x.as_slice());
                 jacobian(result, nx, slope);
-                gradient_of(result, first);
-                hessian(result, second);
+                join(&of_gradient(result), first);
+                join(&of_hessian(result), second);
             }
         } else if wanted.gradient {
             let mut results = vec![Adjoint::default(); count];
@@ -86,7 +87,7 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
             let gradients = answer.gradient.set(count * nw).chunks_exact_mut(nw.max(1));
             for (result, (value, first)) in results.iter().zip(values.zip(gradients)) {
                 value.copy_from_slice(result.x.as_slice());
-                gradient(result, first);
+                join(&of_adjoint(result), first);
             }
         } else if wanted.jacobian {
             let mut results = vec![Forward::default(); count];

@@ -4,7 +4,10 @@
 //! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
 
 use super::algebraic::{self, Sizes};
-use super::blocks::{self, Numbers, Wanted, jacobian, read_inputs, read_multipliers, rows, second, write};
+use super::blocks::{
+    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_hessian, of_jacobian, read_inputs,
+    read_multipliers, rows, second, write,
+};
 use super::cache::{self, Answer, Cache, Given, Part, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
@@ -281,23 +284,23 @@ impl<M: Dae> Asked<'_, M> {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
             if copies {
-                blocks::gradient_of(result, answer.gradient.set(nw));
-                blocks::hessian(result, answer.hessian.set(second::<M>().len()));
+                join(&of_gradient(result), answer.gradient.set(nw));
+                join(&of_hessian(result), answer.hessian.set(second::<M>().len()));
             }
-            (numbers.gradient, numbers.hessian) = (blocks::of_gradient(result), blocks::of_hessian(result));
-            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], blocks::of_jacobian(result));
+            (numbers.gradient, numbers.hessian) = (of_gradient(result), of_hessian(result));
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
         } else if wanted.gradient {
             let result = integrator.gradient(point, seed, along)?;
             if copies {
-                blocks::gradient(result, answer.gradient.set(nw));
+                join(&of_adjoint(result), answer.gradient.set(nw));
             }
-            (numbers.value, numbers.gradient) = ([result.x.as_slice()], blocks::of_adjoint(result));
+            (numbers.value, numbers.gradient) = ([result.x.as_slice()], of_adjoint(result));
         } else if wanted.jacobian {
             let result = integrator.jacobian(point, along)?;
             if copies {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
-            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], blocks::of_jacobian(result));
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
         } else {
             numbers.value = [integrator.value(point, along)?.x.as_slice()];
         }

@@ -10,7 +10,6 @@ use super::groups::groups;
 use super::second::Blocks;
 use super::signature::{Entry, Output, Shape, Source};
 use super::sparsity::{Relation, Sparsity};
-use crate::qp::{HeapQp, StageDims};
 use crate::structure::Pattern;
 use alloc::borrow::ToOwned;
 use alloc::vec;
@@ -35,7 +34,10 @@ fn patterns_are_compressed_columns() {
     let full = Sparsity::new(2, 2, |_, _| true);
     // Row by row, where entries are column by column.
     assert_eq!(full.transposed().1, [0, 2, 1, 3]);
-    assert_eq!(full.upper().entries(), [(0, 0), (0, 1), (1, 1)]);
+    let upper = Sparsity::new(2, 2, |row, column| row <= column);
+    assert_eq!(upper.symmetric(), (full, vec![0, 1, 1, 2]));
+    let one = Sparsity::new(3, 3, |row, column| row == 0 && column == 2);
+    assert_eq!(one.symmetric().0.entries(), [(2, 0), (0, 2)]);
     assert_eq!(lower.diagonal(2).entries(), [(1, 0), (2, 0), (2, 1), (4, 2), (5, 2), (5, 3)]);
     assert_eq!(lower.diagonal(2).dimensions(), [6, 4]);
 }
@@ -129,30 +131,40 @@ fn names_make_groups() {
 
 #[test]
 fn matrices_are_sums_of_numbers_of_stages() {
-    let entry = |index| Slot::Entry { stage: 0, index };
-    // Column 0 at a distance of two, an entry of two numbers and a constant, and a constant alone.
+    let node = |index| Slot::Node { stage: 0, index };
+    let interval = |stage, block, index| Slot::Interval { stage, block, index };
+    // Column 0 at a distance of two, an entry of two intervals, a node and a constant, a constant
+    // alone; and entries one behind the other of one block and of two.
     let terms = vec![
         ([0, 1], Slot::Constant(100.0)),
-        ([0, 0], entry(1)),
-        ([1, 0], entry(3)),
-        ([2, 0], entry(5)),
-        ([0, 1], entry(0)),
-        ([0, 1], entry(2)),
+        ([0, 1], node(2)),
+        ([0, 0], node(1)),
+        ([1, 0], node(3)),
+        ([2, 0], node(5)),
+        ([0, 1], interval(0, 1, 0)),
+        ([0, 1], interval(1, 0, 1)),
         ([2, 1], Slot::Constant(-1.0)),
+        ([0, 2], interval(0, 0, 1)),
+        ([1, 2], interval(0, 0, 2)),
+        ([2, 2], interval(0, 1, 1)),
     ];
-    let entries = Entries::new(3, 2, terms);
-    assert_eq!(entries.sparsity.entries(), [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1)]);
-    let dims = [StageDims::new(2, 0, 0)];
-    let mut qp = HeapQp::<f64>::new(&dims).unwrap();
-    let mut stages = qp.stages_mut();
-    let mut stage = stages.next().unwrap();
-    for (value, to) in stage.arrays().hessian.iter_mut().enumerate() {
-        *to = value as f64;
-    }
-    drop(stages);
-    let mut values = [f64::NAN; 5];
-    entries.write(&qp.view(), |stage| stage.1, 10.0, &mut values);
-    assert_eq!(values, [10.0, 30.0, 50.0, 1020.0, -10.0]);
+    let entries = Entries::new(3, 3, terms);
+    assert_eq!(entries.sparsity.entries(), [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)]);
+    let mut matrix = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+    let mut values = [f64::NAN; 8];
+    let mut write = |matrix: &[f64], xx: &[f64]| {
+        entries.write_interval(0, &[&[0.0, 7.0, 8.0], xx, &[], &[], &[]], 10.0, &mut values);
+        entries.write_interval(1, &[&[0.0, 0.5], &[], &[], &[], &[]], 10.0, &mut values);
+        entries.write_nodes([matrix].into_iter(), 10.0, &mut values);
+        values
+    };
+    let expected = [10.0, 30.0, 50.0, 1065.0, -10.0, 70.0, 80.0, 90.0];
+    assert_eq!(write(&matrix, &[4.0, 9.0]), expected);
+    // Written again, and where a block is not there: zeros.
+    assert_eq!(write(&matrix, &[4.0, 9.0]), expected);
+    assert_eq!(write(&matrix, &[]), [10.0, 30.0, 50.0, 1025.0, -10.0, 70.0, 80.0, 0.0]);
+    entries.clear_node(0, &mut matrix);
+    assert_eq!(matrix, [0.0, 0.0, 0.0, 0.0, 4.0, 0.0]);
 }
 
 #[test]
