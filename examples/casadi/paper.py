@@ -25,6 +25,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "paper"))
 
 FEATURES = {3: "masses-3", 4: "masses-4", 5: "", 6: "masses-6", 7: "masses-7"}
 
+# The size of the chain with the largest library.
+LARGEST = 6
+
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -97,6 +100,8 @@ def experiments(given):
             if m == max(masses) and setting == "s2n1":
                 runs[("calls",)] = lambda m=m, setting=setting: chain.calls(m, setting)
             yield f"chain_{m}_{setting}", features, runs
+            if m == LARGEST:
+                yield f"chain_{m}_{setting}_alone", f"{features},alone", {}
 
 
 def main():

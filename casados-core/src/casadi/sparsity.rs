@@ -56,8 +56,8 @@ impl Sparsity {
         (Self::from_entries(columns, rows, swapped(entries)), order)
     }
 
-    /// The pattern of the symmetric matrix with this upper triangle, and where its entries are among
-    /// those of this one.
+    /// The pattern of the symmetric matrix with this upper triangle, and where its entries are
+    /// among those of this one.
     pub fn symmetric(&self) -> (Self, Vec<usize>) {
         let [rows, columns] = self.dimensions();
         let entries = self.entries.iter().enumerate();

@@ -19,6 +19,15 @@ pub(crate) fn means(name: &str, variable: &str) -> bool {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Bounds of a general constraint of a stage, as they were given.
+    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+        let intervals = self.intervals();
+        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
+    }
+
     /// The names of states and controls.
     #[must_use]
     pub fn names(&self) -> Names {

@@ -3,7 +3,6 @@
 
 use super::algebraic;
 use super::constraint::Constraints;
-use super::cost::Cost;
 #[cfg(feature = "casadi")]
 use super::curvature::Curvature;
 use super::data::{Node, split};
@@ -63,14 +62,5 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         Ok(self.objective)
-    }
-
-    /// Bounds of a general constraint of a stage, as they were given.
-    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
-        let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
-        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
-        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 }

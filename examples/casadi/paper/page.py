@@ -259,7 +259,8 @@ BUILDS = """
 ## Libraries
 
 Each has one model with one method as integrator, horizon and whole problem, and the solvers of
-casados that the tables name; those with two stages have RK4 as integrator and whole problem, too.
-The aircraft is `awe`. Seconds are CPU seconds of a build by one thread, after everything that they
+casados that the tables name. RK4 is beside it as an integrator, in those with two stages as a whole
+problem, too. What a library of one model has is `alone`: neither solvers nor RK4, for the size with
+the largest library. The aircraft is `awe`. Seconds are CPU seconds of a build by one thread, after everything that they
 share was there.
 """

@@ -5,7 +5,8 @@
 mod problem;
 
 use crate::awe::Awe;
-use crate::{Report, numbers, write};
+use crate::numbers;
+use crate::report::{Report, write};
 use casados::casadi::Program;
 use casados::ocp::{Formulation, HeapIpm, HeapOcp, SecondOrder, Shooting};
 use casados::prelude::*;
