@@ -29,8 +29,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// [`Ocp::linearise`], and shows every interval to `watch`. With `apart` derivatives of
-    /// intervals are shown alone: the QP, whose Hessians and gradients were zero, has those of costs
-    /// and constraints, with `∇f` itself as the gradient.
+    /// intervals are shown alone: the QP, whose Hessians and gradients were zero, has those of
+    /// costs and constraints, with `∇f` itself as the gradient.
     pub(crate) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
