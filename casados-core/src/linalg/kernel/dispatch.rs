@@ -20,8 +20,8 @@ pub trait Kernel {
     type Number;
     /// Its result.
     type Output;
-    /// Whether it is long: AVX-512 then takes fewer instructions, as it multiplies by numbers that
-    /// are still in memory.
+    /// Whether it is long, and its products of numbers fill registers of AVX-512. That takes fewer
+    /// instructions there, and one more copy of the kernel to compile.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
     const WIDE: bool = false;
     /// To be `#[inline(always)]`, with everything that it calls.
