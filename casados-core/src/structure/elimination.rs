@@ -95,9 +95,6 @@ pub struct Pivot {
     pub left: [u32; 2],
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
-    /// How many pivots from this one on are a [`Supernode`]; zero if one before this one has
-    /// counted it.
-    pub supernode: u32,
 }
 
 /// A kinematic state `q`, with an equation `q̇ − c v = 0` where `v` is a state that is not

@@ -42,9 +42,8 @@ fn constructors() -> TokenStream {
             [block, upper, end]: [u32; 3],
             left: [u32; 2],
             identity: bool,
-            supernode: u32,
         ) -> Pivot {
-            Pivot { slot, equation, block, upper, end, left, identity, supernode }
+            Pivot { slot, equation, block, upper, end, left, identity }
         }
         const fn supernode(first: u32, count: u32) -> Supernode {
             Supernode { first, count }
@@ -75,10 +74,10 @@ fn row(constructor: &str, values: &[u32]) -> TokenStream {
 }
 
 fn pivot(pivot: &Pivot) -> TokenStream {
-    let &Pivot { slot, equation, range, left, identity, supernode } = pivot;
-    let [slot, equation, supernode] = [slot, equation, supernode].map(Literal::u32_unsuffixed);
+    let &Pivot { slot, equation, range, left, identity } = pivot;
+    let [slot, equation] = [slot, equation].map(Literal::u32_unsuffixed);
     let (range, left) = (range.map(Literal::u32_unsuffixed), left.map(Literal::u32_unsuffixed));
-    quote!(pivot([#slot, #equation], [#(#range),*], [#(#left),*], #identity, #supernode))
+    quote!(pivot([#slot, #equation], [#(#range),*], [#(#left),*], #identity))
 }
 
 fn update(update: &Update) -> TokenStream {

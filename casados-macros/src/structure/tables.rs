@@ -33,7 +33,6 @@ pub struct Pivot {
     /// Its part of the table `left`.
     pub left: [u32; 2],
     pub identity: bool,
-    pub supernode: u32,
 }
 
 /// `casados_core::model::Update`: nothing is in the block before the first one.
@@ -72,7 +71,7 @@ pub fn of(
     }
     let slots = slots(plan, &slot_of_equation);
     let counts = supernodes::find(plan);
-    let (pivots, left) = pivots(plan, &slots, identity, &counts);
+    let (pivots, left) = pivots(plan, &slots, identity);
     let positions: HashMap<_, _> =
         positions.iter().map(|position| ((position.row, position.column), position)).collect();
     Tables {
@@ -99,7 +98,7 @@ fn slots(plan: &Plan, slot_of_equation: &[u32]) -> Vec<u32> {
 }
 
 /// The pivots, and the blocks of `L` row by row.
-fn pivots(plan: &Plan, slots: &[u32], identity: &[bool], counts: &[u32]) -> (Vec<Pivot>, Vec<[u32; 2]>) {
+fn pivots(plan: &Plan, slots: &[u32], identity: &[bool]) -> (Vec<Pivot>, Vec<[u32; 2]>) {
     let mut rows: HashMap<u32, Vec<[u32; 2]>> = HashMap::new();
     for (&(_, slot), &[block, upper, _]) in plan.pivots.iter().zip(&plan.ranges) {
         for block in block + 1..upper {
@@ -110,8 +109,8 @@ fn pivots(plan: &Plan, slots: &[u32], identity: &[bool], counts: &[u32]) -> (Vec
     for (index, (&(equation, slot), &range)) in plan.pivots.iter().zip(&plan.ranges).enumerate() {
         let begin = left.len() as u32;
         left.extend(rows.get(&slot).into_iter().flatten());
-        let (identity, supernode) = (identity[index], counts[index]);
-        pivots.push(Pivot { slot, equation, range, left: [begin, left.len() as u32], identity, supernode });
+        let identity = identity[index];
+        pivots.push(Pivot { slot, equation, range, left: [begin, left.len() as u32], identity });
     }
     (pivots, left)
 }

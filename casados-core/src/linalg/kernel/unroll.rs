@@ -120,7 +120,7 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 
 /// Whether pivots of a [supernode](Supernode) are taken together. In firmware each is one of its
 /// own.
-pub const GROUPED: bool = cfg!(feature = "std");
+const GROUPED: bool = cfg!(feature = "std");
 
 /// What is done at each supernode of a plan.
 pub trait AtSupernode {

@@ -10,7 +10,7 @@
 #[allow(dead_code)]
 mod awe;
 #[cfg(not(any(feature = "orbit", feature = "alone")))]
-mod beside;
+mod comparison;
 #[cfg(feature = "orbit")]
 mod orbit;
 #[cfg(not(any(feature = "orbit", feature = "alone")))]

@@ -55,7 +55,7 @@ macro_rules! pivot {
     };
 }
 
-/// A supernode, at the turn of its first pivot. There is the code for its own size alone.
+/// A supernode. There is the code for its own size alone.
 macro_rules! supernode {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
         $(sizes!($A, $M, $visit, $n: 1 2 3 4);)*
@@ -94,21 +94,22 @@ const fn nth(plan: &Elimination, n: usize) -> Option<(&'static Pivot, &'static [
     Some((pivot, plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0))
 }
 
-/// The supernode that begins with a pivot, if it has so many.
+/// The pivots of a supernode by its number, if it has so many.
 struct NthSupernode<M, const N: usize, const SIZE: usize>(PhantomData<M>);
 
 impl<M: Dae, const N: usize, const SIZE: usize> NthSupernode<M, N, SIZE> {
     const EXISTS: bool = Self::PIVOTS.is_some();
-    const PIVOTS: Option<[&'static Pivot; SIZE]> = supernode(M::STRUCTURE.elimination.pivots, N);
+    const PIVOTS: Option<[&'static Pivot; SIZE]> = nth_supernode(&M::STRUCTURE.elimination, N);
 }
 
-const fn supernode<const SIZE: usize>(pivots: &[Pivot], n: usize) -> Option<[&Pivot; SIZE]> {
-    if n >= pivots.len() || pivots[n].supernode as usize != SIZE {
+const fn nth_supernode<const SIZE: usize>(plan: &Elimination, n: usize) -> Option<[&'static Pivot; SIZE]> {
+    if n >= plan.supernodes.len() || plan.supernodes[n].count as usize != SIZE {
         return None;
     }
-    let (mut all, mut index) = ([&pivots[n]; SIZE], 1);
+    let first = plan.supernodes[n].first as usize;
+    let (mut all, mut index) = ([&plan.pivots[first]; SIZE], 1);
     while index < SIZE {
-        all[index] = &pivots[n + index];
+        all[index] = &plan.pivots[first + index];
         index += 1;
     }
     Some(all)

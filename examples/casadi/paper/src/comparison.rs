@@ -1,4 +1,4 @@
-//! The chain of masses by what the tables name besides: RK4, and the solvers of casados.
+//! What the tables compare the chain of masses with: RK4, and the solvers of casados.
 
 use crate::overhead::{Mode, measure};
 use crate::report::{Report, write};
