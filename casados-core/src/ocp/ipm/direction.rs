@@ -6,7 +6,7 @@ use crate::qp::QpError;
 use crate::qp::interior::Iterate;
 use crate::scalar::Real;
 
-/// The first `δ_w`, as all of them in units of forces.
+/// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
 const FIRST: f64 = 1e-4;
 /// With this on the diagonal, directions without curvature may be left alone.
 const FLAT: f64 = 1e-6;

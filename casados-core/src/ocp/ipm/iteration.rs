@@ -86,7 +86,7 @@ where
         if state.is_held() {
             self.release(ocp, state)?;
         }
-        let direction = self.direction(ocp, state, row).and_then(|is_corrected| {
+        let direction = self.direction(ocp, capacity, state, row).and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
             self.along(ocp, capacity, state, here, is_corrected)
         });
@@ -232,12 +232,15 @@ where
     fn direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<bool, QpError> {
         let force = state.lengths.sizes.force;
         let least = force * barrier::least(self.options.least_error(force));
+        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
         let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        iterate.units = units;
         let probes = state.progress.is_free();
         let aim = if probes { 0.0 } else { state.mu };
         state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim), force)?;
@@ -368,8 +371,8 @@ where
         let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let Accepted { alpha, corrected } = accepted;
-        let mut dual = direction.dual;
+        iterate.units = &*core::mem::take(&mut work.units);
+        let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
         if corrected {
             dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
         }

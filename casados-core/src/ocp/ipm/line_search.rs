@@ -239,6 +239,7 @@ where
                 let qp = ocp.qp.view();
                 let mut iterate =
                     attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                iterate.units = self.work.units;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
                 let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));

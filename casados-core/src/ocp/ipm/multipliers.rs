@@ -37,9 +37,12 @@ where
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut work = Work::new(ends, capacity, self.work.as_mut());
-        let units = state.lengths.units(work.units);
+        let rows = core::mem::take(&mut work.units);
+        let rows = &*rows;
+        let units = state.lengths.units(rows);
         let mut iterate =
             attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
+        iterate.units = units.rows;
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
@@ -50,9 +53,8 @@ where
             assign(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work, force).is_ok() {
             let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(LARGEST * force);
-            let rows = &*iterate.sides.rows;
-            let sides = scaling::of_sides(rows, work.hessian_multipliers, work.units);
-            if scaling::of_gaps(iterate.qp.dims, work.pi, work.units).chain(sides).all(is_small) {
+            let sides = scaling::of_sides(iterate.sides.rows, work.hessian_multipliers, rows);
+            if scaling::of_gaps(iterate.qp.dims, work.pi, rows).chain(sides).all(is_small) {
                 assign(view.dynamics, work.pi);
             } else {
                 view.dynamics.fill(T::ZERO);

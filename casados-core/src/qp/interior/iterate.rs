@@ -25,6 +25,8 @@ pub struct Iterate<'a, T> {
     pub objective: bool,
     /// What keeps variables near where they are: `½ ρ |Δ|²` of every step.
     pub proximal: T,
+    /// The units that `Δ` is measured in there, by rows; all one if there are none.
+    pub units: &'a [T],
     pub riccati: Riccati<'a, T>,
     pub sides: Sides<'a, T>,
     /// What couples stages.
@@ -123,6 +125,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             coupling,
             objective: true,
             proximal: T::ZERO,
+            units: &[],
             riccati,
             sides,
             v: take_mut(numbers, end.row),
@@ -209,8 +212,9 @@ impl<'a, T: Real> Iterate<'a, T> {
             // What keeps variables near where they are belongs to the step, not to the problem.
             for place in Places::<T>::new(self.qp.dims) {
                 let step = part(self.step, place.row, place.n);
-                for (force, &step) in part_mut(forces, place.row, place.n).iter_mut().zip(step) {
-                    *force = *force + self.proximal * step;
+                let forces = part_mut(forces, place.row, place.n);
+                for (i, (force, &step)) in forces.iter_mut().zip(step).enumerate() {
+                    *force = *force + in_units(self.proximal, self.units, place.row + i) * step;
                 }
             }
         }
@@ -353,6 +357,12 @@ impl<'a, T: Real> Iterate<'a, T> {
         let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
         costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
     }
+}
+
+/// What a proximal weight is of a row, whose variable is measured in its unit.
+#[inline(always)]
+pub fn in_units<T: Real>(proximal: T, units: &[T], row: usize) -> T {
+    units.get(row).map_or(proximal, |&unit| proximal / (unit * unit))
 }
 
 /// An element; zero if there is none.

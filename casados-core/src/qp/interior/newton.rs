@@ -1,6 +1,6 @@
 //! Newton's step from an iterate, and the way along it.
 
-use super::iterate::{Iterate, at, scatter};
+use super::iterate::{Iterate, at, in_units, scatter};
 use super::riccati::Equations;
 use super::vector::{add_scaled, shrink};
 use crate::qp::error::QpError;
@@ -62,7 +62,9 @@ impl<T: Real> Iterate<'_, T> {
             self.weights.fill(T::ZERO);
             if self.proximal > T::ZERO {
                 for place in Places::<T>::new(self.qp.dims) {
-                    part_mut(self.weights, place.row, place.n).fill(self.proximal);
+                    for (i, weight) in part_mut(self.weights, place.row, place.n).iter_mut().enumerate() {
+                        *weight = in_units(self.proximal, self.units, place.row + i);
+                    }
                 }
             }
             scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
