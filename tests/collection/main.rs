@@ -6,6 +6,7 @@
 mod data;
 
 mod astray;
+mod climb;
 mod guesses;
 mod held;
 mod limits;

@@ -8,7 +8,7 @@ use casados::{Erk, Rk4};
 use std::f64::consts::PI;
 
 /// Components of the state at a stage.
-fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[(usize, f64)]) -> Test {
+pub fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[(usize, f64)]) -> Test {
     for &(i, value) in values {
         ocp.bound(&format!("x[{i}]"), stage..=stage, value, value)?;
     }
@@ -18,7 +18,7 @@ fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[(usize
 /// Converged in at most so many iterations, at a minimum of IPOPT's (CasADi 3.8.2, the same
 /// discretisation and guess, a tolerance of 1e-6). IPOPT relaxes bounds by 1e-8 of their size,
 /// which changes objectives by as much, times ratios of sizes and differences of up to ten.
-fn is_solved<P: Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>(
+pub fn is_solved<P: Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
     minimum: f64,
     iterations: usize,

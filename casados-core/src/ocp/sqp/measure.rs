@@ -45,6 +45,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         slope.to_f64() + soft
     }
 
+    /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
+    pub(super) fn curvature(&mut self, solution: &Solution<T, D, M>) -> f64 {
+        let intervals = self.intervals();
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let ((from, _), (to, _)) = (self.iterate.vectors(), solution.vectors());
+        let (mut curvature, mut square, mut begin) = (T::ZERO, T::ZERO, 0);
+        for stage in self.qp.view().stages() {
+            let view = stage.arrays();
+            let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
+            begin += view.ld;
+            let (direction, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
+            let force = part_mut(rest, 0, view.ld);
+            for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
+                *d = w - v;
+            }
+            force.fill(T::ZERO);
+            add_symmetric(force, view.hessian, view.ld, direction, view.n);
+            for (&d, &f) in direction.iter().zip(&*force).take(view.n) {
+                (curvature, square) = (curvature + d * f, square + d * d);
+            }
+        }
+        (curvature / square).to_f64()
+    }
+
     /// Objective and violations at some point, with the weights of violations.
     ///
     /// # Errors

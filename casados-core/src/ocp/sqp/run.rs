@@ -3,6 +3,7 @@
 use super::Sqp;
 use super::direction::Direction;
 use super::options::Globalisation;
+use super::scaled::Way;
 use super::secant::Take;
 use super::state::{State, Taken};
 use crate::ocp::convexify::Convexification;
@@ -208,7 +209,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             ControlFlow::Break(status) => return Ok(Some(status)),
         };
         (row.step, row.corrected) = (taken.length, taken.corrected);
-        state.damp(row);
+        let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
+        state.damp(row, curvature);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
         if row.elastic && C::EXACT && (state.nearest || state.elastic_steps <= PASSING) {
             // On the way to a feasible point forces of penalties are no multipliers: curvatures
@@ -218,6 +220,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.forget_weights(ocp, state);
         }
         Ok(None)
+    }
+
+    /// The curvature of the QP along its step, of which the iterate has gone a part.
+    fn curvature_of_step<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> f64 {
+        self.scale(ocp, state, Way::Into);
+        let curvature = ocp.curvature(&self.solution);
+        self.scale(ocp, state, Way::Back);
+        curvature
     }
 
     /// Compares the length of the full step with that of the one before.

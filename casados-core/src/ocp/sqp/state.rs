@@ -3,6 +3,7 @@
 use super::acceptance::Search;
 use crate::ocp::log::Iteration;
 use crate::ocp::units::Sizes;
+use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
 /// What a run remembers from one iteration to the next.
@@ -18,6 +19,8 @@ pub(super) struct State<T> {
     pub regularisation: f64,
     /// The least regularisation, where steps without were too far from being one of descent.
     pub damping: f64,
+    /// The regularisation of the last step that was short, and less after others.
+    pub failed: f64,
     /// Whether the last direction was that of the violations alone.
     pub nearest: bool,
     /// Steps with penalties in a row.
@@ -39,12 +42,17 @@ pub(super) struct State<T> {
     pub number: PhantomData<T>,
 }
 
-/// Steps that are no longer are followed by more damping, by that factor; others by less.
+/// Steps that are no longer are followed by more damping: by that factor, or by what would leave
+/// of the step along a curvature the cube root of the part that was gone.
 const SHORT: f64 = 1.0 / 16.0;
 const GROWTH: f64 = 4.0;
-const RELIEF: f64 = 0.1;
+const ROOT: f64 = -1.0 / 3.0;
+/// Other steps are followed by less damping, but not by less than the geometric mean of what there
+/// was and of what was too little the last time; that is forgotten by a factor.
+const RELIEF: f64 = 0.2;
+const FORGET: f64 = 0.1;
 /// The least and the most of it.
-const LEAST: f64 = 1e-3;
+const LEAST: f64 = 1e-8;
 const MOST: f64 = 1e2;
 
 impl<T> State<T> {
@@ -57,6 +65,7 @@ impl<T> State<T> {
             elastic: false,
             regularisation: 0.0,
             damping: 0.0,
+            failed: 0.0,
             passing: false,
             nearest: false,
             penalty: 0.0,
@@ -75,15 +84,23 @@ impl<T> State<T> {
         self.sizes.map_or(1.0, |sizes| sizes.force)
     }
 
-    /// Damping of the next direction, after a step.
-    pub fn damp(&mut self, row: &Iteration) {
-        self.damping = if row.step <= SHORT {
-            (GROWTH * row.regularisation).clamp(LEAST, MOST)
-        } else if self.damping > RELIEF * LEAST {
-            RELIEF * self.damping
+    /// Whether a step was so short that damping helps.
+    pub fn is_short(&self, row: &Iteration) -> bool {
+        row.step <= SHORT
+    }
+
+    /// Damping of the next direction, after a step with such a curvature of the QP along it.
+    pub fn damp(&mut self, row: &Iteration, curvature: f64) {
+        if self.is_short(row) {
+            let by_curvature = curvature.max(0.0) * (Scalar::powf(row.step, ROOT) - 1.0);
+            self.failed = row.regularisation.max(LEAST);
+            self.damping = by_curvature.max(GROWTH * row.regularisation).clamp(LEAST, MOST);
+        } else if self.damping > LEAST {
+            self.damping = (RELIEF * self.damping).max(Scalar::sqrt(self.damping * self.failed));
+            self.failed *= FORGET;
         } else {
-            0.0
-        };
+            self.damping = 0.0;
+        }
     }
 }
 
