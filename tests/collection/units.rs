@@ -139,3 +139,33 @@ fn satellite_by_interior_point() -> Test {
     assert!((outcome.objective - 5158.556192072234).abs() <= 1e-7 * 5158.6, "{outcome}");
     Ok(())
 }
+
+/// A cart whose jerk is the control, in millimetres: it comes back in a second, with a wall after
+/// 40 mm. Without bounds of the control and with zero as the guess nothing says that the control is
+/// 1e5, and forces 1e6.
+#[ode]
+fn jerked(x: [f64; 3], u: [f64; 1]) -> [f64; 3] {
+    [x[1], x[2], u[0]]
+}
+
+#[function]
+fn square(_x: [f64; 3], u: [f64; 1]) -> f64 {
+    u[0] * u[0]
+}
+
+/// No QP can be solved to more digits than its forces have. IPOPT takes 235 iterations.
+#[test]
+fn cart_in_millimetres() -> Test {
+    let n = 60;
+    let mut ocp = Problem::new(Erk::<Jerked, Rk4>::new(Options::default())?)
+        .running_cost(GeneralCost::<Square>::new())
+        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+    ocp.free_initial_state();
+    ocp.bound("x[0]", .., f64::NEG_INFINITY, 40.0)?;
+    let ends = [[0.0, 1000.0, 0.0], [0.0, -1000.0, 0.0]];
+    for (stage, state) in [0, n].into_iter().zip(ends) {
+        fix(&mut ocp, stage, &[(0, state[0]), (1, state[1]), (2, state[2])])?;
+    }
+    line(&mut ocp, &ends[0], &ends[1], &[0.0])?;
+    is_solved(&mut ocp, 27303029807.437916, 30)
+}

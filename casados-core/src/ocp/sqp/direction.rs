@@ -26,7 +26,7 @@ const UNKNOWN: usize = 3;
 /// Penalties grow by this to see whether less violation is possible at all, up to that multiple.
 const GROWTH: f64 = 100.0;
 const MOST_ELASTIC: f64 = 1e4;
-/// What rounding may leave of forces as large as one.
+/// What rounding may leave of forces as large as one: no QP is solved to more digits.
 const DIGITS: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
 const STAYS: f64 = 1.0 - 1e-3;
@@ -119,7 +119,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
-        self.qp_solver.relax(self.options.qp_accuracy * state.residual);
+        let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
+        self.qp_solver.relax((self.options.qp_accuracy * state.residual).max(DIGITS * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
