@@ -229,6 +229,8 @@ pub trait Shape: 'static {
     const NV: usize;
     /// Directions of sensitivities: `NX + NU + NP`.
     const NW: usize;
+    /// Columns that there is memory for where directions are computed side by side, `NW` or more.
+    const NC: usize;
 
     /// `[T; NX]`
     type ArrayX<T: Plain>: Array<T>;
@@ -244,6 +246,8 @@ pub trait Shape: 'static {
     type ArrayV<T: Plain>: Array<T>;
     /// `[T; NW]`
     type ArrayW<T: Plain>: Array<T>;
+    /// `[T; NC]`
+    type ArrayC<T: Plain>: Array<T>;
 
     /// `SVector<T, NX>`
     type VectorX<T: Plain>: Matrix<T>;
@@ -289,7 +293,7 @@ pub trait Shape: 'static {
     type MatrixCP<T: Plain, const C: usize>: Matrix<T>;
 }
 
-/// The dimensions of a model. The last three follow from the first four (see [`Shape`]); they are
+/// The dimensions of a model. The last four follow from the first four (see [`Shape`]); they are
 /// written out because stable Rust cannot add in a type.
 #[derive(Clone, Copy, Debug)]
 pub struct Dims<
@@ -300,6 +304,7 @@ pub struct Dims<
     const NK: usize,
     const NV: usize,
     const NW: usize,
+    const NC: usize = NW,
 >;
 
 impl<
@@ -310,7 +315,8 @@ impl<
     const NK: usize,
     const NV: usize,
     const NW: usize,
-> Shape for Dims<NX, NZ, NU, NP, NK, NV, NW>
+    const NC: usize,
+> Shape for Dims<NX, NZ, NU, NP, NK, NV, NW, NC>
 {
     const NX: usize = NX;
     const NZ: usize = NZ;
@@ -328,6 +334,10 @@ impl<
         assert!(NW == NX + NU + NP, "NW must be NX + NU + NP");
         NW
     };
+    const NC: usize = {
+        assert!(NC >= NW, "NC must be NW or more");
+        NC
+    };
     type ArrayX<T: Plain> = [T; NX];
     type ArrayZ<T: Plain> = [T; NZ];
     type ArrayU<T: Plain> = [T; NU];
@@ -335,6 +345,7 @@ impl<
     type ArrayK<T: Plain> = [T; NK];
     type ArrayV<T: Plain> = [T; NV];
     type ArrayW<T: Plain> = [T; NW];
+    type ArrayC<T: Plain> = [T; NC];
     type VectorX<T: Plain> = SVector<T, NX>;
     type VectorZ<T: Plain> = SVector<T, NZ>;
     type VectorU<T: Plain> = SVector<T, NU>;

@@ -207,7 +207,7 @@ fn effort(x: f64, u: f64) -> f64 {
 
 #[test]
 fn problems_take_tables() -> Result<(), Box<dyn std::error::Error>> {
-    fn controls<M: casados::Dae<Shape = casados::Dims<1, 0, 1, 0, 1, 4, 2>>>()
+    fn controls<M: casados::Dae<Shape = casados::Dims<1, 0, 1, 0, 1, 4, 2, 8>>>()
     -> Result<Vec<f64>, Box<dyn std::error::Error>> {
         let mut ocp = Problem::new(Irk::<M, Gauss<2>>::new(Options::default())?)
             .running_cost(GeneralCost::<Effort>::new())

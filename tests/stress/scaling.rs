@@ -58,7 +58,7 @@ oscillators! {
 
 /// `x₊` alone, and `x₊`, `dx₊/dx₀`, `dx₊/du`, the gradient and the Hessian of `λᵀx₊` by `x₀`, one
 /// after the other.
-fn found<M: Dae<Shape = casados::Dims<2, 1, 1, 0, 3, 7, 3>>>() -> Vec<f64> {
+fn found<M: Dae<Shape = casados::Dims<2, 1, 1, 0, 3, 7, 3, 8>>>() -> Vec<f64> {
     let mut irk = Irk::<M, Gauss<3>>::new(Options { steps: 3, ..Default::default() }).unwrap();
     let (x0, u, lambda) = (vector![1.0, 0.5], vector![0.3], vector![0.7, -0.4]);
     let simulated = irk.solve(&x0, &u, 0.4).unwrap().x;

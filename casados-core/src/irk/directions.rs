@@ -5,7 +5,9 @@
 //! nearest cache.
 
 use crate::model::{Dae, NO_COLUMN};
+use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Field, Lanes};
+use crate::shape::Shape;
 use core::marker::PhantomData;
 
 /// So many bytes are in the nearest cache, beside others.
@@ -28,6 +30,23 @@ pub(super) const fn before(numbers: &[u32], number: usize) -> usize {
 pub(super) const fn width<E>(stages: usize, count: usize) -> usize {
     let many = size_of::<E>() == 64 && stages <= 2 && count >= 16;
     if size_of::<E>() <= 8 || many { 8 } else { 4 }
+}
+
+/// How many columns the panels of so many directions have together, where there is memory for
+/// `most`. Where two narrow panels would follow the wide ones, columns of zeros make them one:
+/// registers compute these beside the others, and each width has code of its own.
+const fn padded<E>(directions: usize, most: usize) -> usize {
+    let columns = match directions % 8 {
+        5.. if size_of::<E>() <= 8 => directions.next_multiple_of(8),
+        3 | 7 => directions + 1,
+        _ => directions,
+    };
+    if REGISTERS && columns <= most { columns } else { directions }
+}
+
+/// How many columns panels of all directions have together.
+pub(super) const fn all_columns<M: Dae, E>() -> usize {
+    padded::<E>(M::STRUCTURE.directions.len(), M::Shape::NC)
 }
 
 /// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many
@@ -92,8 +111,8 @@ pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows
 
 /// How the directions depend on `w`.
 pub(crate) trait Directions<E> {
-    /// How many there are.
-    const COUNT: usize;
+    /// How many columns their panels have.
+    const COLUMNS: usize;
     /// Whether each is an element of `w`.
     const SPARSE: bool = false;
     /// The column of an element of `w`, if that is a direction.
@@ -125,7 +144,7 @@ impl<M: Dae> Identity<M> {
 }
 
 impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
-    const COUNT: usize = M::STRUCTURE.directions.len();
+    const COLUMNS: usize = all_columns::<M, E>();
     const SPARSE: bool = true;
 
     #[inline(always)]
@@ -151,7 +170,7 @@ impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
 pub(crate) struct Seeded<'a, E, const C: usize>(pub &'a [[E; C]]);
 
 impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
-    const COUNT: usize = C;
+    const COLUMNS: usize = C;
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
@@ -177,4 +196,50 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
 pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
     let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
     E::from_f64(1.0) + E::from_f64(0.25) * E::from_whole(rank)
+}
+
+#[cfg(all(test, feature = "alloc", target_arch = "x86_64"))]
+mod tests {
+    use super::{padded, panel_of};
+    use crate::scalar::lanes::{F64x4, F64x8};
+    use alloc::vec::Vec;
+
+    /// The widths of panels that follow each other, of so many columns.
+    fn widths<E>(columns: usize, stages: usize) -> Vec<usize> {
+        let (mut widths, mut column) = (Vec::new(), 0);
+        while column < columns {
+            let (begin, width) = panel_of::<E>(column, columns, stages);
+            assert_eq!(begin, column);
+            assert!((begin..begin + width).all(|of| panel_of::<E>(of, columns, stages) == (begin, width)));
+            widths.push(width);
+            column += width;
+        }
+        assert_eq!(column, columns);
+        widths
+    }
+
+    /// Panels cover all directions, and have two widths at most: one of eight columns and a
+    /// narrower one. Registers themselves may have a panel of two or of one column beside others.
+    #[test]
+    fn panels_have_few_widths() {
+        for directions in 1..50 {
+            let columns = padded::<f64>(directions, usize::MAX);
+            assert!((directions..directions.next_multiple_of(8) + 1).contains(&columns));
+            let mut narrow = widths::<f64>(columns, 3);
+            narrow.retain(|&width| width < 8);
+            assert!(narrow.len() <= 1, "{directions}: {narrow:?}");
+            for (columns, stages) in [
+                (padded::<F64x4<4>>(directions, usize::MAX), 2),
+                (padded::<F64x8<8>>(directions, usize::MAX), 2),
+                (padded::<F64x8<8>>(directions, usize::MAX), 4),
+            ] {
+                assert!((directions..=directions + 1).contains(&columns));
+                let mut narrow = widths::<F64x8<8>>(columns, stages);
+                narrow.retain(|&width| width < 4);
+                assert!(narrow.len() <= 1, "{directions}: {narrow:?}");
+            }
+            // Without memory for more, columns are directions.
+            assert_eq!(padded::<f64>(directions, directions), directions);
+        }
+    }
 }

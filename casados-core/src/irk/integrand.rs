@@ -16,7 +16,7 @@ use crate::error::{Error, Place};
 use crate::integrator::With;
 use crate::irk::coefficients::Coefficients;
 use crate::memory::{Fallback, Memory, WithHessian};
-use crate::model::{ArrayW, Dae, VectorU, VectorX, VectorZ};
+use crate::model::{ArrayC, Dae, VectorU, VectorX, VectorZ};
 use crate::quadrature::Integrand;
 use crate::result::Hessian;
 use crate::scalar::Real;
@@ -104,7 +104,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
         &mut self,
         n: usize,
         step: &Step<M, T, S>,
-        sweep: &Sweep<M, T, ArrayW<M, T>, S>,
+        sweep: &Sweep<M, T, ArrayC<M, T>, S>,
         second: bool,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {

@@ -46,7 +46,7 @@ pub fn module(
     let mut text = text(model, derivatives, names);
     if let Some(time) = time {
         let Model { variables, graph, residual, .. } = model;
-        let (rate, [_, nv, _]) = ("rate", dimensions(variables));
+        let (rate, [_, nv, ..]) = ("rate", dimensions(variables));
         let routine = Routine {
             name: "time_derivative",
             documentation: "`∂y/∂t`, of the outputs that depend on it:",
@@ -152,7 +152,7 @@ fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> Tok
 fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
     let Model { variables, graph, residual, .. } = model;
-    let [_, nv, _] = dimensions(variables);
+    let [_, nv, ..] = dimensions(variables);
     let (ny, Names { value, value_jacobian, output, symbol }) = (residual.len(), names);
     let (nj, nh) = (jacobian.len(), hessian.len());
     let entries = || jacobian.iter().zip(constant).enumerate();
@@ -207,9 +207,13 @@ fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     [code_residual, code_constants, code_jacobian, code_adjoint, code_hessian].concat()
 }
 
-/// `NK`, `NV` and `NW`.
-pub fn dimensions(variables: &Variables) -> [usize; 3] {
+/// Columns of panels of directions are computed so many at a time.
+const PANEL: usize = 8;
+
+/// `NK`, `NV`, `NW` and `NC`.
+pub fn dimensions(variables: &Variables) -> [usize; 4] {
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
-    [nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np]
+    let nw = nx + nu + np;
+    [nx + nz, 2 * nx + nz + nu + np + 1, nw, nw.next_multiple_of(PANEL)]
 }

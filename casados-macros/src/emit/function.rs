@@ -22,14 +22,14 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let Model { variables, krate, residual, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
-    let [nk, nv, nw] = dimensions(variables);
-    let numbers = [nx, nz, nu, np, nk, nv, nw, residual.len(), jacobian.len(), hessian.len(), nv - 1];
-    let [lx, lz, lu, lp, lk, lv, lw, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
+    let [nk, nv, nw, nc] = dimensions(variables);
+    let numbers = [nx, nz, nu, np, nk, nv, nw, nc, residual.len(), jacobian.len(), hessian.len(), nv - 1];
+    let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::of_function(analysis));
     quote! {
         #[automatically_derived]
         impl #krate::__private::Function for #ty {
-            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
+            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw, #lc>;
             type Outputs = #krate::__private::Count<#ly>;
             type Jacobian<T: #krate::__private::Plain> = [T; #lj];
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
@@ -78,7 +78,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
 
 /// Functions over any scalar, of slices.
 fn graph_function(model: &Model, c: &Option<TokenStream>) -> TokenStream {
-    let (krate, ty, [_, nv, _]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let (krate, ty, [_, nv, ..]) = (&model.krate, ty(model), dimensions(&model.variables));
     let last = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]

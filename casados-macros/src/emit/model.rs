@@ -22,16 +22,16 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     let Model { variables, krate, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
-    let [nk, nv, nw] = dimensions(variables);
+    let [nk, nv, nw, nc] = dimensions(variables);
     let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
-    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
-        [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
+    let [lx, lz, lu, lp, lk, lv, lw, lc, lj, lh, lb, time] =
+        [nx, nz, nu, np, nk, nv, nw, nc, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::write(analysis));
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
     quote! {
         #[automatically_derived]
         impl #krate::__private::Dae for #ty {
-            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
+            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw, #lc>;
             type Jacobian<T: #krate::__private::Plain> = [T; #lj];
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
             type Factors<B: #krate::__private::Plain> = [B; #lb];
@@ -78,7 +78,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
 
 /// Functions over any scalar, of slices.
 fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
-    let (krate, ty, [_, nv, _]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let (krate, ty, [_, nv, ..]) = (&model.krate, ty(model), dimensions(&model.variables));
     let time = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]

@@ -14,7 +14,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         let Work { increment, linear, .. } = work;
         let rows = M::Shape::NK;
         let dy = R::flat_mut(self.dy_mut());
-        panels!(D::COUNT, E, S, column, W => {
+        panels!(D::COLUMNS, E, S, column, W => {
             let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
             for c in 0..W {
                 for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {

@@ -15,7 +15,7 @@ use crate::irk::directions::Identity;
 use crate::irk::driver::Parts;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::memory::Fallback;
-use crate::model::{ArrayW, Dae};
+use crate::model::{ArrayC, Dae};
 use crate::result::{DenseForward, Forward, ForwardAdjoint, Nominal};
 use crate::scalar::{Lanes, Real};
 use crate::shape::Plain;
@@ -35,7 +35,7 @@ copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
-    pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
+    pub(crate) sweep: Sweep<M, T, ArrayC<M, T>, S>,
     /// Zero if all derivatives of `z` are finite, else NaN.
     finite: [T; 1],
 }

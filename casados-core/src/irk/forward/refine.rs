@@ -98,7 +98,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         directions: &D,
     ) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
-        panels!(D::COUNT, T, S, column, W => {
+        panels!(D::COLUMNS, T, S, column, W => {
             let mut right = ArrayK::<M, Packet<T, S, W>>::zeroed();
             for c in 0..W {
                 let inputs = work.probe[0].as_mut().get_mut(nx + nk..).unwrap_or_default();

@@ -35,7 +35,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
     #[inline(always)]
     fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
         let nk = M::Shape::NK;
-        let (begin, width) = panel_of::<E>(column, D::COUNT, S);
+        let (begin, width) = panel_of::<E>(column, D::COLUMNS, S);
         let place = begin * nk * S + (column - begin);
         each!(i < S => {
             if let Some(to) = self.dy.get_mut(place + (slot * S + i) * width) {

@@ -1,8 +1,7 @@
 //! The rows of `D` that enter second derivatives: of curved variables at all stages, from the
 //! derivatives of a step.
 
-use crate::irk::directions::Directions;
-use crate::irk::directions::{NEAREST, width};
+use crate::irk::directions::{Directions, NEAREST, all_columns, width};
 use crate::linalg::{Arithmetic, Block, Packet};
 use crate::model::Dae;
 use crate::scalar::Lanes;
@@ -12,7 +11,7 @@ use core::marker::PhantomData;
 /// Whether all stages of a variable lie together: unless a panel is too large for the nearest
 /// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
 pub(in crate::irk) const fn together<M: Dae, E, const S: usize>() -> bool {
-    let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
+    let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, all_columns::<M, E>()) * size_of::<E>();
     panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
 }
 

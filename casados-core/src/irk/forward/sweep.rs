@@ -190,7 +190,7 @@ kernels! {
         directions: &'k D,
     ) {
         v.fill(E::from_f64(0.0));
-        panels!(D::COUNT, E, S, column, W => {
+        panels!(D::COLUMNS, E, S, column, W => {
             for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {
                 directions.add(index, E::from_f64(1.0), column, row);
             }
@@ -235,7 +235,7 @@ struct Shared<E, const S: usize> {
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Step<'_, M, E, D, G, S> {
     type Number = E;
     type Output = E;
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = is_long::<M, S>() && D::COLUMNS >= 8;
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) -> E {
         let nodes = nodes(&self.coefficients.a, self.h);
@@ -260,7 +260,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
             *weight = -(h * *weight);
         }
         let shared = &Shared { nodes, minus_ha: coupling(&coefficients.a, h), minus_weights };
-        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, shared));
+        panels!(D::COLUMNS, E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum
     }
@@ -270,7 +270,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
     /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
-        let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
+        let bytes = D::COLUMNS * M::Shape::NK * S * size_of::<E>();
         bytes <= NEAREST && is_short::<A, Scatter<'_, M, E, D, S>>()
     }
 

@@ -3,9 +3,9 @@
 use super::output::{Columns, Target};
 use super::sweep::Sweep;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{Directions, Identity, panel, panels};
+use crate::irk::directions::{Directions, Identity, all_columns, panel, panels};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::model::{ArrayW, Dae};
+use crate::model::{ArrayC, ArrayW, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 use core::marker::PhantomData;
@@ -47,7 +47,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Sweep<M, E, ArrayW<M, E>, S> {
+impl<M: Dae, E: Lanes, const S: usize> Sweep<M, E, ArrayC<M, E>, S> {
     /// Rows of `D` at a stage for some variables, over all directions.
     pub(crate) fn write_rows(
         &self,
@@ -101,7 +101,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
                 continue;
             }
             let unknown = if variable < nx { variable } else { variable - nx };
-            panels!(M::STRUCTURE.directions.len(), E, S, column, W => {
+            panels!(all_columns::<M, E>(), E, S, column, W => {
                 let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
                 let v = panel::<E, W>(v, column, nx);
                 let mut values = [zero; W];
@@ -153,7 +153,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
             *weight = -*weight;
         }
         let mut sum = E::from_f64(0.0);
-        panels!(D::COUNT, E, S, column, W => {
+        panels!(D::COLUMNS, E, S, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
             let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
             let unknowns = unknowns.clone();

@@ -16,7 +16,7 @@ use super::matrix_adjoint_step::{Advance, Inverse, add_stages, columns, is_direc
 use super::products::COLUMNS;
 use super::sparse_product::multiply_panel;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{Identity, before, panel_of, panels};
+use crate::irk::directions::{Identity, all_columns, before, panel_of, panels};
 use crate::irk::forward::stage_rows::row_of;
 use crate::irk::forward::sweep::Phase;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
@@ -78,8 +78,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> MatrixAdjoint<'_, M, E, R, S
             return;
         }
         let mut column = 0;
-        while column < M::STRUCTURE.directions.len() {
-            let (_, width) = panel_of::<E>(column, M::STRUCTURE.directions.len(), S);
+        while column < all_columns::<M, E>() {
+            let (_, width) = panel_of::<E>(column, all_columns::<M, E>(), S);
             self.phase(work.linear(kept), h, Phase::Before, column);
             self.solve_columns(work, kept, width);
             self.phase(work.linear(kept), h, Phase::After, column);
@@ -169,10 +169,10 @@ struct Panels<'a, M: Dae, E: Plain, R, const S: usize> {
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Panels<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = is_long::<M, S>() && all_columns::<M, E>() >= 8;
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        panels!(M::STRUCTURE.directions.len(), E, S, column, W => {
+        panels!(all_columns::<M, E>(), E, S, column, W => {
             if self.phase == Phase::Whole || self.only == column {
                 self.panel::<A, W>(column);
             }

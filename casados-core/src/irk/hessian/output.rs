@@ -4,7 +4,7 @@
 
 use crate::irk::directions::{Identity, before};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::model::{ArrayW, Dae};
+use crate::model::{ArrayC, ArrayW, Dae};
 use crate::result::Hessian;
 use crate::scalar::Lanes;
 use crate::shape::{Matrix, Plain, Shape};
@@ -12,7 +12,7 @@ use core::marker::PhantomData;
 
 /// A lower triangle.
 pub(in crate::irk) struct Triangle<'a, M: Dae, E: Plain> {
-    pub rows: &'a [ArrayW<M, E>],
+    pub rows: &'a [ArrayC<M, E>],
     /// What an integrand adds, over all directions: a lower triangle, too.
     pub more: Option<&'a [ArrayW<M, E>]>,
 }

@@ -21,7 +21,7 @@ use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Linearization, Step, Work, copy};
 use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
-use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
+use crate::model::{ArrayC, ArrayK, ArrayV, ArrayW, Dae};
 use crate::quadrature::Along;
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
@@ -46,7 +46,7 @@ pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     /// `−H D` of a few columns at all stages.
     g: Aligned<ArrayV<M, [[T; COLUMNS]; S]>>,
     /// The Hessian over the directions that have any influence, its lower triangle.
-    sum: ArrayW<M, ArrayW<M, T>>,
+    sum: ArrayW<M, ArrayC<M, T>>,
     /// `μ` at all stages, in the order of the equations.
     mu: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
     /// Entries of `∇²(μᵀ f)` at all stages.
@@ -60,7 +60,7 @@ copy!([M: Dae, T: Plain, const S: usize] HessianPass<M, T, S>);
 pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     linear: Linearization<M, T, S, F>,
     /// The rows of `D` at all stages that enter second derivatives, in panels.
-    d: Aligned<ArrayV<M, [ArrayW<M, T>; S]>>,
+    d: Aligned<ArrayV<M, [ArrayC<M, T>; S]>>,
 }
 copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
@@ -175,7 +175,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         let (entries, d, sum) =
             (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
         if const { is_worth::<M, E, S>() } {
-            MatrixAdjoint::<M, E, ArrayW<M, E>, S> {
+            MatrixAdjoint::<M, E, ArrayC<M, E>, S> {
                 coefficients,
                 entries,
                 d,
@@ -188,7 +188,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
             .run(work, kept);
         } else {
             let g = g.as_mut();
-            dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
+            dispatch(Subtract::<M, E, ArrayC<M, E>, S> {
                 entries,
                 d,
                 g,
@@ -198,7 +198,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
             });
         }
         if const { !M::STRUCTURE.lone.is_empty() } {
-            dispatch(Diagonal::<M, E, ArrayW<M, E>, S> { entries, sum, model: PhantomData });
+            dispatch(Diagonal::<M, E, ArrayC<M, E>, S> { entries, sum, model: PhantomData });
         }
     }
 }

@@ -5,7 +5,7 @@
 //! variables of a stage do: what is multiplied is then in the nearest cache.
 
 use super::sparse_product::multiply;
-use crate::irk::directions::{panel, panels};
+use crate::irk::directions::{all_columns, panel, panels};
 use crate::irk::forward::stage_rows::together;
 use crate::linalg::{Arithmetic, Kernel, is_long};
 use crate::model::Dae;
@@ -32,17 +32,17 @@ pub struct Subtract<'a, M, E, R, const S: usize> {
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>();
+    const WIDE: bool = is_long::<M, S>() && all_columns::<M, E>() >= 8;
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         let mut start = 0;
         if const { A::WIDE && size_of::<E>() <= 8 && COLUMNS == 16 } {
-            while start + 16 <= const { M::STRUCTURE.directions.len() } {
+            while start + 16 <= const { all_columns::<M, E>() } {
                 self.panels::<A, 8, 2>(start);
                 start += 16;
             }
         }
-        panels!(M::STRUCTURE.directions.len(), E, S, column from start, W => self.panels::<A, W, 1>(column));
+        panels!(all_columns::<M, E>(), E, S, column from start, W => self.panels::<A, W, 1>(column));
     }
 }
 
@@ -96,7 +96,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
     ) {
         let all = M::STRUCTURE.curved.len() * S;
         let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
-        panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
+        panels!(all_columns::<M, E>(), E, S, row, V => {
             if row >= column {
                 let g = g.get(of_g..of_g + count).unwrap_or_default();
                 let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();

@@ -1,7 +1,7 @@
 //! Memory is allocated by first calls only. A process of its own, whose allocator counts.
 #![allow(unsafe_code)]
 
-#[path = "../models/mod.rs"]
+#[path = "../by_hand/models/mod.rs"]
 mod models;
 
 mod adaptive;

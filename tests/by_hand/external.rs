@@ -1,13 +1,10 @@
 //! The functions that a shared library exports, called as CasADi calls them.
-#![cfg(feature = "casadi")]
 #![allow(unsafe_code)]
 
-mod models;
-
+use crate::models::pendulum::Pendulum;
 use casados_core::{Gauss, Irk, Options};
 use core::ffi::{CStr, c_char, c_int, c_longlong};
 use core::ptr::{null, null_mut};
-use models::pendulum::Pendulum;
 use nalgebra::{SVector, vector};
 
 casados_core::casadi::export! {
