@@ -12,7 +12,7 @@
 
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
-use super::data::{Node, get, inputs, is_algebraic, kept, sizes, split};
+use super::data::{Node, inputs, is_algebraic, kept, sizes, split};
 use super::dynamics::{Dynamics, Nodes, Step};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
@@ -20,6 +20,7 @@ use super::instance::{Ocp, nodes};
 use super::point::Cross;
 use super::point::{Terms, read};
 use super::problem::{Formulation, Problem};
+use crate::qp::element::get;
 use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;

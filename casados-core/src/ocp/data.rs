@@ -3,6 +3,7 @@
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::problem::Formulation;
+use crate::qp::element::get;
 use crate::qp::{StageDims, pad, part};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -154,10 +155,4 @@ pub(super) const fn kept<S: Shape>() -> usize {
 pub(super) const fn extended<S: Shape>(rows: usize) -> usize {
     let [n, nz] = sizes::<S>();
     if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
-}
-
-/// An element; zero where there is none.
-#[inline(always)]
-pub(super) fn get<T: Real>(values: &[T], index: usize) -> T {
-    values.get(index).copied().unwrap_or(T::ZERO)
 }

@@ -2,12 +2,13 @@
 
 use super::constraint::Constraints;
 use super::cost::Cost;
-use super::data::{bounds, get};
+use super::data::bounds;
 use super::dynamics::Dynamics;
 use super::instance::{Initial, Ocp};
 use super::labels::output;
 use super::names::Names;
 use super::problem::Formulation;
+use crate::qp::element::get;
 use crate::qp::{Bounds, Stage, StageDims, marked};
 use crate::scalar::Real;
 use crate::shape::Shape;

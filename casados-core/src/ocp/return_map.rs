@@ -7,7 +7,7 @@ use super::linearise::dot;
 use super::names::Names;
 use super::point::{finite_outputs, read};
 use crate::function::{ArrayV, ArrayY, Function};
-use crate::qp::interior::set;
+use crate::qp::element::set;
 use crate::scalar::Real;
 use crate::shape::{Outputs, Plain, Shape};
 use alloc::{vec, vec::Vec};

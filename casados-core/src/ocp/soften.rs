@@ -3,11 +3,12 @@
 use super::bounds::means;
 use super::check::{Labels, first, range};
 use super::constraint::Constraints;
-use super::data::{get, split};
+use super::data::split;
 use super::error::{OcpError, Part, Text};
 use super::instance::Ocp;
 use super::labels::output;
 use super::problem::Formulation;
+use crate::qp::element::get;
 use crate::qp::{Side, StageDims};
 use crate::scalar::Real;
 use core::ops::RangeBounds;

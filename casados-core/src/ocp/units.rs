@@ -7,7 +7,8 @@
 
 use super::instance::Ocp;
 use super::problem::Formulation;
-use crate::qp::interior::{at, is_first_fixed, set};
+use crate::qp::element::set;
+use crate::qp::interior::{at, is_first_fixed};
 use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::Real;
 

@@ -57,6 +57,7 @@ mod clarabel;
 #[cfg(feature = "alloc")]
 mod condense;
 mod coupling;
+pub(crate) mod element;
 mod error;
 pub(crate) mod interior;
 mod layout;

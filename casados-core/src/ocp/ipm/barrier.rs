@@ -1,7 +1,8 @@
 //! How the barrier parameter changes.
 
 use crate::qp::Residuals;
-use crate::qp::interior::{Sides, set};
+use crate::qp::element::set;
+use crate::qp::interior::Sides;
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.

@@ -2,7 +2,8 @@
 
 use super::IpmOptions;
 use crate::ocp::units::Units;
-use crate::qp::interior::{Iterate, at, set};
+use crate::qp::element::set;
+use crate::qp::interior::{Iterate, at};
 use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
 use crate::scalar::Real;
 

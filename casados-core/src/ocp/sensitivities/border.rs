@@ -12,10 +12,11 @@
 
 use super::column::{self, Column, Right, Zero};
 use super::factors::SolutionFactors;
-use super::{add, get, set, zeros};
+use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::linearise::dot;
+use crate::qp::element::{add, get, set};
 use crate::qp::{QpError, QpView, Symmetric, assign, marked, part, part_mut};
 use crate::scalar::Real;
 use alloc::vec::Vec;

@@ -1,10 +1,11 @@
 //! Solutions of the conditions of optimality by the factors of the recursion.
 
 use super::factors::SolutionFactors;
-use super::{add, get, set, zeros};
+use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::linearise::dot;
+use crate::qp::element::{add, get, set};
 use crate::qp::{Solution, StageDims, assign, part, part_mut};
 use crate::scalar::Real;
 use alloc::vec::Vec;

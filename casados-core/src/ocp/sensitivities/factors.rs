@@ -11,6 +11,7 @@ use crate::ocp::curvature::Curvature;
 use crate::ocp::error::{OcpError, Part};
 use crate::ocp::instance::{Initial, Ocp};
 use crate::ocp::problem::Formulation;
+use crate::qp::element::{get, set};
 use crate::qp::{QpView, Solution, StageDims, assign, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -173,8 +174,8 @@ impl<T: Real> SolutionFactors<T> {
             column::solve_parameter(self, p, &mut column);
             assign(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
             for q in 0..np {
-                let value = super::get(&self.problem.square, p * np + q) + self.change(q, &column);
-                super::set(&mut self.square, p * np + q, value);
+                let value = get(&self.problem.square, p * np + q) + self.change(q, &column);
+                set(&mut self.square, p * np + q, value);
             }
         }
         self.column = column;
@@ -200,7 +201,7 @@ impl<T: Real> SolutionFactors<T> {
         column::solve_seed(self, seed, &mut column);
         for p in 0..self.dims[2] {
             let value = self.change(p, &column);
-            super::set(&mut self.adjoint, p, value);
+            set(&mut self.adjoint, p, value);
         }
         self.column = column;
         Ok(SolutionAdjoint { x0: part(self.column.multipliers(0), 0, self.given()), p: &self.adjoint })

@@ -15,11 +15,11 @@ mod factors;
 mod parameters;
 mod recursion;
 
+use crate::qp::element::get;
 pub use answers::{SolutionAdjoint, ValueHessian};
 pub use factors::SolutionFactors;
 
 use super::curvature::Curvature;
-use super::data::get;
 use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
 use super::problem::Formulation;
@@ -206,18 +206,5 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             derivatives.fill(T::ZERO);
         }
         Ok(())
-    }
-}
-
-#[inline(always)]
-fn set<T: Real>(values: &mut [T], index: usize, value: T) {
-    if let Some(element) = values.get_mut(index) {
-        *element = value;
-    }
-}
-#[inline(always)]
-fn add<T: Real>(values: &mut [T], index: usize, value: T) {
-    if let Some(element) = values.get_mut(index) {
-        *element = *element + value;
     }
 }

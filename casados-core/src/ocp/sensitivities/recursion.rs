@@ -3,10 +3,10 @@
 use super::active::Springs;
 use super::column::solve;
 use super::factors::SolutionFactors;
-use super::{add, get, set};
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::linearise::dot;
+use crate::qp::element::{add, get, set};
 use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut};
 use crate::scalar::Real;
 

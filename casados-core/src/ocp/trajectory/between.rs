@@ -2,12 +2,13 @@
 
 use super::{Kind, Series, Trajectory};
 use crate::ocp::constraint::Constraints;
-use crate::ocp::data::{get, split};
+use crate::ocp::data::split;
 use crate::ocp::dynamics::{Dynamics, Step};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::{Ocp, nodes};
 use crate::ocp::point::read;
 use crate::ocp::problem::{Formulation, Problem};
+use crate::qp::element::get;
 use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;

@@ -3,12 +3,13 @@
 use super::{Kind, Series, Trajectory};
 use crate::ocp::algebraic;
 use crate::ocp::constraint::Constraints;
-use crate::ocp::data::{get, split};
+use crate::ocp::data::split;
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::{Ocp, nodes};
 use crate::ocp::labels::output;
 use crate::ocp::problem::{Formulation, Problem};
+use crate::qp::element::get;
 use crate::qp::{Bounds, SolutionStage, Stage, StageDims};
 use crate::scalar::Real;
 use crate::shape::Shape;

@@ -2,10 +2,10 @@
 
 use super::collect::names;
 use super::{Kind, Series, Trajectory, TrajectoryError};
-use crate::ocp::data::get;
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
+use crate::qp::element::{get, set};
 use crate::qp::{SolutionStageMut, StageDims};
 use crate::scalar::Real;
 use alloc::string::String;
@@ -145,12 +145,6 @@ fn place<T: Real>(times: &[T], time: T) -> (usize, T) {
 /// An element, or the last one.
 fn held<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).or(values.last()).copied().unwrap_or(T::ZERO)
-}
-
-fn set<T>(values: &mut [T], index: usize, value: T) {
-    if let Some(place) = values.get_mut(index) {
-        *place = value;
-    }
 }
 
 /// Whether a series has these lengths: values, multipliers of both sides, costates.

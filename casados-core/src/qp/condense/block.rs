@@ -1,7 +1,7 @@
 //! The condensed problem: the recursion over the stages of a block.
 
 use super::plan::{Kind, Origin, blocks, limits};
-use super::{get, set};
+use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, MORE, Part, Source, product, subtract};
 use crate::qp::layout::{Place, Places, StageDims, assign, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;

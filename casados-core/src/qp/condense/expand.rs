@@ -1,7 +1,7 @@
 //! Between solutions of the problem and of the condensed one.
 
 use super::plan::{Origin, blocks};
-use super::{get, set};
+use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, add_symmetric, add_transposed, subtract, symmetric};
 use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
 use crate::qp::problem::QpView;

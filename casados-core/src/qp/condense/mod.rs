@@ -179,13 +179,3 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         })
     }
 }
-
-fn get<T: Real>(slice: &[T], index: usize) -> T {
-    slice.get(index).copied().unwrap_or(T::ZERO)
-}
-
-fn set<T>(slice: &mut [T], index: usize, value: T) {
-    if let Some(element) = slice.get_mut(index) {
-        *element = value;
-    }
-}

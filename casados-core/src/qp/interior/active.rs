@@ -19,8 +19,9 @@
 
 use super::iterate::{Iterate, at};
 use super::run::Limits;
-use super::sides::{Sides, set};
+use super::sides::Sides;
 use super::terms::Terms;
+use crate::qp::element::set;
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::statistics::QpStatistics;

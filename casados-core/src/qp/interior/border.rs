@@ -16,10 +16,10 @@
 use super::coupling::{Coupling, SIDE};
 use super::kernels::{Columns, Part, Source, product};
 use super::riccati::{Equations, Riccati};
-use super::set;
 use super::shared::Shared;
 use super::symmetric::Symmetric;
 use super::vector::add_scaled;
+use crate::qp::element::{add, set};
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
 use crate::qp::{QpView, marked};
@@ -95,14 +95,6 @@ fn signed<T: Real>(a: &[T], b: &[T], inverse: &[T]) -> T {
             if inverse < T::ZERO { sum - a * b } else { sum + a * b }
         },
     )
-}
-
-/// Adds to an element.
-#[inline(always)]
-fn add<T: Real>(slice: &mut [T], index: usize, value: T) {
-    if let Some(element) = slice.get_mut(index) {
-        *element = *element + value;
-    }
 }
 
 impl<T: Real> Coupling<'_, T> {

@@ -5,6 +5,7 @@
 
 use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
+use crate::qp::element::set;
 use crate::qp::layout::{Place, Places, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
@@ -171,7 +172,7 @@ impl<'a, T: Real> Coupling<'a, T> {
     pub fn fold(&mut self, qp: QpView<'_, T>, rows: &mut [T]) {
         let mut join = |first: usize, other: usize| {
             let value = rows.get(other).copied().unwrap_or(T::ZERO);
-            super::set(rows, other, T::ZERO);
+            set(rows, other, T::ZERO);
             if let Some(row) = rows.get_mut(first) {
                 *row = *row + value;
             }

@@ -31,7 +31,7 @@ pub(crate) use kernels::{
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub(crate) use riccati::{Extent, First};
-pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
+pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed};
 pub use store::Store;
 #[cfg(feature = "alloc")]
 pub(crate) use symmetric::Symmetric;

@@ -8,8 +8,9 @@
 //! leaves the digits of the Hessian beside it.
 
 use super::iterate::at;
-use super::sides::{Sides, set};
+use super::sides::Sides;
 use super::vector::{dot, largest_negative_ratio};
+use crate::qp::element::set;
 use crate::qp::layout::part;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;

@@ -7,6 +7,7 @@ use super::riccati::First;
 use super::sides::Penalties;
 use super::terms::Terms;
 use super::vector::{dot, largest_size};
+use crate::qp::element::set;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::qp::solution::SolutionView;
@@ -322,11 +323,11 @@ impl<T: Real> Iterate<'_, T> {
         let sides = &self.sides;
         for (i, (&row, &multiplier)) in sides.rows.iter().zip(&*sides.multiplier).enumerate() {
             let side = if i < sides.counts.lower { &mut *solution.lower } else { &mut *solution.upper };
-            super::sides::set(side, row as usize, multiplier);
+            set(side, row as usize, multiplier);
         }
         let mut equation = |row: usize, force: T| {
-            super::sides::set(solution.lower, row, force.max(T::ZERO));
-            super::sides::set(solution.upper, row, (-force).max(T::ZERO));
+            set(solution.lower, row, force.max(T::ZERO));
+            set(solution.upper, row, (-force).max(T::ZERO));
         };
         for (&row, &free) in sides.equations.iter().zip(&*sides.free) {
             equation(row as usize, free);

@@ -1,5 +1,6 @@
 //! Controls that are the same at all stages: parameters of the recursion, not eliminated by it.
 
+use crate::qp::element::set;
 use crate::qp::layout::{Place, part_mut};
 use crate::qp::marked;
 use crate::scalar::Real;
@@ -41,7 +42,7 @@ impl<'s, T: Real> Shared<'s, T> {
         for row in rows() {
             part_mut(m, row * ld, ld).fill(T::ZERO);
             for column in nx..n {
-                super::set(m, column * ld + row, if column == row { T::ONE } else { T::ZERO });
+                set(m, column * ld + row, if column == row { T::ONE } else { T::ZERO });
             }
         }
     }

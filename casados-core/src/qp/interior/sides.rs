@@ -6,6 +6,7 @@
 //! `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds that are hard
 //! are an equation, with a multiplier without sign.
 
+use crate::qp::element::set;
 use crate::qp::layout::{Places, part, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::Row;
@@ -268,13 +269,5 @@ impl<'a, T: Real> Sides<'a, T> {
                 }
             }
         });
-    }
-}
-
-/// An element, if there is one.
-#[inline(always)]
-pub fn set<T>(slice: &mut [T], index: usize, value: T) {
-    if let Some(element) = slice.get_mut(index) {
-        *element = value;
     }
 }

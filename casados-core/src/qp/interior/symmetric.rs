@@ -5,6 +5,7 @@
 //! systems", Math. Comp. 31 (1977).
 
 use super::vector::add_scaled;
+use crate::qp::element::set;
 use crate::qp::layout::{part, part_mut};
 use crate::scalar::Real;
 
@@ -77,7 +78,7 @@ impl<T: Real> Elimination<'_, T> {
 
     fn set(&mut self, row: usize, column: usize, value: T) {
         let (row, column) = if row < column { (column, row) } else { (row, column) };
-        super::set(self.a, column * self.n + row, value);
+        set(self.a, column * self.n + row, value);
     }
 
     /// The largest element of a column from some row on, without that of the diagonal.
@@ -142,7 +143,7 @@ impl<T: Real> Elimination<'_, T> {
     /// Eliminates one pivot, that of `row`.
     fn single(&mut self, k: usize, row: usize, vanished: bool) {
         self.exchange(k, row);
-        super::set(self.exchanged, k, T::from_whole(row + 1));
+        set(self.exchanged, k, T::from_whole(row + 1));
         if vanished {
             for i in k + 1..self.n {
                 self.set(i, k, T::ZERO);
@@ -170,8 +171,8 @@ impl<T: Real> Elimination<'_, T> {
     /// Eliminates two pivots, `k` and `row`.
     fn pair(&mut self, k: usize, row: usize) {
         self.exchange(k + 1, row);
-        super::set(self.exchanged, k, -T::from_whole(k + 1));
-        super::set(self.exchanged, k + 1, -T::from_whole(row + 1));
+        set(self.exchanged, k, -T::from_whole(k + 1));
+        set(self.exchanged, k + 1, -T::from_whole(row + 1));
         // Its determinant is negative: one eigenvalue of each sign.
         self.inertia.negative += 1;
         let n = self.n;
@@ -233,7 +234,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
                 let factor = x.get(j).copied().unwrap_or(T::ZERO);
                 for i in k + size..n {
                     let value = x.get(i).copied().unwrap_or(T::ZERO) - self.get(i, j) * factor;
-                    super::set(x, i, value);
+                    set(x, i, value);
                 }
             }
             k += size;
@@ -243,12 +244,12 @@ impl<'a, T: Real> Symmetric<'a, T> {
             let at = |i: usize| x.get(i).copied().unwrap_or(T::ZERO);
             if self.is_pair(k) {
                 let [first, second] = of_pair(self.a, n, k, [at(k), at(k + 1)]);
-                super::set(x, k, first);
-                super::set(x, k + 1, second);
+                set(x, k, first);
+                set(x, k + 1, second);
                 k += 2;
             } else {
                 let pivot = self.get(k, k);
-                super::set(x, k, if pivot == T::ZERO { T::ZERO } else { at(k) / pivot });
+                set(x, k, if pivot == T::ZERO { T::ZERO } else { at(k) / pivot });
                 k += 1;
             }
         }
@@ -261,7 +262,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
                 for i in end..n {
                     value = value - self.get(i, j) * x.get(i).copied().unwrap_or(T::ZERO);
                 }
-                super::set(x, j, value);
+                set(x, j, value);
             }
             end = begin;
         }
