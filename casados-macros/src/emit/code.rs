@@ -215,5 +215,10 @@ pub fn dimensions(variables: &Variables) -> [usize; 4] {
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let nw = nx + nu + np;
-    [nx + nz, 2 * nx + nz + nu + np + 1, nw, nw.next_multiple_of(PANEL)]
+    [nx + nz, 2 * nx + nz + nu + np + 1, nw, panel_columns(nw)]
+}
+
+/// `NC` for so many directions: whole panels.
+pub fn panel_columns(nw: usize) -> usize {
+    nw.next_multiple_of(PANEL)
 }

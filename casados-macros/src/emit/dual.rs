@@ -1,5 +1,6 @@
 //! Dual models: `Dae` by the arithmetic of dual numbers at run time.
 
+use super::code::panel_columns;
 use super::domain;
 use crate::language::dual::{Argument, Model};
 use crate::language::signature::Role;
@@ -56,7 +57,7 @@ impl Sizes {
     /// The type of the dimensions.
     fn shape(&self, krate: &syn::Path) -> TokenStream {
         let &Self { nx, nz, nu, np, nk, nv, nw, .. } = self;
-        let numbers = [nx, nz, nu, np, nk, nv, nw].map(Literal::usize_unsuffixed);
+        let numbers = [nx, nz, nu, np, nk, nv, nw, panel_columns(nw)].map(Literal::usize_unsuffixed);
         quote!(#krate::__private::Dims<#(#numbers),*>)
     }
 }
