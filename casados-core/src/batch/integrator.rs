@@ -3,11 +3,12 @@
 use super::answer::Answer;
 use super::error::BatchError;
 use super::intervals::{Inputs, Intervals};
+use super::share::{Share, Sink, Work, fill, width};
 use super::single::{Single, Standard};
 use super::statistics::BatchStatistics;
 #[cfg(feature = "parallel")]
 use super::work::parallel;
-use super::work::{Share, Work, Worker, fill, width};
+use super::work::{Worker, threads};
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
 use crate::integrator::Integrator as Alone;
@@ -22,6 +23,12 @@ use bytemuck::Zeroable;
 /// Start values `ẋ` and `z`.
 type Given<I> =
     (VectorX<<I as Alone>::Model, <I as Alone>::Number>, VectorZ<<I as Alone>::Model, <I as Alone>::Number>);
+
+/// Weights `λ` of the ends of intervals and `ν` of the algebraic states at their starts.
+pub(crate) type Weights<'a, I> = (
+    Option<&'a [VectorX<<I as Alone>::Model, <I as Alone>::Number>]>,
+    Option<&'a [VectorZ<<I as Alone>::Model, <I as Alone>::Number>]>,
+);
 
 /// Integrates many intervals of one model, as the integrator `I` does one; see
 /// [`Batch`](super::Batch).
@@ -56,7 +63,6 @@ pub struct Integrator<I: Single> {
     tableau: I::Tableau,
     /// One for each thread.
     workers: Vec<Worker<I>>,
-    #[cfg(feature = "parallel")]
     threads: usize,
     given: Option<Given<I>>,
     status: Vec<Result<(), Error>>,
@@ -105,7 +111,6 @@ impl<I: Single> Clone for Integrator<I> {
             options: self.options,
             tableau: self.tableau,
             workers: self.workers.iter().take(1).map(Worker::fresh).collect(),
-            #[cfg(feature = "parallel")]
             threads: self.threads,
             given: self.given,
             status: Vec::new(),
@@ -127,8 +132,7 @@ impl<I: Single> Integrator<I> {
             options,
             tableau,
             workers,
-            #[cfg(feature = "parallel")]
-            threads: rayon::current_num_threads(),
+            threads: threads(),
             given: None,
             status: Vec::new(),
             stages: Vec::new(),
@@ -204,7 +208,7 @@ impl<I: Single> Integrator<I> {
         intervals: &Intervals<'_, I::Model, I::Number>,
         results: &mut [Nominal<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, None, results.len())?, results)
+        self.run(&Inputs::new(intervals, None, None, results.len())?, results, None)
     }
 
     /// The solutions, and their derivatives with respect to `x₀`, `u` and `p`.
@@ -216,7 +220,7 @@ impl<I: Single> Integrator<I> {
         intervals: &Intervals<'_, I::Model, I::Number>,
         results: &mut [Forward<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, None, results.len())?, results)
+        self.run(&Inputs::new(intervals, None, None, results.len())?, results, None)
     }
 
     /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for
@@ -230,7 +234,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [Adjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients of `λᵀx₊`.
@@ -243,7 +247,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [ForwardAdjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
@@ -256,7 +260,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the
@@ -281,7 +285,7 @@ impl<I: Single> Integrator<I> {
         nu: &[VectorZ<I::Model, I::Number>],
         results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results, None)
     }
 
     /// An integrator of single intervals that solves the stages of this one, also of
@@ -308,39 +312,75 @@ impl<I: Single> Integrator<I> {
         single.start(stages.filter(|_| warm), false)
     }
 
+    /// The results of any call, with weights `λ` and `ν` if it has some, shown to `sink` in order,
+    /// up to the first interval that fails. One thread has no more memory than for one group, in
+    /// `room`: it stays in the caches.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub(crate) fn each<R: Answer<I::Model, I::Number> + Zeroable>(
+        &mut self,
+        intervals: &Intervals<'_, I::Model, I::Number>,
+        (lambda, nu): Weights<'_, I>,
+        room: &mut Vec<R>,
+        sink: Sink<'_, R>,
+    ) -> Result<(), BatchError> {
+        let inputs = &Inputs::new(intervals, lambda, nu, intervals.x0.len())?;
+        let places = if self.threads == 1 { self.widths::<R>()[0] } else { inputs.len() };
+        fill(room, places.min(inputs.len()), Zeroable::zeroed())?;
+        self.run(inputs, room, Some(sink))
+    }
+
+    /// How many intervals are computed together for such a result, and how many are simulated
+    /// together before each is differentiated alone: stages of models that are too large to be
+    /// differentiated side by side may still be found so.
+    fn widths<R: Answer<I::Model, I::Number>>(&self) -> [usize; 2] {
+        let missing = I::ITERATES && self.options.start == Start::Given && self.given.is_none();
+        match if missing { 1 } else { width::<I, R>(&self.options) } {
+            1 if I::ITERATES && !missing => [1, width::<I, Nominal<I::Model, I::Number>>(&self.options)],
+            lanes => [lanes, 1],
+        }
+    }
+
     fn run<R: Answer<I::Model, I::Number>>(
         &mut self,
         inputs: &Inputs<'_, I::Model, I::Number>,
         results: &mut [R],
+        sink: Option<Sink<'_, R>>,
     ) -> Result<(), BatchError> {
-        let (count, steps) = (results.len(), self.options.steps);
+        let (count, steps) = (inputs.len(), self.options.steps);
         self.status.clear();
         fill(&mut self.status, count, Ok(()))?;
         if I::ITERATES && (self.options.start == Start::Warm || self.keeps) {
             fill(&mut self.warm, count, false)?;
             fill(&mut self.stages, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
-        let missing = I::ITERATES && self.options.start == Start::Given && self.given.is_none();
-        let lanes = if missing { 1 } else { width::<I, R>(&self.options) };
-        // Stages of models that are too large to be differentiated side by side may still be found
-        // so.
-        let apart = I::ITERATES && !missing && lanes == 1;
-        let simulated = if apart { width::<I, Nominal<I::Model, I::Number>>(&self.options) } else { 1 };
+        let [lanes, simulated] = self.widths::<R>();
         let (options, tableau) = (&self.options, &self.tableau);
         let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
         let work = Work { inputs, options, tableau, given, lanes, simulated, solved: self.solved };
+        let threads = self.threads;
         let share = Share {
             first: 0,
-            results,
+            results: &mut *results,
             status: &mut self.status,
             stages: &mut self.stages,
             warm: &mut self.warm,
         };
-        #[cfg(feature = "parallel")]
-        parallel(&work, &mut self.workers, self.threads, share)?;
-        #[cfg(not(feature = "parallel"))]
-        if let Some(worker) = self.workers.first_mut() {
-            worker.run(&work, share);
+        match (sink, self.workers.first_mut()) {
+            (Some(sink), Some(worker)) if threads == 1 => worker.each(&work, share, sink),
+            (sink, _) => {
+                #[cfg(feature = "parallel")]
+                parallel(&work, &mut self.workers, threads, share)?;
+                #[cfg(not(feature = "parallel"))]
+                if let Some(worker) = self.workers.first_mut() {
+                    worker.run(&work, share);
+                }
+                let good = results.iter().zip(&self.status).take_while(|(_, status)| status.is_ok());
+                if let Some(sink) = sink {
+                    good.enumerate().for_each(|(interval, (result, _))| sink(interval, result));
+                }
+            }
         }
         self.statistics = BatchStatistics::default();
         for worker in &mut self.workers {

@@ -117,6 +117,11 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
         Ok(Self { intervals, lambda, nu })
     }
 
+    /// How many intervals there are.
+    pub fn len(&self) -> usize {
+        self.intervals.x0.len()
+    }
+
     /// One interval.
     ///
     /// # Errors

@@ -23,8 +23,10 @@ mod implicit;
 mod integrator;
 mod intervals;
 mod lanes;
+mod share;
 mod single;
 mod statistics;
+mod together;
 mod work;
 
 pub use error::{BatchError, Slice};

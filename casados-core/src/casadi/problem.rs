@@ -119,34 +119,30 @@ impl Problems {
 
     fn first(&self, worker: &mut Worker) -> Result<(), OcpError> {
         worker.follows = true;
-        if !worker.known.first {
-            // What an error interrupts is known no more.
-            let known = core::mem::take(&mut worker.known).value;
-            let Worker { program, v, ends, jacobian, .. } = worker;
-            self.begin(program.as_mut(), known);
-            let to = Derivatives {
-                clear: &|stage, matrix| self.layout.upper.clear_node(stage, matrix),
-                interval: &mut |stage, blocks| {
-                    self.layout.jacobian.write_interval(stage, blocks, 1.0, jacobian);
-                },
-            };
-            worker.objective = program.first(v, ends, to)?;
-            self.complete_first(worker);
-            (worker.known.value, worker.known.first) = (true, true);
+        if worker.known.first {
+            return Ok(());
         }
+        // What an error interrupts is known no more.
+        let known = core::mem::take(&mut worker.known);
+        self.begin(worker.program.as_mut(), known.value);
+        let Layout { jacobian: slopes, upper, .. } = &self.layout;
+        let Worker { program, x, v, ends, jacobian, gradient, .. } = worker;
+        let apart = Derivatives {
+            clear: &|stage, matrix| upper.clear_node(stage, matrix),
+            interval: &mut |stage, blocks| slopes.write_interval(stage, blocks, 1.0, jacobian),
+        };
+        worker.objective = program.first(v, ends, apart)?;
+        let qp = program.qp();
+        slopes.write_nodes(qp.stages().map(|stage| stage.arrays().matrix), 1.0, jacobian);
+        self.layout.gradient(&qp, x, gradient);
+        worker.known = Known { value: true, first: true, ..known };
         Ok(())
     }
 
-    /// What costs and constraints add to gradient and Jacobian.
-    fn complete_first(&self, Worker { program, x, gradient, jacobian, .. }: &mut Worker) {
-        let qp = program.qp();
-        self.layout.jacobian.write_nodes(qp.stages().map(|stage| stage.arrays().matrix), 1.0, jacobian);
-        self.layout.gradient(&qp, x, gradient);
-    }
-
     /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
-    fn second(&self, worker: &mut Worker) -> Result<(), OcpError> {
-        if worker.known.second {
+    /// It is kept unless it has a place of its own.
+    fn second(&self, worker: &mut Worker, to: Option<&mut [f64]>) -> Result<(), OcpError> {
+        if worker.known.second && to.is_none() {
             return Ok(());
         }
         let known = core::mem::take(&mut worker.known);
@@ -154,39 +150,49 @@ impl Problems {
         let factor = if sigma == 0.0 { 1.0 } else { sigma };
         worker.scaled.clear();
         worker.scaled.extend(mu.iter().take(self.layout.functions).map(|mu| mu / factor));
-        self.begin(worker.program.as_mut(), known.value);
-        self.curvature(worker, factor, !known.first)?;
-        if !known.first {
-            self.complete_first(worker);
-        }
-        if sigma == 0.0 {
-            let mut whole = core::mem::take(&mut worker.hessian);
-            worker.hessian.resize(whole.len(), 0.0);
+        let mut own = core::mem::take(&mut worker.hessian);
+        let (is_kept, to) = (to.is_none(), to.unwrap_or(&mut own));
+        let mut outcome = self.curvature(worker, known, factor, to);
+        if sigma == 0.0 && outcome.is_ok() {
+            let mut objective = vec![0.0; to.len()];
             worker.scaled.fill(0.0);
-            self.begin(worker.program.as_mut(), true);
-            self.curvature(worker, 1.0, false)?;
-            whole.iter_mut().zip(&worker.hessian).for_each(|(whole, objective)| *whole -= objective);
-            worker.hessian = whole;
+            let known = Known { value: true, first: true, second: false };
+            outcome = self.curvature(worker, known, 1.0, &mut objective);
+            to.iter_mut().zip(&objective).for_each(|(to, objective)| *to -= objective);
         }
-        worker.known = Known { value: true, first: true, second: true };
+        worker.hessian = own;
+        outcome?;
+        worker.known = Known { value: true, first: true, second: is_kept };
         Ok(())
     }
 
-    /// The Hessian times `factor`; and the Jacobian of intervals, if it is asked for.
-    fn curvature(&self, worker: &mut Worker, factor: f64, first: bool) -> Result<(), OcpError> {
+    /// The Hessian times `factor`; and gradient and Jacobian, if they are not `known`.
+    fn curvature(
+        &self,
+        worker: &mut Worker,
+        known: Known,
+        factor: f64,
+        to: &mut [f64],
+    ) -> Result<(), OcpError> {
         let Layout { jacobian: slopes, upper, .. } = &self.layout;
-        let Worker { program, v, scaled, ends, jacobian, hessian, .. } = worker;
-        let to = Derivatives {
+        let Worker { program, x, v, scaled, ends, gradient, jacobian, .. } = worker;
+        self.begin(program.as_mut(), known.value);
+        let apart = Derivatives {
             clear: &|stage, matrix| upper.clear_node(stage, matrix),
             interval: &mut |stage, blocks| {
-                if first {
+                if !known.first {
                     slopes.write_interval(stage, blocks, 1.0, jacobian);
                 }
-                upper.write_interval(stage, blocks, factor, hessian);
+                upper.write_interval(stage, blocks, factor, to);
             },
         };
-        worker.objective = program.second(v, scaled, ends, to)?;
-        upper.write_nodes(program.qp().stages().map(|stage| stage.arrays().hessian), factor, hessian);
+        worker.objective = program.second(v, scaled, ends, apart)?;
+        let qp = program.qp();
+        upper.write_nodes(qp.stages().map(|stage| stage.arrays().hessian), factor, to);
+        if !known.first {
+            slopes.write_nodes(qp.stages().map(|stage| stage.arrays().matrix), 1.0, jacobian);
+            self.layout.gradient(&qp, x, gradient);
+        }
         Ok(())
     }
 }
@@ -253,14 +259,11 @@ impl Client for Problems {
         let is_value = |port: &Port| [c"f", c"g"].contains(&port.name.as_ref());
         for values in [false, true] {
             for (output, port) in signature.outputs.iter().enumerate() {
-                if is_value(port) == values && call.wants(output) {
-                    self.compute(worker, port).map_err(|error| Failure(error.to_string()))?;
+                if is_value(port) == values
+                    && let Some(to) = call.output(output)
+                {
+                    self.answer(worker, port, to).map_err(|error| Failure(error.to_string()))?;
                 }
-            }
-        }
-        for (output, port) in signature.outputs.iter().enumerate() {
-            if let Some(to) = call.output(output) {
-                self.write(worker, port, to);
             }
         }
         Ok(())
@@ -272,16 +275,20 @@ impl Client for Problems {
 }
 
 impl Problems {
-    fn compute(&self, worker: &mut Worker, port: &Port) -> Result<(), OcpError> {
+    /// Computes and writes an output; the Hessian that IPOPT asks for to where it belongs.
+    fn answer(&self, worker: &mut Worker, port: &Port, to: &mut [f64]) -> Result<(), OcpError> {
         match port.name.to_bytes() {
-            b"f" | b"g" => self.value(worker),
+            b"f" | b"g" => self.value(worker)?,
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" | b"jac_g_x" | b"jac_adj_x_adj_g" => {
-                self.first(worker)
+                self.first(worker)?;
             }
-            b"grad_gamma_x" | b"adj_x" => self.first(worker),
-            b"triu_hess_gamma_x_x" | b"jac_adj_x_x" => self.second(worker),
-            _ => Ok(()),
+            b"grad_gamma_x" | b"adj_x" => self.first(worker)?,
+            b"triu_hess_gamma_x_x" if !worker.known.second => return self.second(worker, Some(to)),
+            b"jac_adj_x_x" => self.second(worker, None)?,
+            _ => {}
         }
+        self.write(worker, port, to);
+        Ok(())
     }
 
     /// An output; those of other names have no entries.

@@ -7,12 +7,12 @@ use super::convexify::convexify;
 use super::cost::{At, Cost};
 use super::curvature::Curvature;
 use super::data::{Node, inputs, split};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, Sink, Step, add_stages, larger};
+use super::dynamics::{Dynamics, Nodes, Sink, Step, add_stages, larger};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
-use super::point::{Terms, add_blocks, read};
+use super::point::{Terms, read};
 use super::problem::{Formulation, Problem};
-use super::transfer::Transfer;
+use super::transfer::{Left, dot};
 use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -25,102 +25,86 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
-        self.linearise_watched(curvature, false, &mut |_, _| {})
+        self.linearise_watched(curvature, &mut |_, _| {})
     }
 
-    /// [`Ocp::linearise`], and shows every interval to `watch`. With `apart` derivatives of
-    /// intervals are shown alone: the QP, whose Hessians and gradients were zero, has those of
-    /// costs and constraints, with `∇f` itself as the gradient.
-    pub(crate) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
+    /// [`Ocp::linearise`], and shows every interval to `watch`.
+    pub(super) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        apart: bool,
         watch: Sink<'_, T>,
     ) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        let mut left = Left { plain: !C::EXACT, adding: false };
+        let sums = self.linearise_intervals(curvature, &mut |k, step, stage, at| {
+            left.transfer::<P, C, T>(step, stage, at);
+            watch(k, step);
+        })?;
+        let costs = self.linearise_functions::<C>(left.plain, &|k, hessian, gradient| {
+            if !(left.adding && k < intervals) {
+                hessian.fill(T::ZERO);
+                gradient.fill(T::ZERO);
+            }
+        })?;
+        self.complete_gradients(curvature, left.plain);
+        self.add_arrival(false);
+        self.keep_sums(sums, costs);
+        Ok(())
+    }
+
+    /// Dynamics and integral costs, all intervals in one call: each goes `to` its stage, with its
+    /// start and its multipliers. The sums of their costs, and of what lifted stages have left.
+    pub(super) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        to: ToStage<'_, T>,
+    ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
-        let intervals = self.linearise_intervals(curvature, apart, watch)?;
-        let costs = self.linearise_functions::<C>(&intervals)?;
-        if !apart {
-            self.complete_gradients(curvature, &intervals);
-        }
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        let x0 = self.iterate.stages().next().map_or(&[][..], |first| first.x);
-        arrival::add(data.arrival, if apart { x0 } else { &[] }, &mut self.qp);
-        self.objective = intervals.objective + costs + arrival::cost(data.arrival, &self.iterate);
-        self.stages = intervals.stages;
-        Ok(())
-    }
-
-    /// Dynamics and integral costs, all intervals in one call.
-    fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
-        &mut self,
-        curvature: C,
-        apart: bool,
-        watch: Sink<'_, T>,
-    ) -> Result<Intervals<T>, OcpError> {
-        let intervals = self.intervals();
-        let (nx, n) = (P::Shape::NX, inputs::<P::Shape>());
+        let (intervals, nx, ld) = (self.intervals(), P::Shape::NX, ld_of::<P::Shape, T>());
         let Self { problem, qp, iterate, data, along, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
         let (v, multipliers) = iterate.vectors();
-        let (objective, plain, left) = (T::ZERO, !C::EXACT && !apart, [T::ZERO; 2]);
-        let mut result = Intervals { objective, plain, adding: apart, apart, stages: left };
-        let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
         let nodes = Nodes { along: *along, ..nodes };
+        let mut stages = qp.stages_mut();
+        let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
         let Problem { dynamics, .. } = problem.parts();
         curvature.run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
-            let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
-            let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
-            let keeps = C::KEEPS && step.dx.is_empty();
-            if apart {
-                // They are not wanted here.
-            } else if keeps {
-                shift_kept(matrix, ld, offset, step.x, part(point, 0, n));
-            } else {
-                Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
-            }
-            watch(k, step);
+            objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
-                result.stages = add_stages(result.stages, step.stages);
+                left = add_stages(left, step.stages);
             }
-            let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
-            result.objective = result.objective + value;
-            let mut terms = Terms { gradient, hessian, ld };
-            let slopes = x.iter().chain(u).enumerate();
-            if apart {
-                // The Hessian of what is integrated along is in that of the interval.
-                slopes.for_each(|(i, &slope)| terms.slope(i, slope));
-                return;
-            }
-            result.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
-            if result.plain && x.is_empty() && u.is_empty() {
-                return;
-            }
-            result.adding = true;
-            terms.hessian.fill(T::ZERO);
-            terms.gradient.fill(T::ZERO);
-            slopes.for_each(|(i, &slope)| terms.slope(i, slope));
-            add_blocks(&mut terms, nx, blocks);
-            add_blocks(&mut terms, nx, step.hessian);
-            if keeps {
-                let of_interval = part(multipliers, k * pad::<T>(nx), nx);
-                correct_kept(terms.gradient, matrix, ld, of_interval);
-            }
+            to(k, step, stage.arrays(), [part(v, k * ld, ld), part(multipliers, k * pad::<T>(nx), nx)]);
         })?;
-        Ok(result)
+        Ok((objective, left))
     }
 
-    /// Costs and constraints at nodes, stage by stage; the costs.
-    fn linearise_functions<C: Curvature<P::Dynamics, T>>(
+    /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
+    pub(super) fn add_arrival(&mut self, at_iterate: bool) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let x0 = self.iterate.stages().next().filter(|_| at_iterate).map_or(&[][..], |first| first.x);
+        arrival::add(data.arrival, x0, &mut self.qp);
+    }
+
+    /// The objective at the iterate, of intervals and `costs` at nodes.
+    pub(super) fn keep_sums(&mut self, (objective, stages): Sums<T>, costs: T) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        self.objective = objective + costs + arrival::cost(data.arrival, &self.iterate);
+        self.stages = stages;
+    }
+
+    /// Costs and constraints at nodes, stage by stage, added to Hessians and gradients with which
+    /// each `begin`s; the costs. Where stages have nothing else, they are `plain`.
+    pub(super) fn linearise_functions<C: Curvature<P::Dynamics, T>>(
         &mut self,
-        of: &Intervals<T>,
+        plain: bool,
+        begin: Begin<'_, T>,
     ) -> Result<T, OcpError> {
         let intervals = self.intervals();
         let Self { problem, qp, iterate, data, .. } = self;
@@ -131,17 +115,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            if !(of.apart || of.adding && k < intervals) {
-                hessian.fill(T::ZERO);
-                gradient.fill(T::ZERO);
-            }
+            begin(k, hessian, gradient);
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
             read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
             let mut direct = Terms { gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
             let here = part(v, k * ld_of::<P::Shape, T>(), n);
-            let from = if of.is_direct::<P>(k == intervals, z) { here } else { &[] };
+            let from = if plain && is_direct::<P, T>(k == intervals, z) { here } else { &[] };
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
             let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
@@ -186,7 +167,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
     /// complete.
-    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, of: &Intervals<T>) {
+    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, plain: bool) {
         let intervals = self.intervals();
         let Self { qp, iterate, data, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
@@ -194,7 +175,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let ld = ld_of::<P::Shape, T>();
         for (k, mut stage) in qp.stages_mut().enumerate() {
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            if of.is_direct::<P>(k == intervals, z) {
+            if plain && is_direct::<P, T>(k == intervals, z) {
                 continue;
             }
             let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
@@ -318,27 +299,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// What intervals have left.
-struct Intervals<T> {
-    /// Their costs.
-    objective: T,
-    /// Whether Hessians are those of costs at nodes alone.
-    plain: bool,
-    /// Whether they add to costs: all of them do, or none. Then these are cleared where those at
-    /// nodes are added.
-    adding: bool,
-    /// Whether the QP has no derivatives of intervals, and was cleared before.
-    apart: bool,
-    /// What is left of the equations of lifted stages.
-    stages: [T; 2],
-}
+/// Takes an interval to the arrays of its stage, with its start and its multipliers.
+type ToStage<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>, Arrays<'_, T>, [&[T]; 2]);
 
-impl<T: Real> Intervals<T> {
-    /// Whether costs at a node write the gradient of the QP themselves.
-    fn is_direct<P: Formulation<T>>(&self, is_last: bool, z: &[T]) -> bool {
-        let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
-        self.plain && convex && z.is_empty()
-    }
+/// What Hessian and gradient of a stage begin with.
+type Begin<'a, T> = &'a dyn Fn(usize, &mut [T], &mut [T]);
+
+/// The costs of all intervals, and what is left of the equations of lifted stages.
+type Sums<T> = (T, [T; 2]);
+
+/// Whether costs at a node write the gradient of the QP themselves, where nothing else is there.
+fn is_direct<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
+    let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
+    convex && z.is_empty()
 }
 
 /// Bounds of what is linear, `lg − g + [C D] v`, where the values `g` are.
@@ -356,21 +329,6 @@ fn shift_limits<T: Real>(
     }
 }
 
-/// The offset of dynamics that end at `next`, with the columns that there are.
-fn shift_kept<T: Real>(matrix: &[T], ld: usize, offset: &mut [T], next: &[T], point: &[T]) {
-    let columns = matrix.chunks_exact(ld.max(1));
-    for ((offset, &x), column) in offset.iter_mut().zip(next).zip(columns) {
-        *offset = x - dot(column, point);
-    }
-}
-
-/// Takes the products of kept columns with multipliers from a gradient.
-fn correct_kept<T: Real>(gradient: &mut [T], matrix: &[T], ld: usize, multipliers: &[T]) {
-    for (column, &pi) in matrix.chunks_exact(ld.max(1)).zip(multipliers) {
-        gradient.iter_mut().zip(column).for_each(|(g, &a)| *g = *g - a * pi);
-    }
-}
-
 /// How many numbers `φ` of every interval and `g` of every stage are.
 pub(super) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
     dims.len().saturating_sub(1) * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
@@ -379,21 +337,4 @@ pub(super) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usiz
 /// The distance of stages in vectors `v`.
 const fn ld_of<S: Shape, T>() -> usize {
     pad::<T>(inputs::<S>())
-}
-
-#[inline(always)]
-pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    // Four sums, which the compiler may compute side by side.
-    let mut sums = [T::ZERO; 4];
-    let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
-    let (chunks, rest) = a.as_chunks::<4>();
-    let (others, more) = b.as_chunks::<4>();
-    for (a, b) in chunks.iter().zip(others) {
-        for ((sum, &a), &b) in sums.iter_mut().zip(a).zip(b) {
-            *sum = *sum + a * b;
-        }
-    }
-    let [a0, a1, a2, a3] = sums;
-    let sum = (a0 + a1) + (a2 + a3);
-    rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
 }

@@ -10,6 +10,8 @@ use super::data::{Node, split};
 use super::dynamics::Sink;
 use super::error::OcpError;
 use super::instance::Ocp;
+#[cfg(feature = "casadi")]
+use super::point::Terms;
 use super::point::read;
 use super::problem::{Formulation, Problem};
 #[cfg(feature = "casadi")]
@@ -37,7 +39,18 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             clear(k, hessian);
             gradient.fill(T::ZERO);
         }
-        self.linearise_watched(curvature, true, watch)
+        let sums =
+            self.linearise_intervals(curvature, &mut |k, step, Arrays { ld, hessian, gradient, .. }, _| {
+                watch(k, step);
+                // The Hessian of what is integrated along is in that of the interval.
+                let (mut terms, slopes) =
+                    (Terms { gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
+                slopes.enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
+            })?;
+        let costs = self.linearise_functions::<C>(false, &|_, _, _| {})?;
+        self.add_arrival(true);
+        self.keep_sums(sums, costs);
+        Ok(())
     }
 
     /// Where algebraic states are those of the iterate: `g` of every stage in `values`, and after

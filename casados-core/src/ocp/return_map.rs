@@ -3,9 +3,9 @@
 use super::cost::Show;
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step};
 use super::error::OcpError;
-use super::linearise::dot;
 use super::names::Names;
 use super::point::{finite_outputs, read};
+use super::transfer::dot;
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::qp::element::set;
 use crate::scalar::Real;

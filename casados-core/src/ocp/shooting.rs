@@ -44,6 +44,7 @@ pub struct Shooting<I: Single> {
     t: Vec<I::Number>,
     lambda: Vec<VectorX<I::Model, I::Number>>,
     nu: Vec<VectorZ<I::Model, I::Number>>,
+    /// Results of a few intervals at a time.
     nominal: Vec<Nominal<I::Model, I::Number>>,
     forward: Vec<Forward<I::Model, I::Number>>,
     hessian: Vec<Hessian<I::Model, I::Number>>,
@@ -150,15 +151,6 @@ fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })
 }
 
-/// Places for so many results.
-fn places<V: Default + Clone>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
-    if list.len() != length {
-        reserve(list, length)?;
-        list.resize_with(length, V::default);
-    }
-    Ok(())
-}
-
 fn failed(error: BatchError) -> OcpError {
     match error {
         BatchError::Intervals { first, error, .. } => OcpError::Integration { interval: first, error },
@@ -184,14 +176,11 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, false)?;
-        places(&mut self.nominal, nodes.len())?;
         let Self { batch, x, u, p, h, t, nominal, .. } = self;
-        batch.solve(&Intervals { x0: x, u, p, h, t0: t }, nominal).map_err(failed)?;
+        let intervals = Intervals { x0: x, u, p, h, t0: t };
+        let outcome = batch.each(&intervals, (None, None), nominal, &mut |k, result| sink(k, &result.into()));
+        outcome.map_err(failed)?;
         self.solved = true;
-        let nominal = &self.nominal;
-        for (k, result) in nominal.iter().enumerate() {
-            sink(k, &result.into());
-        }
         Ok(())
     }
 
@@ -209,14 +198,11 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, false)?;
-        places(&mut self.forward, nodes.len())?;
         let Self { batch, x, u, p, h, t, forward, .. } = self;
-        batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
+        let intervals = Intervals { x0: x, u, p, h, t0: t };
+        let outcome = batch.each(&intervals, (None, None), forward, &mut |k, result| sink(k, &result.into()));
+        outcome.map_err(failed)?;
         self.solved = true;
-        let forward = &self.forward;
-        for (k, result) in forward.iter().enumerate() {
-            sink(k, &result.into());
-        }
         Ok(())
     }
 }
@@ -224,15 +210,14 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
 impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
     fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, true)?;
-        places(&mut self.adjoint, nodes.len())?;
         let Self { batch, x, u, p, h, t, lambda, adjoint, .. } = self;
-        batch.adjoint(&Intervals { x0: x, u, p, h, t0: t }, lambda, adjoint).map_err(failed)?;
-        self.solved = true;
-        let adjoint = &self.adjoint;
-        for (k, result) in adjoint.iter().enumerate() {
+        let intervals = Intervals { x0: x, u, p, h, t0: t };
+        let outcome = batch.each(&intervals, (Some(lambda), None), adjoint, &mut |k, result| {
             let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
             sink(k, &step(result.x.as_slice(), gradients));
-        }
+        });
+        outcome.map_err(failed)?;
+        self.solved = true;
         Ok(())
     }
 }
@@ -240,19 +225,12 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
 impl<I: Single<Number = T> + Inside<T>, T: Real> SecondOrder<T> for Shooting<I> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, true)?;
-        places(&mut self.hessian, nodes.len())?;
         let Self { batch, x, u, p, h, t, lambda, nu, hessian, .. } = self;
+        let weights = (Some(&lambda[..]), Some(&nu[..]).filter(|nu| !nu.is_empty()));
         let intervals = Intervals { x0: x, u, p, h, t0: t };
-        let outcome = match nu.is_empty() {
-            true => batch.hessian(&intervals, lambda, hessian),
-            false => batch.hessian_with_z0(&intervals, lambda, nu, hessian),
-        };
+        let outcome = batch.each(&intervals, weights, hessian, &mut |k, result| sink(k, &result.into()));
         outcome.map_err(failed)?;
         self.solved = true;
-        let hessian = &self.hessian;
-        for (k, result) in hessian.iter().enumerate() {
-            sink(k, &result.into());
-        }
         Ok(())
     }
 }

@@ -1,7 +1,13 @@
 //! The linearised dynamics of an interval, in the layout of the QP.
 
-use crate::qp::{part, part_mut, splat};
+use super::curvature::Curvature;
+use super::data::inputs;
+use super::dynamics::{IntegralTerms, Step};
+use super::point::{Terms, add_blocks};
+use super::problem::Formulation;
+use crate::qp::{Arrays, part, part_mut, splat};
 use crate::scalar::{Packed, Real, Registers, compiled};
+use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// More lanes than any register has.
@@ -92,6 +98,80 @@ impl<T: Real> Registers<T> for Transfer<'_, T> {
             }
         }
     }
+}
+
+/// What intervals have left in the QP.
+pub(super) struct Left {
+    /// Whether Hessians are those of costs at nodes alone.
+    pub plain: bool,
+    /// Whether they add to costs: all of them do, or none. Then these are cleared where those at
+    /// nodes are added.
+    pub adding: bool,
+}
+
+impl Left {
+    /// Writes an interval to its stage.
+    pub fn transfer<P: Formulation<T>, C: Curvature<P::Dynamics, T>, T: Real>(
+        &mut self,
+        step: &Step<'_, T>,
+        Arrays { ld, matrix, hessian, gradient, offset, .. }: Arrays<'_, T>,
+        [point, multipliers]: [&[T]; 2],
+    ) {
+        let (nx, n) = (P::Shape::NX, inputs::<P::Shape>());
+        let keeps = C::KEEPS && step.dx.is_empty();
+        if keeps {
+            shift_kept(matrix, ld, offset, step.x, part(point, 0, n));
+        } else {
+            Transfer { columns: [step.dx, step.du], next: step.x, point, matrix, ld, offset }.run();
+        }
+        let IntegralTerms { x, u, hessian: blocks, .. } = step.cost;
+        self.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
+        if self.plain && x.is_empty() && u.is_empty() {
+            return;
+        }
+        self.adding = true;
+        let mut terms = Terms { gradient, hessian, ld };
+        terms.hessian.fill(T::ZERO);
+        terms.gradient.fill(T::ZERO);
+        x.iter().chain(u).enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
+        add_blocks(&mut terms, nx, blocks);
+        add_blocks(&mut terms, nx, step.hessian);
+        if keeps {
+            correct_kept(terms.gradient, matrix, ld, multipliers);
+        }
+    }
+}
+
+/// The offset of dynamics that end at `next`, with the columns that there are.
+fn shift_kept<T: Real>(matrix: &[T], ld: usize, offset: &mut [T], next: &[T], point: &[T]) {
+    let columns = matrix.chunks_exact(ld.max(1));
+    for ((offset, &x), column) in offset.iter_mut().zip(next).zip(columns) {
+        *offset = x - dot(column, point);
+    }
+}
+
+/// Takes the products of kept columns with multipliers from a gradient.
+fn correct_kept<T: Real>(gradient: &mut [T], matrix: &[T], ld: usize, multipliers: &[T]) {
+    for (column, &pi) in matrix.chunks_exact(ld.max(1)).zip(multipliers) {
+        gradient.iter_mut().zip(column).for_each(|(g, &a)| *g = *g - a * pi);
+    }
+}
+
+#[inline(always)]
+pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    // Four sums, which the compiler may compute side by side.
+    let mut sums = [T::ZERO; 4];
+    let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
+    let (chunks, rest) = a.as_chunks::<4>();
+    let (others, more) = b.as_chunks::<4>();
+    for (a, b) in chunks.iter().zip(others) {
+        for ((sum, &a), &b) in sums.iter_mut().zip(a).zip(b) {
+            *sum = *sum + a * b;
+        }
+    }
+    let [a0, a1, a2, a3] = sums;
+    let sum = (a0 + a1) + (a2 + a3);
+    rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::factors::SolutionFactors;
 use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
-use crate::ocp::linearise::dot;
+use crate::ocp::transfer::dot;
 use crate::qp::element::{add, get, set};
 use crate::qp::{Solution, StageDims, assign, part, part_mut};
 use crate::scalar::Real;

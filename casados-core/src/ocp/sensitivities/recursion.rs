@@ -5,7 +5,7 @@ use super::column::solve;
 use super::factors::SolutionFactors;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
-use crate::ocp::linearise::dot;
+use crate::ocp::transfer::dot;
 use crate::qp::element::{add, get, set};
 use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut};
 use crate::scalar::Real;

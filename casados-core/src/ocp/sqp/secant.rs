@@ -25,8 +25,8 @@ use crate::ocp::curvature::{Curvature, Secant, Update};
 use crate::ocp::data::split;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::dot;
 use crate::ocp::problem::Formulation;
+use crate::ocp::transfer::dot;
 use crate::qp::{Arrays, QpField, StageDims, Store, add_symmetric, assign, pad, part, part_mut, take_mut};
 use crate::scalar::Real;
 
