@@ -21,20 +21,6 @@ pub type ArrayK<M, T> = <<M as Dae>::Shape as Shape>::ArrayK<T>;
 pub type ArrayV<M, T> = <<M as Dae>::Shape as Shape>::ArrayV<T>;
 /// `[T; NW]` of a model: one element per direction `(x₀, u, p)`.
 pub type ArrayW<M, T> = <<M as Dae>::Shape as Shape>::ArrayW<T>;
-/// `[T; NC]` of a model: one element per column of panels of directions.
-#[cfg(any(
-    target_arch = "x86_64",
-    all(target_arch = "aarch64", target_feature = "neon"),
-    all(target_arch = "wasm32", target_feature = "simd128")
-))]
-pub type ArrayC<M, T> = <<M as Dae>::Shape as Shape>::ArrayC<T>;
-/// `[T; NW]` of a model: without registers panels have no other columns than directions.
-#[cfg(not(any(
-    target_arch = "x86_64",
-    all(target_arch = "aarch64", target_feature = "neon"),
-    all(target_arch = "wasm32", target_feature = "simd128")
-)))]
-pub type ArrayC<M, T> = ArrayW<M, T>;
 /// `SVector<T, NX>` of a model.
 ///
 /// ```

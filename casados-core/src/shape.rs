@@ -3,6 +3,10 @@
 //! Stable Rust has no `[T; M::NX]` in generic code. So the dimensions of a model are a type,
 //! [`Dims`], and [`Shape`] maps an element type to the arrays and matrices of these dimensions.
 
+mod outputs;
+
+pub use outputs::{Count, Outputs};
+
 use bytemuck::Zeroable;
 use core::fmt::Debug;
 use core::ops::{Deref, DerefMut, Index, IndexMut};
@@ -367,40 +371,4 @@ impl<
     type MatrixCZ<T: Plain, const C: usize> = SMatrix<T, C, NZ>;
     type MatrixCU<T: Plain, const C: usize> = SMatrix<T, C, NU>;
     type MatrixCP<T: Plain, const C: usize> = SMatrix<T, C, NP>;
-}
-
-/// The number of outputs of a function, and the arrays and matrices it gives beside the dimensions
-/// of a model.
-pub trait Outputs: 'static {
-    /// How many.
-    const NY: usize;
-    /// `[T; NY]`
-    type ArrayY<T: Plain>: Array<T>;
-    /// `SVector<T, NY>`
-    type VectorY<T: Plain>: Matrix<T>;
-    /// `SMatrix<T, NY, NY>`
-    type MatrixYY<T: Plain>: Matrix<T>;
-    /// `SMatrix<T, NY, NX>`
-    type MatrixYX<D: Shape, T: Plain>: Matrix<T>;
-    /// `SMatrix<T, NY, NZ>`
-    type MatrixYZ<D: Shape, T: Plain>: Matrix<T>;
-    /// `SMatrix<T, NY, NU>`
-    type MatrixYU<D: Shape, T: Plain>: Matrix<T>;
-    /// `SMatrix<T, NY, NP>`
-    type MatrixYP<D: Shape, T: Plain>: Matrix<T>;
-}
-
-/// `NY` outputs.
-#[derive(Clone, Copy, Debug)]
-pub struct Count<const NY: usize>;
-
-impl<const NY: usize> Outputs for Count<NY> {
-    const NY: usize = NY;
-    type ArrayY<T: Plain> = [T; NY];
-    type VectorY<T: Plain> = SVector<T, NY>;
-    type MatrixYY<T: Plain> = SMatrix<T, NY, NY>;
-    type MatrixYX<D: Shape, T: Plain> = D::MatrixCX<T, NY>;
-    type MatrixYZ<D: Shape, T: Plain> = D::MatrixCZ<T, NY>;
-    type MatrixYU<D: Shape, T: Plain> = D::MatrixCU<T, NY>;
-    type MatrixYP<D: Shape, T: Plain> = D::MatrixCP<T, NY>;
 }

@@ -24,6 +24,7 @@ mod curvature;
 mod degenerate;
 mod errors;
 mod estimation;
+mod failing_intervals;
 mod guesses;
 mod infeasible;
 mod ipm;

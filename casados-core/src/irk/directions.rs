@@ -44,6 +44,14 @@ const fn padded<E>(directions: usize, most: usize) -> usize {
     if REGISTERS && columns <= most { columns } else { directions }
 }
 
+/// A number for each column of panels of all directions: there is memory for whole panels where
+/// machines may have registers of several numbers.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32"))]
+pub type ArrayC<M, T> = <<M as Dae>::Shape as Shape>::ArrayC<T>;
+/// A number for each direction.
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")))]
+pub type ArrayC<M, T> = crate::model::ArrayW<M, T>;
+
 /// How many columns panels of all directions have together.
 pub(super) const fn all_columns<M: Dae, E>() -> usize {
     padded::<E>(M::STRUCTURE.directions.len(), M::Shape::NC)

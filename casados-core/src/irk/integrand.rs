@@ -8,6 +8,7 @@
 //! ```
 
 use super::adjoint::Backward;
+use super::directions::ArrayC;
 use super::driver::Parts;
 use super::forward::sweep::Sweep;
 use super::integrator::Integrator;
@@ -16,7 +17,7 @@ use crate::error::{Error, Place};
 use crate::integrator::With;
 use crate::irk::coefficients::Coefficients;
 use crate::memory::{Fallback, Memory, WithHessian};
-use crate::model::{ArrayC, Dae, VectorU, VectorX, VectorZ};
+use crate::model::{Dae, VectorU, VectorX, VectorZ};
 use crate::quadrature::Integrand;
 use crate::result::Hessian;
 use crate::scalar::Real;

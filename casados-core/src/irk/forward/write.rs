@@ -3,9 +3,9 @@
 use super::output::{Columns, Target};
 use super::sweep::Sweep;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{Directions, Identity, all_columns, panel, panels};
+use crate::irk::directions::{ArrayC, Directions, Identity, all_columns, panel, panels};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::model::{ArrayC, ArrayW, Dae};
+use crate::model::{ArrayW, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 use core::marker::PhantomData;

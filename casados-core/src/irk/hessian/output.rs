@@ -2,9 +2,9 @@
 //! have any influence, to the matrices of results: those over one part of `w = (x₀, u, p)` have
 //! both triangles, those over two parts lie whole in the one that was found.
 
-use crate::irk::directions::{Identity, before};
+use crate::irk::directions::{ArrayC, Identity, before};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::model::{ArrayC, ArrayW, Dae};
+use crate::model::{ArrayW, Dae};
 use crate::result::Hessian;
 use crate::scalar::Lanes;
 use crate::shape::{Matrix, Plain, Shape};
