@@ -36,11 +36,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let mut left = Left { plain: !C::EXACT, adding: false };
-        let sums = self.linearise_intervals(curvature, &mut |k, step, stage, at| {
+        let sums = self.linearise_intervals(curvature, |k, step, stage, at| {
             left.transfer::<P, C, T>(step, stage, at);
             watch(k, step);
         })?;
-        let costs = self.linearise_functions::<C>(left.plain, &|k, hessian, gradient| {
+        let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
             if !(left.adding && k < intervals) {
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
@@ -57,7 +57,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        to: ToStage<'_, T>,
+        mut to: impl FnMut(usize, &Step<'_, T>, Arrays<'_, T>, [&[T]; 2]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
@@ -104,7 +104,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn linearise_functions<C: Curvature<P::Dynamics, T>>(
         &mut self,
         plain: bool,
-        begin: Begin<'_, T>,
+        begin: impl Fn(usize, &mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
         let intervals = self.intervals();
         let Self { problem, qp, iterate, data, .. } = self;
@@ -298,12 +298,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 }
-
-/// Takes an interval to the arrays of its stage, with its start and its multipliers.
-type ToStage<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>, Arrays<'_, T>, [&[T]; 2]);
-
-/// What Hessian and gradient of a stage begin with.
-type Begin<'a, T> = &'a dyn Fn(usize, &mut [T], &mut [T]);
 
 /// The costs of all intervals, and what is left of the equations of lifted stages.
 type Sums<T> = (T, [T; 2]);

@@ -40,14 +40,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             gradient.fill(T::ZERO);
         }
         let sums =
-            self.linearise_intervals(curvature, &mut |k, step, Arrays { ld, hessian, gradient, .. }, _| {
+            self.linearise_intervals(curvature, |k, step, Arrays { ld, hessian, gradient, .. }, _| {
                 watch(k, step);
                 // The Hessian of what is integrated along is in that of the interval.
                 let (mut terms, slopes) =
                     (Terms { gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
                 slopes.enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
             })?;
-        let costs = self.linearise_functions::<C>(false, &|_, _, _| {})?;
+        let costs = self.linearise_functions::<C>(false, |_, _, _| {})?;
         self.add_arrival(true);
         self.keep_sums(sums, costs);
         Ok(())
