@@ -10,32 +10,27 @@
 mod estimate;
 mod points;
 mod roughness;
+mod scheme;
 
 use super::control::LENIENT;
 use super::defect_filter::DefectFilter;
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
-use super::stages::{
-    Convergence, FAST, Failure, FilteredDefect, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start,
-};
+use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
-use crate::tableau::{Method, Tableau};
+use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
-
-/// Increments that shrink no more are rounding errors, if they are this small beside what is
-/// tolerated: of a state near zero that follows from large ones by an equation, they may be above
-/// the tolerance of the iteration.
-const NOISE: f64 = 0.01;
+use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
 const UNDOUBTED: f64 = 0.25;
@@ -61,67 +56,31 @@ struct Memory<M: Dae, T: Plain, const S: usize, const G: usize> {
     factors: EigenFactors<M, T>,
 }
 
-/// A step of the collocation method `B` with `S` stages in `G` groups.
-pub struct Collocation<M: Dae, B, T: Real, const S: usize, const G: usize> {
-    tableau: Tableau<S>,
-    /// Columns of `A`, and of `−h A` of this step.
-    a: [Groups<T, G>; S],
-    minus_ha: [Groups<T, G>; S],
-    c: Groups<T, G>,
-    /// Columns of the basis, one for each part.
-    right: [Groups<T, G>; PARTS],
-    /// Lagrange polynomials at the start of the step.
-    lagrange: [T; S],
-    /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
-    factors: [f64; S],
-    basis: Eigenbasis<T, S, PARTS>,
-    defect_filter: DefectFilter,
+/// A step of a collocation method with `S` stages in `G` groups.
+pub struct Collocation<M: Dae, T: Real, const S: usize, const G: usize> {
+    scheme: Scheme<T, S, G>,
     memory: Box<Memory<M, T, S, G>>,
-    method: PhantomData<fn() -> B>,
 }
 
-/// A value of each stage, of which the last is repeated.
-fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) -> Groups<T, G> {
-    from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
-}
-
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn new() -> Result<Self, Error> {
-        const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
-        let tableau = B::TABLEAU;
+    pub fn new(tableau: Tableau<S>) -> Result<Self, Error> {
         let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, G>>() };
-        let memory = try_zeroed_box().map_err(|()| out_of_memory)?;
+        let Ok(memory) = try_zeroed_box() else { return Err(out_of_memory) };
         // Gauss and Radau IIA methods have one: tests construct all.
-        let basis: Eigenbasis<T, S, PARTS> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
-        let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
-        let a = from_fn(|j| groups(S, |i| T::from_f64(a[i][j])));
-        Ok(Self {
-            a,
-            minus_ha: a,
-            c: groups(S, |i| T::from_f64(c[i])),
-            right: from_fn(|part| groups(S, |i| right[part][i])),
-            lagrange: tableau.lagrange(0.0).map(T::from_f64),
-            factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
-            defect_filter: DefectFilter::new::<T, S>(basis.values()),
-            basis,
-            tableau,
-            memory,
-            method: PhantomData,
-        })
+        let Some(scheme) = Scheme::new(tableau) else { return Err(out_of_memory) };
+        Ok(Self { scheme, memory })
     }
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
-    for Collocation<M, B, T, S, G>
-{
+impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocation<M, T, S, G> {
     fn count(&self) -> usize {
         S
     }
 
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize> {
-        self.memory.factors.factor(jacobian, self.basis.values(), h)
+        self.memory.factors.factor(jacobian, self.scheme.basis.values(), h)
     }
 
     fn set_pivoted(&mut self, pivoted: bool) -> bool {
@@ -139,8 +98,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
     }
 
     fn continue_from_last(&mut self, ratio: f64) {
-        let weights: [[f64; S]; S] = from_fn(|i| self.polynomials(1.0 + self.tableau.c()[i] * ratio));
-        let weights = from_fn(|j| groups(S, |i| T::from_f64(weights[i][j])));
+        let weights = self.scheme.continued(ratio);
         let Memory { y, accepted, .. } = &mut *self.memory;
         dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
     }
@@ -153,19 +111,19 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
             let y = y.as_flattened();
             to[if index < nx { index } else { index + nx }] = y[stage];
             if index < nx {
-                let terms = self.tableau.a()[stage].iter().zip(y);
+                let terms = self.scheme.tableau.a()[stage].iter().zip(y);
                 let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);
                 to[nx + index] = to[nx + index] + start.h * sum;
             }
         }
         if let Some(time) = to.last_mut() {
-            *time = *time + start.h * T::from_f64(self.tableau.c()[stage]);
+            *time = *time + start.h * T::from_f64(self.scheme.tableau.c()[stage]);
         }
     }
 
     fn adopt(&mut self, other: &dyn Stages<M, T>) {
         let count = other.count();
-        for (stage, node) in self.tableau.c().iter().enumerate() {
+        for (stage, node) in self.scheme.tableau.c().iter().enumerate() {
             let weights = other.lagrange(*node);
             let unknowns = other.accepted().chunks_exact(count);
             for (to, from) in self.memory.accepted.as_mut().iter_mut().zip(unknowns) {
@@ -182,26 +140,20 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         convergence: &mut Convergence,
         residuals: &mut usize,
     ) -> Result<(), Failure> {
-        for (to, from) in self.minus_ha.as_flattened_mut().iter_mut().zip(self.a.as_flattened()) {
-            *to = from.map(|a| -(start.h * a));
-        }
+        self.scheme.set_step(start.h);
         let t = start.point.as_ref().last().copied().unwrap_or(T::ZERO);
         let inputs = 2 * M::Shape::NX + M::Shape::NZ;
-        for (points, c) in self.memory.points.iter_mut().zip(&self.c) {
+        for (points, times) in self.memory.points.iter_mut().zip(&self.scheme.times(t, start.h)) {
             for (to, from) in points.as_mut().iter_mut().zip(start.point.as_ref()).skip(inputs) {
                 *to = [*from; GROUP];
             }
             if let Some(time) = points.as_mut().last_mut() {
-                *time = c.map(|c| t + c * start.h);
+                *time = *times;
             }
         }
         self.advance(start, false);
-        let most = (ITERATIONS + MORE_ITERATIONS * (S as f64 - 3.0)).max(4.0) as usize;
-        convergence.most = most;
-        convergence.factor = Scalar::powf(convergence.factor.max(f64::EPSILON), 0.8);
-        convergence.rate = FAST;
-        let (mut last, mut last_rate) = (0.0, 0.0);
-        for iteration in 1..=most {
+        convergence.begin(S);
+        for iteration in 1..=convergence.most {
             *residuals += S;
             self.evaluate();
             let Memory { rows, factors, .. } = &mut *self.memory;
@@ -213,41 +165,16 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
                 let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
-            if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
+            if convergence.after(increment, tolerance)? {
                 return Ok(());
             }
-            if iteration > 1 && iteration < most {
-                let rate: f64 = increment / last;
-                convergence.rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
-                last_rate = rate;
-                // Written so that NaN, after an increment of zero, is no divergence.
-                if convergence.rate >= 0.99 {
-                    return Err(Failure::Diverges);
-                }
-                if convergence.rate.is_finite() {
-                    convergence.factor = convergence.rate / (1.0 - convergence.rate);
-                    let left = (most - 1 - iteration) as i32;
-                    let expected =
-                        convergence.factor * increment * Scalar::powi(convergence.rate, left) / tolerance;
-                    if expected >= 1.0 {
-                        let excess = expected.clamp(1e-4, 20.0);
-                        return Err(Failure::Slow(
-                            0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left))),
-                        ));
-                    }
-                }
-            }
-            if convergence.factor * increment <= tolerance {
-                return Ok(());
-            }
-            last = increment.max(f64::EPSILON);
         }
         Err(Failure::Diverges)
     }
 
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
         *point = *start.point;
-        if !self.tableau.is_stiffly_accurate() {
+        if !self.scheme.tableau.is_stiffly_accurate() {
             self.extrapolate(start.h, point);
             if let Some(time) = point.as_mut().last_mut() {
                 *time = *time + start.h;
@@ -255,7 +182,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
             return true;
         }
         for (xdot, k) in point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
-            *xdot = dot(&self.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+            *xdot = dot(&self.scheme.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
         }
         false
     }
@@ -269,7 +196,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         factors.solve(rows);
         // The real one is the first. Of methods with an even number of stages there is none; the
         // error is the real part.
-        let (re, im) = self.basis.values().scaled(h).get(0);
+        let (re, im) = self.scheme.basis.values().scaled(h).get(0);
         for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
             let (real, imaginary) = row.get(0);
             *error = if index < M::Shape::NX { re * real - im * imaginary } else { real };
@@ -278,7 +205,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
 
     fn filtered_defect(&self, h: T) -> FilteredDefect<M, T> {
         let mut errors = FilteredDefect::<M, T>::zeroed();
-        for (error, weights) in errors.iter_mut().zip(self.defect_filter.weights()) {
+        for (error, weights) in errors.iter_mut().zip(self.scheme.defect_filter.weights()) {
             let weights = weights.map(T::from_f64);
             for (error, [[row]]) in error.as_mut().iter_mut().zip(self.memory.rows.as_ref()) {
                 *error = h * dot(&weights, &row.parts);
@@ -288,7 +215,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
     }
 
     fn defect_filter(&self) -> &DefectFilter {
-        &self.defect_filter
+        &self.scheme.defect_filter
     }
 
     fn unknowns(&self, to: &mut Vec<T>) {
@@ -335,7 +262,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
     }
 
     fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool {
-        if !self.tableau.is_stiffly_accurate() {
+        if !self.scheme.tableau.is_stiffly_accurate() {
             self.extrapolate(h, point);
             return false;
         }
@@ -352,11 +279,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
     }
 
     fn lagrange(&self, theta: f64) -> [f64; MOST] {
-        padded(self.polynomials(theta))
+        padded(self.scheme.polynomials(theta))
     }
 
     fn weights(&self, theta: f64) -> [f64; MOST] {
-        padded(self.tableau.weights(theta))
+        padded(self.scheme.tableau.weights(theta))
     }
 }
 

@@ -63,7 +63,7 @@ pub use statistics::AdaptiveStatistics;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
+use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, Method, RadauIIA};
 use alloc::boxed::Box;
 use replay::{Single, Three};
 use stages::Stages;
@@ -248,7 +248,8 @@ macro_rules! single {
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
                 // As many lanes as there are eigenvalues, filled up to registers; stages in groups
                 // of four.
-                Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, $groups>::new()?))
+                let tableau = <Self as Method<$stages>>::TABLEAU;
+                Ok(Box::new(collocation::Collocation::<M, T, $stages, $groups>::new(tableau)?))
             }
         })*
     };

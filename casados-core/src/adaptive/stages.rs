@@ -2,7 +2,7 @@
 
 use super::defect_filter::DefectFilter;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
 /// The most stages.
@@ -11,12 +11,17 @@ pub(super) const MOST: usize = 9;
 /// The Newton matrix is that of the last Jacobian, so that the iteration converges linearly. It is
 /// expected to take no more than this many iterations, and this many more with each stage above
 /// three.
-pub(super) const ITERATIONS: f64 = 7.0;
-pub(super) const MORE_ITERATIONS: f64 = 2.5;
+const ITERATIONS: f64 = 7.0;
+const MORE_ITERATIONS: f64 = 2.5;
 
 /// An iteration that converges at this rate, or is over at once, keeps its Jacobian for the next
 /// step.
 pub(super) const FAST: f64 = 1e-3;
+
+/// Increments that shrink no more are rounding errors, if they are this small beside what is
+/// tolerated: of a state near zero that follows from large ones by an equation, they may be above
+/// the tolerance of the iteration.
+const NOISE: f64 = 0.01;
 
 /// Where a step begins and what it is measured by.
 pub struct Start<'a, M: Dae, T: Real> {
@@ -57,17 +62,59 @@ pub struct Convergence {
     pub rate: f64,
     /// `θ/(1 − θ)`, which carries over to the next step.
     pub factor: f64,
+    /// The last increment and the last rate.
+    last: [f64; 2],
 }
 
 impl Default for Convergence {
     fn default() -> Self {
-        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN }
+        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN, last: [0.0; 2] }
     }
 }
 
 impl Convergence {
     /// The factor where no step tells: an increment counts as what is left after it.
     pub(super) const UNKNOWN: f64 = 1.0;
+
+    /// Before an iteration for so many stages.
+    pub(super) fn begin(&mut self, stages: usize) {
+        self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)).max(4.0) as usize;
+        self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
+        self.rate = FAST;
+        self.last = [0.0; 2];
+    }
+
+    /// After an increment relative to what is tolerated: whether what is left is below the
+    /// tolerance.
+    ///
+    /// # Errors
+    /// It does not converge, or not soon enough.
+    pub(super) fn after(&mut self, increment: f64, tolerance: f64) -> Result<bool, Failure> {
+        let (iteration, most, [last, last_rate]) = (self.iterations, self.most, self.last);
+        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
+            return Ok(true);
+        }
+        if iteration > 1 && iteration < most {
+            let rate = increment / last;
+            self.rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
+            self.last[1] = rate;
+            // Written so that NaN, after an increment of zero, is no divergence.
+            if self.rate >= 0.99 {
+                return Err(Failure::Diverges);
+            }
+            if self.rate.is_finite() {
+                self.factor = self.rate / (1.0 - self.rate);
+                let left = (most - 1 - iteration) as i32;
+                let expected = self.factor * increment * Scalar::powi(self.rate, left) / tolerance;
+                if expected >= 1.0 {
+                    let excess = expected.clamp(1e-4, 20.0);
+                    return Err(Failure::Slow(0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left)))));
+                }
+            }
+        }
+        self.last[0] = increment.max(f64::EPSILON);
+        Ok(self.factor * increment <= tolerance)
+    }
 }
 
 /// An error of the states, and `(hJ)⁻²` times it.

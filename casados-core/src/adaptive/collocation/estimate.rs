@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// The larger one of the two estimates, from the defect at the point that is there.
     ///
     /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where
@@ -43,7 +43,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         let asked =
             start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
         let relative = error.as_ref().iter().zip(divided.as_ref()).zip(asked);
-        self.defect_filter.larger(
+        self.scheme.defect_filter.larger(
             first,
             start.finer,
             relative.map(|((error, divided), asked)| (*error * asked, *divided * asked)),
@@ -65,12 +65,12 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         self.memory.point = *start.point;
         let Memory { point, y, .. } = &mut *self.memory;
         for (index, (y, change)) in y.as_ref().iter().zip(changes.as_mut()).enumerate() {
-            let slope = dot(&self.lagrange, y.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+            let slope = dot(&self.scheme.lagrange, y.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
             let old = &mut point[if index < nx { index } else { index + nx }];
             *change = slope - *old;
             *old = slope;
         }
-        let unfiltered = self.basis.values().scaled(start.h).get(0).0.to_f64().abs()
+        let unfiltered = self.scheme.basis.values().scaled(start.h).get(0).0.to_f64().abs()
             * norm(&changes.as_ref()[..nx], start.scale.as_ref());
         let undoubted = UNDOUBTED * (LENIENT / start.finer).min(1.0);
         if unfiltered <= 2.0 * error.max(undoubted) {

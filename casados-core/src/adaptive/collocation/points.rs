@@ -2,23 +2,7 @@
 
 use super::*;
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
-    /// The Lagrange polynomials of the nodes, without a division.
-    pub(super) fn polynomials(&self, theta: f64) -> [f64; S] {
-        let c = self.tableau.c();
-        let (mut before, mut after) = (1.0, 1.0);
-        let mut values = self.factors;
-        for (value, c) in values.iter_mut().zip(c) {
-            *value *= before;
-            before *= theta - c;
-        }
-        for (value, c) in values.iter_mut().zip(c).rev() {
-            *value *= after;
-            after *= theta - c;
-        }
-        values
-    }
-
+impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// The residual at all stages, and from there to the rows of the linear systems.
     pub(super) fn evaluate(&mut self) {
         let Memory { points, f, rows, point, f_point, .. } = &mut *self.memory;
@@ -37,7 +21,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             }
         }
         dispatch(Split::<M, T, S, G> {
-            left: self.basis.left(),
+            left: self.scheme.basis.left(),
             f: from_fn(|group| f[group].as_ref()),
             rows: rows.as_mut(),
             model: PhantomData,
@@ -49,9 +33,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
     pub(super) fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
-        let (re, im) = self.right.split_at(PARTS / 2);
+        let (re, im) = self.scheme.right.split_at(PARTS / 2);
         let sum = dispatch(Advance {
-            minus_ha: &self.minus_ha,
+            minus_ha: &self.scheme.minus_ha,
             // Of the lanes that there are eigenvalues for.
             right: [&re[..S.div_ceil(2)], &im[..S.div_ceil(2)]],
             x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
@@ -60,14 +44,13 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             y: y.as_mut(),
             points: &mut points,
         });
-        // Each stage once.
-        sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
+        Scheme::<T, S, G>::total(&sum)
     }
 
     /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
     pub(super) fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
         let (nx, point) = (M::Shape::NX, point.as_mut());
-        let (b, end) = (self.tableau.b().map(T::from_f64), self.polynomials(1.0).map(T::from_f64));
+        let (b, end) = (self.scheme.weights(), self.scheme.values(1.0));
         for (index, y) in self.memory.y.as_ref().iter().enumerate() {
             let Some(y) = y.as_flattened().first_chunk() else { continue };
             if index < nx {

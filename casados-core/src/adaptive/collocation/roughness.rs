@@ -21,7 +21,7 @@ const SUSPECTED_GROWING: f64 = 0.4;
 /// from what both let expect.
 const ROUGH: f64 = 0.2;
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// The largest defect that was looked at, filtered, relative to what the estimate tolerates;
     /// zero where it is that of a smooth solution. Of Gauss methods the estimate looks at the end
     /// of the step and the first further point is next to it: that one tells, where the estimate
@@ -32,16 +32,15 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         growth: f64,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        if S < 3 || !self.tableau.is_stiffly_accurate() && growth <= 1.0 {
+        if S < 3 || !self.scheme.tableau.is_stiffly_accurate() && growth <= 1.0 {
             return Ok(0.0);
         }
-        let (c, radau) = (*self.tableau.c(), self.tableau.is_stiffly_accurate());
-        let middle = |stage: usize| 0.5 * (c[stage - 1] + c[stage]);
-        let nodes = |tau: f64| c.iter().fold(1.0, |product, c| product * (tau - c));
-        let (seen, near, far) = (if radau { 0.0 } else { 1.0 }, middle(S - 1), middle(S / 2));
+        let (scheme, radau) = (&self.scheme, self.scheme.tableau.is_stiffly_accurate());
+        let (seen, near, far) = (if radau { 0.0 } else { 1.0 }, scheme.middle(S - 1), scheme.middle(S / 2));
+        let [at_seen, at_near, at_far] = [scheme.nodes(seen), scheme.nodes(near), scheme.nodes(far)];
         let known = self.memory.error;
         let first = self.defect_at(near, start, residuals)?;
-        let expected = scaled_sum::<M, T>(nodes(near) / nodes(seen), &known, 0.0, &known);
+        let expected = scaled_sum::<M, T>(at_near / at_seen, &known, 0.0, &known);
         let difference = unlike::<M, T>(&first, &expected, start);
         let largest = size::<M, T>(&known, start).max(size::<M, T>(&first, start));
         if difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
@@ -52,7 +51,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         }
         let second = self.defect_at(far, start, residuals)?;
         let share = (far - seen) / (near - seen);
-        let [a, b] = [(1.0 - share) / nodes(seen), share / nodes(near)].map(|a| a * nodes(far));
+        let (a, b) = ((1.0 - share) / at_seen * at_far, share / at_near * at_far);
         let difference = unlike::<M, T>(&second, &scaled_sum::<M, T>(a, &known, b, &first), start);
         let decades = Scalar::ln(growth) / core::f64::consts::LN_10;
         let rough = difference * (1.0 + decades) > ROUGH;
@@ -67,8 +66,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         residuals: &mut usize,
     ) -> Result<ArrayK<M, T>, Failure> {
         let nx = M::Shape::NX;
-        let values = self.polynomials(tau).map(T::from_f64);
-        let integrals = self.tableau.weights(tau).map(T::from_f64);
+        let values = self.scheme.values(tau);
+        let integrals = self.scheme.integrals(tau);
         self.memory.point = *start.point;
         let Memory { point, y, .. } = &mut *self.memory;
         for (index, y) in y.as_ref().iter().enumerate() {
