@@ -9,6 +9,7 @@
 
 mod estimate;
 mod points;
+mod rate;
 mod roughness;
 
 use super::control::LENIENT;
@@ -214,7 +215,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
             if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
-                return Ok(());
+                convergence.rate = increment / last;
+                // So does what converges slowly with the Jacobian of an earlier step.
+                return if convergence.fresh { Ok(()) } else { Err(Failure::Slow(1.0)) };
             }
             if iteration > 1 && iteration < most {
                 let rate: f64 = increment / last;
@@ -237,7 +240,13 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
                     }
                 }
             }
-            if convergence.factor * increment <= tolerance {
+            if convergence.factor * increment <= tolerance
+                && (iteration > 1 || increment <= tolerance || {
+                    let rate = self.measured_rate(residuals)?;
+                    convergence.factor = convergence.factor.min(rate);
+                    rate * increment <= tolerance * (1.0 - rate)
+                })
+            {
                 return Ok(());
             }
             last = increment.max(f64::EPSILON);
@@ -322,9 +331,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, residuals)
+        self.roughness(start, growth, watched, residuals)
     }
 
     fn accept(&mut self) {

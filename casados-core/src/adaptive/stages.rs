@@ -57,11 +57,13 @@ pub struct Convergence {
     pub rate: f64,
     /// `θ/(1 − θ)`, which carries over to the next step.
     pub factor: f64,
+    /// Whether the Jacobian was evaluated for this step, and not kept from an earlier one.
+    pub fresh: bool,
 }
 
 impl Default for Convergence {
     fn default() -> Self {
-        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN }
+        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN, fresh: false }
     }
 }
 
@@ -113,7 +115,7 @@ pub trait Stages<M: Dae, T: Real> {
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
     /// The estimated error where the defect of a step is not that of a smooth solution, relative to
     /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
-    /// error is as foreseen.
+    /// error is as foreseen; a step that is watched is looked at whatever that is.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
@@ -121,6 +123,7 @@ pub trait Stages<M: Dae, T: Real> {
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
     /// The variables where the estimate compares the derivative of the polynomial with the

@@ -30,9 +30,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        if S < 3 || !self.tableau.is_stiffly_accurate() && growth <= 1.0 {
+        if S < 3 || !watched && !self.tableau.is_stiffly_accurate() && growth <= 1.0 {
             return Ok(0.0);
         }
         let (c, radau) = (*self.tableau.c(), self.tableau.is_stiffly_accurate());
@@ -44,10 +45,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         let expected = scaled_sum::<M, T>(nodes(near) / nodes(seen), &known, 0.0, &known);
         let difference = unlike::<M, T>(&first, &expected, start);
         let largest = size::<M, T>(&known, start).max(size::<M, T>(&first, start));
-        if difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
+        if !watched && difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
             return Ok(0.0);
         }
-        if !radau {
+        if !watched && !radau {
             return Ok(largest);
         }
         let second = self.defect_at(far, start, residuals)?;

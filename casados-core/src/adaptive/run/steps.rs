@@ -88,6 +88,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// A value that is not finite.
     fn linearise(&mut self, stages: &mut dyn Stages<M, T>, walk: &mut Walk<T>) -> Result<(), Error> {
         walk.current = walk.is_careful();
+        walk.convergence.fresh = true;
         if !walk.current {
             let Base { point, scale, asked, finer, middle, .. } = &mut *self.base;
             let start =
@@ -155,10 +156,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *finer / ROUGH_OVER_ERROR;
         let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
-        if is_above_rounding && error * counted >= 1.0 && walk.roughness.may_be(error) {
+        let watched = walk.refusals.is_watched();
+        if is_above_rounding && (watched || error * counted >= 1.0 && walk.roughness.may_be(error)) {
             let growth = walk.trend.growth(size, error, order);
-            let rough = stages.roughness(&start, growth, &mut self.statistics.residuals)? * counted;
-            if rough >= 1.0 && walk.roughness.refuses(size, error) {
+            let seen = stages.roughness(&start, growth, watched, &mut self.statistics.residuals)?;
+            let rough = seen * counted;
+            if rough >= 1.0 && walk.roughness.may_be(seen) && walk.roughness.refuses(size, seen.max(error)) {
                 // A derivative that jumps leaves an error like the fourth power of the step size,
                 // or a lower one.
                 return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));

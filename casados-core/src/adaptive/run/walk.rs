@@ -224,6 +224,7 @@ impl<T: Real> Walk<T> {
         self.starting = self.starting && factor > LONGER;
         self.accepted = Some(self.h);
         (self.t, self.current) = (end, false);
+        self.convergence.fresh = false;
         let mut next = (size * factor).min(self.longest);
         if core::mem::take(&mut self.rejected) {
             next = next.min(size);
