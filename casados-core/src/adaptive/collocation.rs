@@ -217,7 +217,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
             if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
                 convergence.rate = increment / last;
                 // So does what converges slowly with the Jacobian of an earlier step.
-                return if convergence.fresh { Ok(()) } else { Err(Failure::Slow(1.0)) };
+                return if convergence.fresh { Ok(()) } else { Err(Failure::Stale) };
             }
             if iteration > 1 && iteration < most {
                 let rate: f64 = increment / last;
@@ -240,12 +240,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
                     }
                 }
             }
+            // The rate of an earlier step holds where the matrix is exact.
+            let measured = iteration > 1 || increment <= tolerance || M::STRUCTURE.constant_matrix;
             if convergence.factor * increment <= tolerance
-                && (iteration > 1 || increment <= tolerance || {
-                    let rate = self.measured_rate(residuals)?;
-                    convergence.factor = convergence.factor.min(rate);
-                    rate * increment <= tolerance * (1.0 - rate)
-                })
+                && (measured || self.confirms(tolerance / increment, convergence, residuals)?)
             {
                 return Ok(());
             }

@@ -42,6 +42,8 @@ pub enum Failure {
     Diverges,
     /// The model has a value that is not finite.
     NotFinite,
+    /// It converges slowly, with the Jacobian of an earlier step.
+    Stale,
     /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
     Rough(f64),
 }

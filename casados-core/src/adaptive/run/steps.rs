@@ -5,7 +5,7 @@ use crate::adaptive::stages::Convergence;
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
-const ROUGH_OVER_ERROR: f64 = 8.0;
+const ROUGH_OVER_ERROR: f64 = 3.0;
 /// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
