@@ -215,8 +215,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
             if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
-                convergence.rate = increment / last;
-                // So does what converges slowly with the Jacobian of an earlier step.
+                // So does what converges slowly with the Jacobian of an earlier step: the next one
+                // gets its own, too.
+                convergence.rate = 2.0 * FAST;
                 return if convergence.fresh { Ok(()) } else { Err(Failure::Stale) };
             }
             if iteration > 1 && iteration < most {

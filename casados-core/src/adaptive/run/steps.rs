@@ -9,6 +9,8 @@ const ROUGH_OVER_ERROR: f64 = 3.0;
 /// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
+/// What follows a rough step may be shorter by this and still be a step.
+const SHORTEST: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
@@ -161,10 +163,16 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             let growth = walk.trend.growth(size, error, order);
             let seen = stages.roughness(&start, growth, watched, &mut self.statistics.residuals)?;
             let rough = seen * counted;
-            if rough >= 1.0 && walk.roughness.may_be(seen) && walk.roughness.refuses(size, seen.max(error)) {
-                // A derivative that jumps leaves an error like the fourth power of the step size,
-                // or a lower one.
-                return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));
+            // A derivative that jumps leaves an error like the fourth power of the step size, or a
+            // lower one. Where times are no finer than that, the step is as good as can be.
+            let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
+            let shorter = walk.h * T::from_f64(SHORTEST * factor);
+            if rough >= 1.0
+                && walk.roughness.may_be(seen)
+                && self.check_step(walk.t, shorter, Refusal::Error).is_ok()
+                && walk.roughness.refuses(size, seen.max(error))
+            {
+                return Err(Failure::Rough(factor));
             }
         }
         walk.trend.accepted(size, error, order, *noise);
