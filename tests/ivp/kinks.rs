@@ -69,8 +69,8 @@ fn converter(x: [f64; 2], t: f64) -> [f64; 2] {
     let mut voltage = 0.0;
     for period in 0..20 {
         let since = t - period as f64;
-        if since >= 0.0 && since < 0.4 {
-            voltage = 12.0;
+        if since >= 0.0 {
+            voltage = if since < 0.4 { 12.0 } else { 0.0 };
         }
     }
     [(voltage - x[1]) / 2.0, (x[0] - x[1] / 1.5) / 3.0]
