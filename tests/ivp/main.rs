@@ -8,6 +8,7 @@ mod models {
 }
 
 mod ends;
+mod kinks;
 mod rough;
 mod sensitivities;
 mod tolerances;

@@ -194,10 +194,10 @@ fn t27_scaling() {
     explicit_and_implicit!(check);
 }
 
-/// Times up to the end of the range.
+/// Times up to the ends of the range: of the least number there is no tenth.
 #[test]
 fn t36_long_and_short_intervals() {
-    for t in [1e-300, 1e-30, 1e30, 1e300] {
+    for t in [5e-324, 1e-300, 1e-30, 1e30, 1e300] {
         let mut adaptive = Adaptive::<Decay, Radau>::new(options(1e-6)).expect("valid");
         let x0 = SVector::from([1.0, 1.0]);
         let x = adaptive.solve(&x0, &zero(), t).expect("a solution").x;
@@ -207,6 +207,28 @@ fn t36_long_and_short_intervals() {
             assert!(x.amax() <= 1e-5, "{t:e}: {x}");
         }
     }
+}
+
+/// Beside a state that begins at zero and a tiny absolute tolerance its rate overflows, and so
+/// does what the first step would follow from.
+#[test]
+fn t36_tiny_absolute_tolerance() {
+    let options = AdaptiveOptions { atol: 1e-300, ..options(1e-6) };
+    macro_rules! check {
+        ($method:ty) => {
+            let mut adaptive = Adaptive::<Turning, $method>::new(options).expect("valid");
+            let x = adaptive.solve(&SVector::from([1.0, 0.0]), &zero(), 1.0).expect("a solution").x;
+            assert!((x[0] - 1f64.cos()).abs() <= 1e-4 && (x[1] + 1f64.sin()).abs() <= 1e-4, "{x}");
+        };
+    }
+    check!(DormandPrince5);
+    check!(DormandPrince8);
+}
+
+/// `ẍ = −x`
+#[ode]
+fn turning(x: [f64; 2]) -> [f64; 2] {
+    [x[1], -x[0]]
 }
 
 /// The same input gives the same bits, in every call.

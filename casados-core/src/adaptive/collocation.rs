@@ -9,6 +9,7 @@
 
 mod estimate;
 mod points;
+mod rate;
 mod roughness;
 mod scheme;
 
@@ -166,7 +167,11 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
             if convergence.after(increment, tolerance)? {
-                return Ok(());
+                // The rate of an earlier step holds where the matrix is exact.
+                let measured = iteration > 1 || increment <= tolerance || M::STRUCTURE.constant_matrix;
+                if measured || self.confirms(tolerance / increment, convergence, residuals)? {
+                    return Ok(());
+                }
             }
         }
         Err(Failure::Diverges)
@@ -249,9 +254,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, residuals)
+        self.roughness(start, growth, watched, residuals)
     }
 
     fn accept(&mut self) {

@@ -145,6 +145,8 @@ impl Roughness {
 pub struct Refusals {
     /// Those by much count twice, and accepted steps take one away.
     count: usize,
+    /// So many steps more are looked at whatever their estimates are.
+    watched: usize,
 }
 
 impl Refusals {
@@ -153,6 +155,9 @@ impl Refusals {
     /// Where so much is left, as after refusals of two steps one after the other, the solution is
     /// not smooth.
     const NOT_SMOOTH: usize = 3;
+    /// So many steps after a refusal by much are watched: those that become shorter until an
+    /// estimate is small by chance, and those that become longer behind a jump.
+    const WATCHED: usize = 10;
 
     /// How often an estimate counts that is asked for this much less than the solution.
     pub fn weight(&self, finer: f64) -> f64 {
@@ -163,12 +168,19 @@ impl Refusals {
     pub fn refused(&mut self, error: f64) {
         if error >= Self::MUCH {
             self.count = (self.count + 2).min(2 * Self::NOT_SMOOTH);
+            self.watched = Self::WATCHED;
         }
+    }
+
+    /// Whether a small estimate is to be doubted.
+    pub fn is_watched(&self) -> bool {
+        self.watched > 0
     }
 
     /// A step was accepted.
     pub fn accepted(&mut self) {
         self.count = self.count.saturating_sub(1);
+        self.watched = self.watched.saturating_sub(1);
     }
 }
 

@@ -9,6 +9,7 @@ use super::pairs::Pair;
 use super::replay::{Replay, Taken};
 use super::run::{Accepted, After, Base, Run, Span};
 use super::sealed::{Engine, Kind};
+use super::start::a_length;
 use super::tape::Entry;
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
@@ -288,7 +289,7 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     } else {
         power(0.01 / largest, 1.0 / B::CONTROL.order)
     };
-    Ok((100.0 * guess).min(second).min(longest))
+    Ok(a_length((100.0 * guess).min(second), longest))
 }
 
 macro_rules! explicit {

@@ -31,7 +31,8 @@ pub struct AdaptiveOptions {
     pub atol: f64,
     /// The length of the first step, finite and above zero; chosen if it is not given.
     pub initial_step: Option<f64>,
-    /// No step is longer; above zero, infinite by default.
+    /// No step is longer; above zero, infinite by default. After a long rest steps are long, and
+    /// all points at which the model is evaluated may lie beside a short pulse: give its length.
     pub max_step: f64,
     /// A step that would have to be shorter is the error `StepSizeUnderflow`; between zero, the
     /// default, and `max_step`.

@@ -47,6 +47,8 @@ pub enum Failure {
     Diverges,
     /// The model has a value that is not finite.
     NotFinite,
+    /// It converges slowly, with the Jacobian of an earlier step.
+    Stale,
     /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
     Rough(f64),
 }
@@ -62,13 +64,16 @@ pub struct Convergence {
     pub rate: f64,
     /// `θ/(1 − θ)`, which carries over to the next step.
     pub factor: f64,
+    /// Whether the Jacobian was evaluated for this step, and not kept from an earlier one.
+    pub fresh: bool,
     /// The last increment and the last rate.
     last: [f64; 2],
 }
 
 impl Default for Convergence {
     fn default() -> Self {
-        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN, last: [0.0; 2] }
+        let (most, factor, last) = (ITERATIONS as usize, Self::UNKNOWN, [0.0; 2]);
+        Self { iterations: 0, most, rate: 0.0, factor, fresh: false, last }
     }
 }
 
@@ -92,7 +97,10 @@ impl Convergence {
     pub(super) fn after(&mut self, increment: f64, tolerance: f64) -> Result<bool, Failure> {
         let (iteration, most, [last, last_rate]) = (self.iterations, self.most, self.last);
         if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
-            return Ok(true);
+            // So does what converges slowly with the Jacobian of an earlier step: the next one gets
+            // its own, too.
+            self.rate = 2.0 * FAST;
+            return if self.fresh { Ok(true) } else { Err(Failure::Stale) };
         }
         if iteration > 1 && iteration < most {
             let rate = increment / last;
@@ -160,7 +168,7 @@ pub trait Stages<M: Dae, T: Real> {
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
     /// The estimated error where the defect of a step is not that of a smooth solution, relative to
     /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
-    /// error is as foreseen.
+    /// error is as foreseen; a step that is watched is looked at whatever that is.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
@@ -168,6 +176,7 @@ pub trait Stages<M: Dae, T: Real> {
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
     /// The variables where the estimate compares the derivative of the polynomial with the

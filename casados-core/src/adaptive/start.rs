@@ -120,6 +120,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let second =
             if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { Scalar::powf(0.01 / largest, 0.25) };
         self.measure();
-        Ok((100.0 * step).min(second).min(longest))
+        Ok(a_length((100.0 * step).min(second), longest))
     }
+}
+
+/// The length of a first step, at most the longest. Where sizes overflow beside a tiny absolute
+/// tolerance nothing is foreseen: then a short one.
+pub(super) fn a_length(step: f64, longest: f64) -> f64 {
+    if step > 0.0 { step.min(longest) } else { 1e-8 * longest }
 }

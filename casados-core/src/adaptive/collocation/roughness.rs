@@ -30,9 +30,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
+        watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        if S < 3 || !self.scheme.tableau.is_stiffly_accurate() && growth <= 1.0 {
+        if S < 3 || !watched && !self.scheme.tableau.is_stiffly_accurate() && growth <= 1.0 {
             return Ok(0.0);
         }
         let (scheme, radau) = (&self.scheme, self.scheme.tableau.is_stiffly_accurate());
@@ -43,10 +44,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let expected = scaled_sum::<M, T>(at_near / at_seen, &known, 0.0, &known);
         let difference = unlike::<M, T>(&first, &expected, start);
         let largest = size::<M, T>(&known, start).max(size::<M, T>(&first, start));
-        if difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
+        if !watched && difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
             return Ok(0.0);
         }
-        if !radau {
+        if !watched && !radau {
             return Ok(largest);
         }
         let second = self.defect_at(far, start, residuals)?;

@@ -26,8 +26,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::StepSizeUnderflow`]
     pub(in crate::adaptive) fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
         let size = h.to_f64().abs();
+        // Of the least numbers there is no tenth.
         let tenth = T::from_f64(0.1) * h;
-        if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + tenth == t {
+        let part = if tenth == T::ZERO { h } else { tenth };
+        if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + part == t {
             return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
         }
         Ok(())

@@ -5,10 +5,12 @@ use crate::adaptive::stages::Convergence;
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
-const ROUGH_OVER_ERROR: f64 = 8.0;
+const ROUGH_OVER_ERROR: f64 = 3.0;
 /// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
+/// What follows a rough step may be shorter by this and still be a step.
+const SHORTEST: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
@@ -88,6 +90,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// A value that is not finite.
     fn linearise(&mut self, stages: &mut dyn Stages<M, T>, walk: &mut Walk<T>) -> Result<(), Error> {
         walk.current = walk.is_careful();
+        walk.convergence.fresh = true;
         if !walk.current {
             let Base { point, scale, asked, finer, middle, .. } = &mut *self.base;
             let start =
@@ -155,13 +158,21 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *finer / ROUGH_OVER_ERROR;
         let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
-        if is_above_rounding && error * counted >= 1.0 && walk.roughness.may_be(error) {
+        let watched = walk.refusals.is_watched();
+        if is_above_rounding && (watched || error * counted >= 1.0 && walk.roughness.may_be(error)) {
             let growth = walk.trend.growth(size, error, order);
-            let rough = stages.roughness(&start, growth, &mut self.statistics.residuals)? * counted;
-            if rough >= 1.0 && walk.roughness.refuses(size, error) {
-                // A derivative that jumps leaves an error like the fourth power of the step size,
-                // or a lower one.
-                return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));
+            let seen = stages.roughness(&start, growth, watched, &mut self.statistics.residuals)?;
+            let rough = seen * counted;
+            // A derivative that jumps leaves an error like the fourth power of the step size, or a
+            // lower one. Where times are no finer than that, the step is as good as can be.
+            let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
+            let shorter = walk.h * T::from_f64(SHORTEST * factor);
+            if rough >= 1.0
+                && walk.roughness.may_be(seen)
+                && self.check_step(walk.t, shorter, Refusal::Error).is_ok()
+                && walk.roughness.refuses(size, seen.max(error))
+            {
+                return Err(Failure::Rough(factor));
             }
         }
         walk.trend.accepted(size, error, order, *noise);

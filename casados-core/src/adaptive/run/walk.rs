@@ -183,10 +183,14 @@ impl<T: Real> Walk<T> {
     pub fn fail(&mut self, failure: Failure) {
         self.refusal = match failure {
             Failure::NotFinite => Refusal::NotFinite,
-            Failure::Slow(_) | Failure::Diverges => Refusal::NotConverged,
+            Failure::Slow(_) | Failure::Diverges | Failure::Stale => Refusal::NotConverged,
             Failure::Rough(_) => Refusal::Error,
         };
         let factor = match failure {
+            Failure::Stale => {
+                self.need = Need::Jacobian;
+                return;
+            }
             Failure::Slow(factor) => {
                 self.order.much_shorter = factor <= 0.5;
                 factor
@@ -224,6 +228,7 @@ impl<T: Real> Walk<T> {
         self.starting = self.starting && factor > LONGER;
         self.accepted = Some(self.h);
         (self.t, self.current) = (end, false);
+        self.convergence.fresh = false;
         let mut next = (size * factor).min(self.longest);
         if core::mem::take(&mut self.rejected) {
             next = next.min(size);

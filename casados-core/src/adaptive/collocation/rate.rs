@@ -1,0 +1,49 @@
+//! What an iteration left of the residual at the last stage.
+
+use super::*;
+
+impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
+    /// Whether an increment that may be so much larger than what is left after it is the last one.
+    ///
+    /// # Errors
+    /// [`Failure::NotFinite`]
+    pub(super) fn confirms(
+        &mut self,
+        most: f64,
+        convergence: &mut Convergence,
+        residuals: &mut usize,
+    ) -> Result<bool, Failure> {
+        let rate = self.measured_rate(residuals)?;
+        convergence.factor = convergence.factor.min(rate);
+        Ok(rate <= most * (1.0 - rate))
+    }
+
+    /// The residual at the last stage relative to the one before the iteration at all stages, of
+    /// the worst equation: the rate of convergence, where a force or its derivatives jump in the
+    /// step. The rate of an earlier step knows nothing of that.
+    ///
+    /// # Errors
+    /// [`Failure::NotFinite`]
+    fn measured_rate(&mut self, residuals: &mut usize) -> Result<f64, Failure> {
+        let Memory { points, point, .. } = &mut *self.memory;
+        // The last lane repeats the last stage.
+        for (to, [.., last]) in point.as_mut().iter_mut().zip(points.last().map_or(&[][..], AsRef::as_ref)) {
+            *to = *last;
+        }
+        self.evaluate_point(residuals)?;
+        let Memory { f, f_point, .. } = &*self.memory;
+        Ok(largest_ratio(f_point.as_ref(), f.each_ref().map(AsRef::as_ref).as_slice()))
+    }
+}
+
+/// `|after| / |before|` of the worst equation, of the largest before in all lanes.
+fn largest_ratio<T: Real>(after: &[T], before: &[&[[T; GROUP]]]) -> f64 {
+    let mut ratio = 0.0f64;
+    for (equation, after) in after.iter().enumerate() {
+        let all = before.iter().flat_map(|group| group.get(equation)).flatten();
+        let most = all.fold(0.0f64, |most, f| most.max(f.abs().to_f64()));
+        // Written so that nothing of nothing is nothing.
+        ratio = ratio.max(after.abs().to_f64() / most);
+    }
+    ratio
+}
