@@ -14,7 +14,7 @@ mod roughness;
 mod scheme;
 
 use super::control::LENIENT;
-use super::defect_filter::DefectFilter;
+use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
 use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};

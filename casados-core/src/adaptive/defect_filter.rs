@@ -39,6 +39,26 @@ const KEPT: [f64; 2] = [4.0, 12.0];
 /// A complex number.
 type Number = Complex<f64, 2>;
 
+/// Sums over the states of errors relative to the tolerance that was asked for, and of `(hJ)⁻²`
+/// times them.
+#[derive(Default)]
+pub struct RelativeErrors {
+    square: f64,
+    product: f64,
+    divided_square: f64,
+    count: usize,
+}
+
+impl RelativeErrors {
+    /// An error, and what is `(hJ)⁻²` times it.
+    pub fn add(&mut self, error: f64, divided: f64) {
+        self.square += error * error;
+        self.product += error * divided;
+        self.divided_square += divided * divided;
+        self.count += 1;
+    }
+}
+
 /// The filter of a method, and how what it lets pass is judged.
 #[derive(Clone, Copy, Debug)]
 pub struct DefectFilter {
@@ -93,17 +113,9 @@ impl DefectFilter {
     }
 
     /// The estimate of lower order or, if that is larger, the power of this one that behaves like
-    /// it: of errors relative to the tolerance that was asked for, which is `finer` than that of
-    /// the first as a factor, and `(hJ)⁻²` times them.
-    pub fn larger<T: Real>(&self, first: f64, finer: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
-        let (mut square, mut product, mut divided_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
-        for (error, divided) in relative {
-            let (error, divided) = (error.to_f64(), divided.to_f64());
-            square += error * error;
-            product += error * divided;
-            divided_square += divided * divided;
-            count += 1;
-        }
+    /// it; the tolerance that was asked for is `finer` than that of the first as a factor.
+    pub fn larger(&self, first: f64, finer: f64, relative: &RelativeErrors) -> f64 {
+        let RelativeErrors { square, product, divided_square, count } = *relative;
         // The square of the cosine between them, where they point against each other.
         let against = if product < 0.0 { product / square * (product / divided_square) } else { 0.0 };
         let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);

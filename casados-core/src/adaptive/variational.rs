@@ -16,6 +16,7 @@
 //! "forward sensitivity analysis"); the worst column counts.
 
 use super::consistent::{At, Consistent};
+use super::defect_filter::RelativeErrors;
 use super::norm::mean;
 use super::pairs::Pair;
 use super::replay::{Replay, Taken};
@@ -252,9 +253,11 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 let asked = tolerances.rtol.as_ref().iter().zip(tolerances.atol.as_ref());
                 let scales = scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
                 let [filtered, divided]: FilteredDefect<M, T> = stages.filtered_defect(start.h);
-                let pairs = filtered.as_ref().iter().zip(divided.as_ref()).zip(scales);
-                let pairs = pairs.map(|((error, divided), scale)| (*error / scale, *divided / scale));
-                relative = stages.defect_filter().larger(first, start.finer, pairs);
+                let mut errors = RelativeErrors::default();
+                for ((error, divided), scale) in filtered.as_ref().iter().zip(divided.as_ref()).zip(scales) {
+                    errors.add((*error / scale).to_f64(), (*divided / scale).to_f64());
+                }
+                relative = stages.defect_filter().larger(first, start.finer, &errors);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }

@@ -213,7 +213,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
         let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
-        W::nominal(&mut self.work).map_or(error, |work| work.explain_from(error, start))
+        W::nominal(&mut self.work).map_or(error, |work| work.explain_from(error, &start))
     }
 
     /// The stages of every step, as a warm start.

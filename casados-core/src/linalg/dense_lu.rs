@@ -74,9 +74,14 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
         let n = rows.len();
         for (scale, row) in scales.iter_mut().zip(rows.iter_mut()) {
             let row = row.as_mut().as_flattened_mut();
-            let largest = row.iter().fold(T::ZERO, |m, a| a.abs().max(m));
+            let mut largest = T::ZERO;
+            for a in row.iter() {
+                largest = a.abs().max(largest);
+            }
             *scale = if largest > T::ZERO { T::from_f64(1.0) / largest } else { T::from_f64(1.0) };
-            row.iter_mut().for_each(|a| *a = *a * *scale);
+            for a in row {
+                *a = *a * *scale;
+            }
         }
         for k in 0..n {
             let (mut best, mut at) = (T::ZERO, k);
@@ -96,10 +101,10 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let pivot = row[k];
             let singular = !(best > T::ZERO && pivot.is_finite())
                 || best * best < T::from_f64(T::EPSILON) && {
-                    let sum = above
-                        .iter()
-                        .zip(row)
-                        .fold(T::ZERO, |sum, (above, l)| sum + (*l * above.as_ref().as_flattened()[k]).abs());
+                    let mut sum = T::ZERO;
+                    for (above, l) in above.iter().zip(row) {
+                        sum = sum + (*l * above.as_ref().as_flattened()[k]).abs();
+                    }
                     pivot.abs() <= T::from_whole(n) * T::from_f64(T::EPSILON) * sum
                 };
             if singular {
@@ -159,7 +164,9 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
     /// Multiplies the rows as those of the matrix were.
     fn scale<R: Array<E>>(&self, b: &mut [R]) {
         for (row, scale) in b.iter_mut().zip(self.scales.as_ref().as_flattened()) {
-            row.as_mut().iter_mut().for_each(|b| *b = *b * *scale);
+            for b in row.as_mut() {
+                *b = *b * *scale;
+            }
         }
     }
 

@@ -40,14 +40,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// The larger one of an estimate and the second one, of the defect that was filtered last.
     fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
         let [error, divided] = self.filtered_defect(start.h);
-        let asked =
-            start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
-        let relative = error.as_ref().iter().zip(divided.as_ref()).zip(asked);
-        self.scheme.defect_filter.larger(
-            first,
-            start.finer,
-            relative.map(|((error, divided), asked)| (*error * asked, *divided * asked)),
-        )
+        let mut relative = RelativeErrors::default();
+        let asked = start.scale.as_ref().iter().zip(start.asked.as_ref());
+        for ((error, divided), (scale, asked)) in error.as_ref().iter().zip(divided.as_ref()).zip(asked) {
+            let asked = *scale * *asked;
+            relative.add((*error * asked).to_f64(), (*divided * asked).to_f64());
+        }
+        self.scheme.defect_filter.larger(first, start.finer, &relative)
     }
 
     /// The larger one of an estimate at the end of a step and the same at its start: of what ends

@@ -18,7 +18,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
             for c in 0..W {
                 for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
-                    *to = from.map(|row| [row[c]]);
+                    for (to, row) in to.iter_mut().zip(from) {
+                        *to = [row[c]];
+                    }
                 }
                 linear.factors.solve(increment);
                 for (to, from) in packets.iter_mut().zip(increment.as_ref()) {

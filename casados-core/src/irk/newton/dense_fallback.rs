@@ -87,7 +87,9 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             for (equation, f) in self.f.as_ref().iter().enumerate() {
                 if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
-                    *to = f.map(|f| [f]);
+                    for (to, f) in to.iter_mut().zip(f) {
+                        *to = [*f];
+                    }
                 }
             }
             self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);

@@ -146,8 +146,14 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
         let expensive = STILL[cheap] + Self::RESIDUAL + Self::RENEWAL[cheap];
         let mut cell: E::Cell = Zeroable::zeroed();
         left.store(&mut cell);
-        let lanes = || (0..E::LANES).map(|lane| E::lane(&cell, lane));
-        let slowest = lanes().filter(|&left| left < 1.0 / 16.0).fold(0.0, f64::max);
-        remaining(true, 1.0, slowest, tolerance) > expensive || lanes().any(|left| left >= 1.0)
+        let (mut slowest, mut grows) = (0.0f64, false);
+        for lane in 0..E::LANES {
+            let left = E::lane(&cell, lane);
+            grows |= left >= 1.0;
+            if left < 1.0 / 16.0 {
+                slowest = slowest.max(left);
+            }
+        }
+        grows || remaining(true, 1.0, slowest, tolerance) > expensive
     }
 }

@@ -40,7 +40,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let h = self.inputs.time.step.abs();
         let bound = E::from_f64(SMALL / E::EPSILON);
         let mut small = E::lt(h, h);
-        for pivot in M::STRUCTURE.elimination.pivots.iter().filter(|pivot| !pivot.identity) {
+        for pivot in M::STRUCTURE.elimination.pivots {
+            if pivot.identity {
+                continue;
+            }
             let (slot, equation) = (pivot.slot as usize, pivot.equation as usize);
             let (Some(inverse), Some(y), Some(terms)) = (
                 factors.blocks.get(pivot.block as usize),

@@ -19,11 +19,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     pub(in crate::irk) fn explain_start(&mut self, error: Error, from: &InitialGuess<'_, M, T, S>) -> Error {
         let given = self.given;
         match from {
-            InitialGuess::Nominal => self.explain_from(error, |unknown| M::START.get(unknown).copied()),
+            InitialGuess::Nominal => self.explain_from(error, &|unknown| M::START.get(unknown).copied()),
             InitialGuess::Given => {
-                self.explain_from(error, |unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+                self.explain_from(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
             }
-            InitialGuess::Zero => self.explain_from(error, |_| None),
+            InitialGuess::Zero => self.explain_from(error, &|_| None),
             InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
         }
     }
@@ -34,7 +34,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     pub(in crate::irk) fn explain_from(
         &mut self,
         error: Error,
-        start: impl Fn(usize) -> Option<f64>,
+        start: &dyn Fn(usize) -> Option<f64>,
     ) -> Error {
         if const { M::Shape::NZ == 0 } {
             return error;
@@ -50,37 +50,55 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
                 let own = (nx..M::Shape::NK).find(|index| unknown_name::<M>(*index) == unknown);
-                let own = own.or_else(|| Self::algebraic_of(equation).next());
+                let own = own.or_else(|| Self::find_algebraic(equation, &mut |_| true));
                 Error::NotConverged { residual, equation, unknown, increment, at, started: own.map(started) }
             }
             other => other,
         }
     }
 
-    /// The algebraic states that occur in an equation, as unknowns.
-    fn algebraic_of(equation: usize) -> impl Iterator<Item = usize> {
+    /// The first algebraic state of an equation, as an unknown, of which something holds.
+    fn find_algebraic(equation: usize, holds: &mut dyn FnMut(usize) -> bool) -> Option<usize> {
         let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
-        let places = (begin..end).filter_map(|entry| M::STRUCTURE.jacobian.get(entry));
-        places.filter(move |place| place.0 == equation).map(|place| place.1.saturating_sub(M::Shape::NX))
+        for entry in begin..end {
+            let Some((row, column)) = M::STRUCTURE.jacobian.get(entry) else { continue };
+            let unknown = column.saturating_sub(M::Shape::NX);
+            if row == equation && holds(unknown) {
+                return Some(unknown);
+            }
+        }
+        None
     }
 
     /// The algebraic state for whose value an equation has none: with another one it has. The
     /// points of the stages are left anywhere.
     fn without_value(&mut self, equation: usize) -> Option<usize> {
-        Self::algebraic_of(equation).find(|unknown| {
+        Self::find_algebraic(equation, &mut |unknown| {
             let variable = unknown + M::Shape::NX;
             let Some(start) = self.points.as_ref().get(variable).copied() else { return false };
-            let has_value = TRIED.iter().any(|value| {
-                self.place_point(variable, [T::from_f64(*value); S]);
+            let mut has_value = false;
+            for value in TRIED {
+                self.place_point(variable, [T::from_f64(value); S]);
                 self.evaluate_jacobian();
-                let jacobian = self.linear.jacobian.as_ref();
-                let mut row = entries(&M::STRUCTURE, jacobian, 0, jacobian.len()).filter(|e| e.0 == equation);
-                let residual = self.f.as_ref().get(equation);
-                residual.is_some_and(|f| not_finite(f).is_none()) && row.all(|e| not_finite(e.2).is_none())
-            });
+                has_value = self.has_value(equation);
+                if has_value {
+                    break;
+                }
+            }
             self.place_point(variable, start);
             has_value
         })
+    }
+
+    /// Whether the residual of an equation and its row of the Jacobian are finite.
+    fn has_value(&self, equation: usize) -> bool {
+        let jacobian = self.linear.jacobian.as_ref();
+        for (row, _, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
+            if row == equation && not_finite(values).is_some() {
+                return false;
+            }
+        }
+        self.f.as_ref().get(equation).is_some_and(|f| not_finite(f).is_none())
     }
 
     fn place_point(&mut self, variable: usize, value: [T; S]) {
