@@ -59,6 +59,12 @@ pub fn parallel<I: Single, R: Answer<I::Model, I::Number>>(
     Ok(())
 }
 
+/// How many numbers fill registers of 32 bytes: so few intervals take less time there than in wider
+/// ones.
+const fn narrow<T>() -> usize {
+    32 / size_of::<T>()
+}
+
 /// What computes, with memory of its own.
 pub struct Worker<I: Single> {
     single: I,
@@ -128,13 +134,16 @@ impl<I: Single> Worker<I> {
                 Err(error) => *status = Err(error),
             }
         }
-        let several = intervals.iter().flatten().count() > 1;
+        let count = intervals.iter().flatten().count();
+        let several = count > 1;
         let (mut done, mut solved) = ([false; MOST_LANES], [false; MOST_LANES]);
         if several && work.lanes > 1 {
             let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut share);
             let together = Together { work, groups, statistics, intervals: &intervals, share };
             // What did not get memory side by side may get it alone.
-            done = I::Number::widest(work.lanes, together).ok().and_then(Result::ok).unwrap_or_default();
+            let lanes = if count > narrow::<I::Number>() { work.lanes } else { narrow::<I::Number>() };
+            let lanes = lanes.min(work.lanes);
+            done = I::Number::widest(lanes, together).ok().and_then(Result::ok).unwrap_or_default();
         } else if several && work.simulated > 1 && !work.solved {
             solved = self.simulate(work, &intervals, &share).unwrap_or_default();
         }
