@@ -12,7 +12,9 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
-//! | `elastic` | penalties where no step makes progress |
+//! | `feasibility` | violations alone where no step makes progress, and that they stay |
+//! | `elastic` | penalties where that does not help |
+//! | `verdict` | how a run may end |
 //! | `lifted` | stages that are variables go with the iterate |
 //!
 //! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
@@ -22,6 +24,7 @@
 mod barrier;
 mod direction;
 mod elastic;
+mod feasibility;
 #[cfg(feature = "alloc")]
 mod heap;
 mod iteration;
@@ -38,6 +41,7 @@ mod run;
 mod scaling;
 mod start;
 mod state;
+mod verdict;
 mod work;
 
 pub use barrier::Barrier;
