@@ -128,7 +128,7 @@ where
         let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (penalties, units) = (&*given.penalties, &*given.units);
         if state.phase.force.is_some() {
-            if state.progress.is_free() || state.progress.adapts() {
+            if state.progress.adapts() {
                 state.begin_monotone(&self.options);
                 return None;
             }
@@ -172,6 +172,7 @@ where
         let Self { trial, work, .. } = self;
         let work = Work::new(ocp.ends(), capacity, work.as_mut());
         trial.copy_from(&ocp.iterate);
+        ocp.has_algebraic = false;
         let (mut farthest, mut gaps) = (0.0, 0.0);
         for pass in 0..=ocp.intervals() {
             if ocp.evaluate(trial, work.ends).is_err() {
@@ -199,7 +200,6 @@ where
             }
         }
         ocp.iterate.copy_from(trial);
-        ocp.has_algebraic = false;
     }
 }
 

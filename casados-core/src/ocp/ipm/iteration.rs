@@ -87,7 +87,11 @@ where
         });
         let mut direction = match direction {
             Ok(direction) => direction,
-            Err(QpError::NotConvex { .. }) => return Ok(self.recover(ocp, capacity, state)),
+            Err(error @ QpError::NotConvex { .. }) => {
+                // A derivative that is not finite is another error.
+                ocp.status_of_error(error)?;
+                return Ok(self.recover(ocp, capacity, state));
+            }
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
         self.expand(ocp, state)?;

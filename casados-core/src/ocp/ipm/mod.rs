@@ -64,9 +64,10 @@ use alloc::vec::Vec;
 /// It needs dynamics with second derivatives ([`SecondOrder`](super::SecondOrder)). Bounds that are
 /// equal are equations; soft ones have their penalties. An iteration costs one evaluation with
 /// Hessians, one Riccati factorisation, and one simulation for each point that the line search
-/// tries. Where no step makes progress, hard bounds of states and constraints get penalties, and
-/// the bound that stays violated most is named. The iterate of the problem is the best one
-/// afterwards, whatever the status.
+/// tries. Where no step makes progress, violations of bounds of states and constraints alone are
+/// made small; where they stay, the bound that is violated most is named. The iterate of the
+/// problem is the best one afterwards, whatever the status; where violations stay, the one at which
+/// they do.
 ///
 /// [`HeapIpm`] allocates its memory; [`Ipm::in_memory`] takes it, and then a run allocates nothing
 /// but its log, with the feature `alloc`.
