@@ -192,7 +192,7 @@ where
                 gaps = moved;
             }
             farthest += moved;
-            if !(farthest <= FAR * gaps) {
+            if farthest.is_nan() || farthest > FAR * gaps {
                 return;
             }
             if moved == 0.0 {
