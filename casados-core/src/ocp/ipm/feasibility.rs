@@ -36,9 +36,9 @@ const SMALL: f64 = 1e-4;
 const FAR_OFF: f64 = 1e-2;
 /// Violations are there to stay where no step makes more than this part of them less, to first
 /// order.
-const STAYS: f64 = 1e-2;
+const STAYS: f64 = 1e-4;
 /// What is left of the dynamics by then, as a part of the violations.
-const EXACT: f64 = 1e-3;
+const EXACT: f64 = 1e-5;
 /// A simulation is not far away if states move by no more than this times the gaps.
 const FAR: f64 = 100.0;
 /// So many phases there may be in a run.
