@@ -9,6 +9,7 @@ mod astray;
 mod climb;
 mod guesses;
 mod held;
+mod infeasible;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;

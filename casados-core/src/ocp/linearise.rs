@@ -193,6 +193,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
+    /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
+    pub(super) fn forget_gradients(&mut self) {
+        let (v, _) = self.iterate.vectors();
+        let mut begin = 0;
+        for mut stage in self.qp.stages_mut() {
+            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
+            gradient.fill(T::ZERO);
+            add_symmetric(gradient, hessian, ld, part(v, begin, ld), n);
+            gradient.iter_mut().for_each(|g| *g = T::ZERO - *g);
+            begin += ld;
+        }
+    }
+
     /// Adds `½ δ ‖v − v̄‖²` to the objective of the QP at the iterate `v̄`.
     pub(super) fn regularise(&mut self, delta: T) {
         let (v, _) = self.iterate.vectors();

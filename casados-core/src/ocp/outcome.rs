@@ -76,7 +76,8 @@ pub enum Status {
     /// ```
     Unbounded,
     /// Locally infeasible: gaps are less than violations, and no step makes the sum of both smaller
-    /// by a thousandth, to first order. Elsewhere there may be points that satisfy all constraints.
+    /// by a thousandth, in [`Ipm`](super::Ipm) that of violations by a hundredth, to first order.
+    /// Elsewhere there may be points that satisfy all constraints.
     /// This is the one that the iterate violates most.
     Infeasible {
         /// The constraint.

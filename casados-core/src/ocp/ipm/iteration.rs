@@ -8,6 +8,7 @@ use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
 use super::predictor::{self, needs_equal_steps};
 use super::scaling::{Relative, relative};
 use super::state::{MARGIN, State};
+use super::verdict::Next;
 use super::work::Work;
 use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
@@ -24,22 +25,10 @@ use crate::ocp::watch::Watch;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// Variables that are larger have no end.
-const UNBOUNDED: f64 = 1e12;
 /// A step lets the violation grow to this multiple of it, to one, or to what it was at the start.
 const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
-
-/// What follows the residuals of an iteration.
-enum Next {
-    /// A search direction.
-    Direction,
-    /// Another iteration: bounds have other penalties.
-    NewPenalties,
-    /// The end of the run.
-    End(Status),
-}
 
 /// A search direction, and how far it may be gone.
 struct Direction {
@@ -81,7 +70,13 @@ where
         match self.next(ocp, capacity, state, row) {
             Next::Direction => {}
             Next::NewPenalties => return Ok(None),
-            Next::End(status) => return Ok(Some(status)),
+            Next::End(status) => {
+                if matches!(status, Status::Infeasible { .. }) {
+                    // That is said of the last iterate.
+                    state.best_iteration = *row;
+                }
+                return Ok(Some(status));
+            }
         }
         if state.is_held() {
             self.release(ocp, state)?;
@@ -92,6 +87,11 @@ where
         });
         let mut direction = match direction {
             Ok(direction) => direction,
+            Err(error @ QpError::NotConvex { .. }) => {
+                // A derivative that is not finite is another error.
+                ocp.status_of_error(error)?;
+                return Ok(self.recover(ocp, capacity, state));
+            }
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
         self.expand(ocp, state)?;
@@ -105,21 +105,7 @@ where
         };
         row.times.search = watch.lap();
         let Some(accepted) = accepted else {
-            if state.progress.adapts() {
-                // From the best point on, as carefully as may be.
-                ocp.recall(&self.best);
-                state.begin_monotone(&self.options);
-                return Ok(None);
-            }
-            if state.elastic.is_some() || !self.options.elastic {
-                return Ok(Some(Status::NoProgress));
-            }
-            // Where no step made progress is no place to begin.
-            ocp.recall(&self.best);
-            let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-            let given = (&*work.penalties, &*work.units);
-            elastic::soften(ocp, state, given, self.options.elastic_penalty);
-            return Ok(None);
+            return Ok(self.recover(ocp, capacity, state));
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
@@ -143,10 +129,16 @@ where
             if !core::mem::take(&mut state.is_linearised) {
                 ocp.linearise(Slopes)?;
             }
+            if state.lengths.alone {
+                ocp.forget_gradients();
+            }
             self.begin(ocp, capacity, state)?;
         }
         self.curve(ocp, capacity, state)?;
         ocp.linearise(EXACT)?;
+        if state.lengths.alone {
+            ocp.forget_gradients();
+        }
         let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
         attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
         Ok(())
@@ -167,7 +159,7 @@ where
         let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
         let mut view = solution.view_mut();
         iterate.store(&mut view);
-        let objective = plain + penalties;
+        let objective = if state.lengths.alone { plain } else { plain + penalties };
         if P::Dynamics::LIFTED {
             residuals.dynamics = larger(residuals.dynamics, of_stages);
         }
@@ -182,47 +174,26 @@ where
             relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.judge(error, others, &self.options);
+        state.gaps = barrier.0.dynamics;
+        state.violation = state.gaps.max(barrier.0.inequalities);
+        let is_alone = state.lengths.alone;
+        if is_alone {
+            state.phase.take(&iterate, view.dynamics, state.gaps, units);
+        }
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
         let size = state.error.max(violation);
-        if size < state.best_residual || row.iteration == 0 {
+        if !is_alone && size < state.best_residual || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
+            state.best_violation = state.violation;
             self.best.copy_from(&ocp.iterate);
             ocp.problem.parts().dynamics.move_stages(StageAction::Remember);
         }
-        let acceptable = size <= self.options.acceptable_tolerance;
+        let acceptable = !is_alone && size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
         Ok(())
-    }
-
-    /// What follows the residuals of an iteration.
-    fn next<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
-        state: &mut State<'_>,
-        row: &Iteration,
-    ) -> Next {
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        if state.error <= self.options.tolerance {
-            let cost = row.objective - ocp.objective.to_f64();
-            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
-            return end.map_or(Next::NewPenalties, Next::End);
-        }
-        if state.acceptable >= self.options.acceptable_iterations.max(1) {
-            return Next::End(Status::Acceptable);
-        }
-        let is_feasible = row.residuals.dynamics.max(row.residuals.inequalities) <= self.options.tolerance;
-        let (v, _) = ocp.iterate.vectors();
-        if is_feasible && state.elastic.is_none() && v.iter().any(|v| v.abs().to_f64() > UNBOUNDED) {
-            return Next::End(Status::Unbounded);
-        }
-        if row.iteration >= self.options.max_iterations {
-            return Next::End(Status::MaxIterations);
-        }
-        Next::Direction
     }
 
     /// The search direction, and the barrier parameter if that follows it; whether it is corrected.
@@ -274,7 +245,7 @@ where
     ) -> Result<Measure, QpError> {
         let lengths = state.lengths;
         let Self { trial, numbers, indices, work, .. } = self;
-        let plain = ocp.objective.to_f64();
+        let plain = if lengths.alone { 0.0 } else { ocp.objective.to_f64() };
         let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
         let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
         let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));

@@ -14,6 +14,8 @@ pub(super) struct Lengths {
     pub extent: Extent,
     /// What is known of units.
     pub sizes: Sizes,
+    /// Whether violations count alone, without the objective.
+    pub alone: bool,
 }
 
 impl Lengths {
@@ -22,7 +24,14 @@ impl Lengths {
         let reading = reading(qp);
         let counts = count(qp, &reading);
         let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
-        Self { counts, fixed: reading.fixed, numbers, extent, sizes: Sizes { force: 1.0, least: 1.0 } }
+        Self {
+            counts,
+            fixed: reading.fixed,
+            numbers,
+            extent,
+            sizes: Sizes { force: 1.0, least: 1.0 },
+            alone: false,
+        }
     }
 
     /// Units whose sizes these are.

@@ -196,6 +196,7 @@ where
             }
         }
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
+        let objective = if self.lengths.alone { 0.0 } else { objective };
         ocp.along = Some(T::ZERO);
         let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
         if P::Dynamics::LIFTED {

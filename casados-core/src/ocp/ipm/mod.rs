@@ -12,7 +12,9 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
-//! | `elastic` | penalties where no step makes progress |
+//! | `feasibility` | violations alone where no step makes progress, and that they stay |
+//! | `elastic` | penalties where that does not help |
+//! | `verdict` | how a run may end |
 //! | `lifted` | stages that are variables go with the iterate |
 //!
 //! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
@@ -22,6 +24,7 @@
 mod barrier;
 mod direction;
 mod elastic;
+mod feasibility;
 #[cfg(feature = "alloc")]
 mod heap;
 mod iteration;
@@ -38,6 +41,7 @@ mod run;
 mod scaling;
 mod start;
 mod state;
+mod verdict;
 mod work;
 
 pub use barrier::Barrier;
@@ -60,9 +64,10 @@ use alloc::vec::Vec;
 /// It needs dynamics with second derivatives ([`SecondOrder`](super::SecondOrder)). Bounds that are
 /// equal are equations; soft ones have their penalties. An iteration costs one evaluation with
 /// Hessians, one Riccati factorisation, and one simulation for each point that the line search
-/// tries. Where no step makes progress, hard bounds of states and constraints get penalties, and
-/// the bound that stays violated most is named. The iterate of the problem is the best one
-/// afterwards, whatever the status.
+/// tries. Where no step makes progress, violations of bounds of states and constraints alone are
+/// made small; where they stay, the bound that is violated most is named. The iterate of the
+/// problem is the best one afterwards, whatever the status; where violations stay, the one at which
+/// they do.
 ///
 /// [`HeapIpm`] allocates its memory; [`Ipm::in_memory`] takes it, and then a run allocates nothing
 /// but its log, with the feature `alloc`.

@@ -5,7 +5,7 @@ use super::newton::{attach, attach_to_new, evaluate, evaluate_values, least_squa
 use super::start::begin_sides;
 use super::state::State;
 use super::work::Work;
-use super::{Ipm, barrier, scaling};
+use super::{Ipm, barrier, feasibility, scaling};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
@@ -48,6 +48,9 @@ where
         evaluate_values(&mut iterate);
         let force = state.lengths.sizes.force;
         begin_sides(&mut iterate, &self.options, warm, state.mu, units, &view);
+        if state.lengths.alone {
+            feasibility::centre(&mut iterate.sides, state.mu);
+        }
         iterate.store(&mut view);
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);

@@ -27,7 +27,8 @@ pub struct IpmOptions {
     /// below one it is this times the unit. Default 1e-8; of single precision 1e-3.
     pub tolerance: f64,
     /// A point whose residuals stay below this for `acceptable_iterations` is accepted where the
-    /// tolerance is not reached. Default 1e-6; of single precision 1e-2.
+    /// tolerance is not reached, as is the best one where no more steps are gone. Default
+    /// 1e-6; of single precision 1e-2.
     pub acceptable_tolerance: f64,
     /// Default 15.
     pub acceptable_iterations: usize,
@@ -60,8 +61,8 @@ pub struct IpmOptions {
     pub warm_start: bool,
     /// The same distance where the start is warm. Default 1e-6.
     pub warm_push: f64,
-    /// Whether bounds of states and constraints get penalties where no step makes progress. Default
-    /// true.
+    /// Whether violations of bounds of states and constraints alone are made small where no step
+    /// makes progress, and then get penalties beside the objective. Default true.
     pub elastic: bool,
     /// The first of these penalties, linear, in units of forces over those of what is bounded; they
     /// grow by factors of ten up to ten thousand times that. Default 1e2.

@@ -1,16 +1,13 @@
 //! The iterations.
 
 use super::Ipm;
-use super::barrier::{Barrier, Progress};
-use super::direction::Regularisation;
 use super::lengths::Lengths;
 use super::start::push_inside;
-use super::state::{MARGIN, State};
+use super::state::State;
 use super::work::Work;
 use crate::ocp::curvature::Slopes;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
-use crate::ocp::filter::Filter;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
 #[cfg(feature = "alloc")]
@@ -110,34 +107,8 @@ where
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise_guess(Slopes, &mut self.trial)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
-        let mut state = State {
-            over,
-            lengths,
-            mu: self.options.first_mu(lengths.sizes.force),
-            // Products that do not vanish leave nothing to correct.
-            progress: Progress::new(if self.options.final_mu > 0.0 {
-                Barrier::Monotone
-            } else {
-                self.options.barrier
-            }),
-            filter: Filter::new(MARGIN, f64::INFINITY),
-            small_violation: f64::INFINITY,
-            first_violation: f64::INFINITY,
-            regularisation: Regularisation::default(),
-            delta: 0.0,
-            elastic: None,
-            first_objective: ocp.objective.to_f64(),
-            stationary_violation: f64::INFINITY,
-            acceptable: 0,
-            held: 0,
-            released: false,
-            has_slacks: false,
-            is_linearised,
-            has_filter: false,
-            error: f64::INFINITY,
-            best_residual: f64::INFINITY,
-            best_iteration: Iteration::default(),
-        };
+        let mut state = State::new(over, lengths, is_linearised, &self.options);
+        state.first_objective = ocp.objective.to_f64();
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();
@@ -167,11 +138,13 @@ where
         };
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.set_penalties(work.penalties, None, &[]);
-        if outcome.status != Status::Converged && state.best_residual.is_finite() {
+        let is_last = matches!(outcome.status, Status::Converged | Status::Infeasible { .. });
+        if !(is_last && result.is_ok()) && state.best_residual.is_finite() {
             ocp.recall(&self.best);
         }
         (ocp.along, ocp.has_algebraic) = (None, false);
-        let stuck = matches!(outcome.status, Status::NoProgress | Status::QpFailed(_));
+        let stuck =
+            matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
         if stuck && state.best_residual <= self.options.acceptable_tolerance {
             outcome.status = Status::Acceptable;
         }

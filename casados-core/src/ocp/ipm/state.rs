@@ -3,6 +3,7 @@
 use super::IpmOptions;
 use super::barrier::{self, Barrier, Progress};
 use super::direction::Regularisation;
+use super::feasibility::Phase;
 use super::lengths::Lengths;
 use crate::ocp::filter::Filter;
 use crate::ocp::log::Iteration;
@@ -37,6 +38,14 @@ pub(super) struct State<'c> {
     pub delta: f64,
     /// The penalty, if bounds are soft.
     pub elastic: Option<f64>,
+    /// Phases in which violations alone are made small.
+    pub phase: Phase,
+    /// The largest gap or violation, in units.
+    pub violation: f64,
+    /// The largest gap.
+    pub gaps: f64,
+    /// The largest gap or violation of the best iterate.
+    pub best_violation: f64,
     /// The objective at the first iterate.
     pub first_objective: f64,
     /// The violation that the last penalty left.
@@ -61,7 +70,45 @@ pub(super) struct State<'c> {
     pub best_iteration: Iteration,
 }
 
-impl State<'_> {
+impl<'c> State<'c> {
+    /// That of a run that begins.
+    pub fn new(
+        over: &'c mut dyn FnMut() -> bool,
+        lengths: Lengths,
+        is_linearised: bool,
+        options: &IpmOptions,
+    ) -> Self {
+        // Products that do not vanish leave nothing to correct.
+        let barrier = if options.final_mu > 0.0 { Barrier::Monotone } else { options.barrier };
+        Self {
+            over,
+            lengths,
+            mu: options.first_mu(lengths.sizes.force),
+            progress: Progress::new(barrier),
+            filter: Filter::new(MARGIN, f64::INFINITY),
+            small_violation: f64::INFINITY,
+            first_violation: f64::INFINITY,
+            regularisation: Regularisation::default(),
+            delta: 0.0,
+            elastic: None,
+            phase: Phase::default(),
+            violation: f64::INFINITY,
+            gaps: f64::INFINITY,
+            best_violation: f64::INFINITY,
+            first_objective: 0.0,
+            stationary_violation: f64::INFINITY,
+            acceptable: 0,
+            held: 0,
+            released: false,
+            has_slacks: false,
+            is_linearised,
+            has_filter: false,
+            error: f64::INFINITY,
+            best_residual: f64::INFINITY,
+            best_iteration: Iteration::default(),
+        }
+    }
+
     /// The next barrier parameter, from residuals and with a unit of products in which errors are
     /// relative; another one has another filter.
     pub fn update_barrier<T: Real>(

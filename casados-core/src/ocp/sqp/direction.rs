@@ -32,8 +32,9 @@ const DIGITS: f64 = 1e-13;
 const STAYS: f64 = 1.0 - 1e-3;
 /// Gaps are closed that are no more than this part of the violations of bounds.
 const CLOSED: f64 = 1e-2;
-/// The curvature that keeps a point near the iterate, as a part of the penalty.
-const FLAT: f64 = 2e-5;
+/// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
+/// penalty; then those of an easier QP.
+const FLAT: [(f64, f64); 2] = [(2e-5, DIGITS), (2e-3, 1e-9)];
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -91,14 +92,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        (state.nearest, state.residual) = (false, row.residuals.largest());
+        (state.nearest, state.rewritten) = (false, false);
+        state.residual = row.residuals.largest();
         self.scale(ocp, state, Way::Into);
         if state.sizes.is_some() {
             state.residual = ocp.residuals().0.largest();
         }
         let mut direction = self.direction_in_units(ocp, state, row);
         self.scale(ocp, state, Way::Back);
-        if state.nearest {
+        if state.nearest || state.rewritten {
             self.linearise(ocp)?;
         }
         if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
@@ -154,31 +156,34 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
         let most = MOST_ELASTIC * self.options.elastic_penalty;
-        let mut stays = true;
-        while stays && penalty < most {
+        let mut solved = true;
+        while solved && penalty < most {
             penalty *= GROWTH;
             self.set_elastic(ocp, state, penalty);
             // Forces are as large as penalties, and have as many digits.
             self.qp_solver.relax(DIGITS * penalty);
-            stays = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
-            if stays && self.violation_of_solution(ocp) < STAYS * before {
+            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
+            if solved && self.violation_of_solution(ocp) < STAYS * before {
                 // It is, and from now on it does.
                 state.penalty = penalty;
                 return Ok(Direction::Step);
             }
         }
-        // The Hessian may, too: nearly a linear program is what tells where gaps are closed.
-        if stays && gaps <= CLOSED * bounds {
-            if self.nearest(ocp, state, row, before).is_err() {
-                return Err(error);
-            }
-            if self.violation_of_solution(ocp) >= STAYS * before {
+        // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
+        // gaps are closed.
+        if gaps <= CLOSED * bounds {
+            let is_near = self.nearest(ocp, state, row, before).is_ok();
+            if is_near && self.violation_of_solution(ocp) >= STAYS * before {
                 return Ok(Direction::Infeasible(worst));
             }
-            return Ok(Self::go_near(state, row));
+            if solved {
+                return if is_near { Ok(Self::go_near(state, row)) } else { Err(error) };
+            }
+            // The QP has another objective now, and is to be written again.
+            state.rewritten = true;
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if stays && gaps <= bounds {
+        if solved && gaps <= bounds {
             return Ok(Direction::Infeasible(worst));
         }
         state.penalty = 0.0;
@@ -212,9 +217,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
         self.set_elastic(ocp, state, penalty);
-        ocp.forget_objective(T::from_f64(FLAT * penalty / violation));
-        self.qp_solver.relax(DIGITS * penalty);
-        let result = self.solve_qp(ocp, QpStart::Cold, row);
+        let mut result = Ok(());
+        for (flat, digits) in FLAT {
+            self.qp_solver.relax(digits * penalty);
+            ocp.forget_objective(T::from_f64(flat * penalty / violation));
+            result = self.solve_qp(ocp, QpStart::Cold, row);
+            if result.is_ok() {
+                break;
+            }
+        }
         self.set_elastic(ocp, state, alone);
         result
     }

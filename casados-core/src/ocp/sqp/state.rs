@@ -23,6 +23,8 @@ pub(super) struct State<T> {
     pub failed: f64,
     /// Whether the last direction was that of the violations alone.
     pub nearest: bool,
+    /// Whether the QP that the last direction comes from was overwritten.
+    pub rewritten: bool,
     /// Steps with penalties in a row.
     pub elastic_steps: usize,
     /// The penalty that violations were found to need; zero at first.
@@ -68,6 +70,7 @@ impl<T> State<T> {
             failed: 0.0,
             passing: false,
             nearest: false,
+            rewritten: false,
             penalty: 0.0,
             elastic_steps: 0,
             best_residual: f64::INFINITY,

@@ -1,0 +1,65 @@
+//! How a run may end, from residuals of an iterate.
+
+use super::lengths::Lengths;
+use super::state::State;
+use super::work::Work;
+use super::{Ipm, elastic, feasibility};
+use crate::ocp::instance::Ocp;
+use crate::ocp::log::Iteration;
+use crate::ocp::outcome::Status;
+use crate::ocp::problem::Formulation;
+use crate::qp::{StageDims, Store};
+use crate::scalar::Real;
+
+/// Variables that are larger have no end.
+const UNBOUNDED: f64 = 1e12;
+/// What follows the residuals of an iteration.
+pub(super) enum Next {
+    /// A search direction.
+    Direction,
+    /// Another iteration: bounds have other penalties.
+    NewPenalties,
+    /// The end of the run.
+    End(Status),
+}
+
+impl<T, D, M, I> Ipm<T, D, M, I>
+where
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
+    I: Store<u32>,
+{
+    /// What follows the residuals of an iteration.
+    pub(super) fn next<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        row: &Iteration,
+    ) -> Next {
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        if state.lengths.alone {
+            let next = feasibility::judge(ocp, state, work.penalties, &self.options);
+            if let Some(next) = next {
+                return next;
+            }
+        } else if state.error <= self.options.tolerance {
+            let cost = row.objective - ocp.objective.to_f64();
+            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
+            return end.map_or(Next::NewPenalties, Next::End);
+        }
+        if state.acceptable >= self.options.acceptable_iterations.max(1) {
+            return Next::End(Status::Acceptable);
+        }
+        let is_feasible = row.residuals.dynamics.max(row.residuals.inequalities) <= self.options.tolerance;
+        let (v, _) = ocp.iterate.vectors();
+        if is_feasible && state.elastic.is_none() && v.iter().any(|v| v.abs().to_f64() > UNBOUNDED) {
+            return Next::End(Status::Unbounded);
+        }
+        if row.iteration >= self.options.max_iterations {
+            return Next::End(Status::MaxIterations);
+        }
+        Next::Direction
+    }
+}
