@@ -79,12 +79,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The largest violation of a bound that is hard, by the penalties that are remembered, and the
-    /// sum of all of them.
-    pub(super) fn worst(&self, memory: &[T]) -> (Option<Worst>, f64) {
+    /// The largest violation, in units if there are any, of a bound that is hard, by the penalties
+    /// that are remembered, and the sum of all of them as they are.
+    pub(super) fn worst(&self, memory: &[T], units: &[T]) -> (Option<Worst>, f64) {
         let mut pairs = memory.as_chunks().0.iter();
         let fixed = self.initial == Initial::Fixed;
-        worst(self.qp(), self.iterate.vectors().0, |place, row| {
+        worst(self.qp(), self.iterate.vectors().0, units, |place, row| {
             let given = pairs.next().copied().unwrap_or([T::ZERO; 2]);
             if fixed && place.stage == 0 && row < place.nx { [T::ZERO; 2] } else { given }
         })

@@ -22,15 +22,17 @@ impl From<Violation> for QpError {
     }
 }
 
-/// The hard bound that a point `v` violates most, and the sum of all such violations. Bounds are
-/// hard whose linear penalties are infinite: those of lower and upper bounds of states, controls
-/// and general constraints, stage by stage, as `penalties` has them.
+/// The hard bound that a point `v` violates most, in units if there are any, and the sum of all
+/// such violations as they are. Bounds are hard whose linear penalties are infinite: those of lower
+/// and upper bounds of states, controls and general constraints, stage by stage, as `penalties` has
+/// them.
 pub(crate) fn worst<T: Real>(
     qp: QpView<'_, T>,
     v: &[T],
+    units: &[T],
     mut penalties: impl FnMut(&Place, usize) -> [T; 2],
 ) -> (Option<Violation>, f64) {
-    let (mut worst, mut sum): (Option<Violation>, f64) = (None, 0.0);
+    let (mut worst, mut most, mut sum): (Option<Violation>, f64, f64) = (None, 0.0, 0.0);
     for place in Places::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let v = part(v, place.v, place.ld);
@@ -49,7 +51,10 @@ pub(crate) fn worst<T: Real>(
                     continue;
                 }
                 sum += violation;
-                if violation > worst.map_or(0.0, |worst| worst.violation) {
+                let unit = units.get(place.row + row).filter(|&&unit| unit > T::ZERO);
+                let unit = unit.map_or(1.0, |unit| unit.to_f64());
+                if violation > most * unit {
+                    most = violation / unit;
                     let (field, index) = place.name(row);
                     worst = Some(Violation { field, stage: place.stage, index, side, violation });
                 }

@@ -18,13 +18,13 @@ const STAYS: f64 = 0.9;
 /// The barrier parameter of new penalties, in units of forces.
 const BARRIER: f64 = 0.1;
 
-/// The hard bound that is violated most while penalties stand for it.
+/// The hard bound that is violated most, in units, while penalties stand for it.
 pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
     state: &State<'_>,
-    given: &[T],
+    (given, units): (&[T], &[T]),
 ) -> Option<Worst> {
-    state.elastic.and_then(|_| ocp.worst(given).0)
+    state.elastic.and_then(|_| ocp.worst(given, units).0)
 }
 
 /// The end of a run at a stationary point, where violations cost so much; nothing where penalties
@@ -38,7 +38,7 @@ pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRe
     cost: f64,
     options: &IpmOptions,
 ) -> Option<Status> {
-    let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
+    let worst = worst(ocp, state, (given, units)).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
     let stays = worst.violation > STAYS * state.stationary_violation
         && cost >= (ocp.objective.to_f64() - state.first_objective).abs();

@@ -14,101 +14,25 @@ use super::elastic::{self, soften};
 use super::lengths::Lengths;
 use super::state::State;
 use super::verdict::Next;
+use super::violations::{PHASES, SMALL};
 use super::work::Work;
 use super::{Ipm, IpmOptions};
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::instance::Ocp;
 use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
-use crate::ocp::units::Units;
 use crate::qp::element::set;
-use crate::qp::interior::{Iterate, Sides, at};
+use crate::qp::interior::{Sides, at};
 use crate::qp::{Places, StageDims, Store, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
 /// of the objective is small.
 const FORCE: f64 = 1e3;
-/// Violations and gaps, in units, that are no more than this are none from which a run cannot go
-/// on.
-const SMALL: f64 = 1e-4;
 /// Where violations are no more than this, a run begins with a monotone barrier parameter first.
 const FAR_OFF: f64 = 1e-2;
-/// Violations are there to stay where no step makes more than this part of them less, to first
-/// order.
-const STAYS: f64 = 1e-4;
-/// What is left of the dynamics by then, as a part of the violations.
-const EXACT: f64 = 1e-5;
 /// A simulation is not far away if states move by no more than this times the gaps.
 const FAR: f64 = 100.0;
-/// So many phases there may be in a run.
-const PHASES: usize = 4;
-
-/// What there is at an iterate, in units.
-#[derive(Clone, Copy, Debug, Default)]
-struct Violations {
-    /// Of hard bounds, which are soft in the phase.
-    sum: f64,
-    /// By how much a point may be better that is no farther away than variables are large, to first
-    /// order: products of slacks and multipliers, of residuals and multipliers, of the gradient and
-    /// variables.
-    better: f64,
-    gaps: f64,
-}
-
-/// What is remembered of phases.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Phase {
-    /// The unit of forces of the problem, while there is a phase.
-    pub force: Option<f64>,
-    /// How many there were.
-    count: usize,
-    /// What there is in the phase.
-    violations: Violations,
-}
-
-impl Phase {
-    /// Whether another phase may help.
-    pub fn may_begin(&self) -> bool {
-        self.force.is_none() && self.count < PHASES
-    }
-
-    /// Takes what there is at an iterate with multipliers `π` of the dynamics.
-    pub fn take<T: Real>(&mut self, iterate: &Iterate<'_, T>, pi: &[T], gaps: f64, units: Units<'_, T>) {
-        let sides = &iterate.sides;
-        let product = |sum: f64, (&a, &b): (&T, &T)| sum + (a * b).abs().to_f64();
-        let slacks = sides.slack.iter().zip(&*sides.multiplier).fold(0.0, product);
-        let of_sides = sides.residual.iter().zip(&*sides.multiplier).fold(slacks, product);
-        let of_rows = sides.equation_residual.iter().zip(&*sides.free).fold(of_sides, product);
-        let mut better = Places::<T>::new(iterate.qp.dims).fold(of_rows, |sum, place| {
-            let gaps = part(iterate.dynamics, place.dynamics, place.next);
-            gaps.iter().zip(part(pi, place.dynamics, place.next)).fold(sum, product)
-        });
-        for ((&g, &v), &unit) in iterate.stationarity.iter().zip(&*iterate.v).zip(units.rows) {
-            better += (g * (v.abs() + unit)).abs().to_f64();
-        }
-        let violations = sides.slack.get(sides.counts.sides()..).unwrap_or_default();
-        let mut sum = 0.0;
-        for ((&side, &violation), &linear) in sides.soft.iter().zip(violations).zip(&*sides.linear) {
-            sum += (linear * (violation - at(sides.slack, side)).max(T::ZERO)).to_f64();
-        }
-        let force = units.sizes.force;
-        self.violations = Violations { sum: sum / force, better: better / force, gaps };
-    }
-}
-
-impl Violations {
-    /// Whether a run may go on.
-    fn are_small(&self) -> bool {
-        self.sum <= SMALL && self.gaps <= SMALL
-    }
-
-    /// Whether they are stationary.
-    fn stay(&self) -> bool {
-        let Self { sum, better, gaps } = *self;
-        sum > SMALL && better <= STAYS * sum && gaps <= EXACT * sum
-    }
-}
 
 impl<T, D, M, I> Ipm<T, D, M, I>
 where
@@ -235,12 +159,12 @@ fn leave<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 pub(super) fn judge<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
-    penalties: &[T],
+    (penalties, units): (&[T], &[T]),
     options: &IpmOptions,
 ) -> Option<Next> {
     let violations = state.phase.violations;
     if violations.stay()
-        && let Some(worst) = elastic::worst(ocp, state, penalties)
+        && let Some(worst) = elastic::worst(ocp, state, (penalties, units))
     {
         return Some(Next::End(ocp.status_of_worst(&worst)));
     }

@@ -183,7 +183,8 @@ where
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
+        let worst = elastic::worst(ocp, state, (work.penalties, work.units));
+        let violation = worst.map_or(0.0, |worst| worst.violation);
         let size = state.error.max(violation);
         if !is_alone && size < state.best_residual || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);

@@ -12,7 +12,7 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
-//! | `feasibility` | violations alone where no step makes progress, and that they stay |
+//! | `feasibility`, `violations` | violations alone where no step makes progress, and that they stay |
 //! | `elastic` | penalties where that does not help |
 //! | `verdict` | how a run may end |
 //! | `lifted` | stages that are variables go with the iterate |
@@ -42,6 +42,7 @@ mod scaling;
 mod start;
 mod state;
 mod verdict;
+mod violations;
 mod work;
 
 pub use barrier::Barrier;

@@ -3,8 +3,8 @@
 use super::IpmOptions;
 use super::barrier::{self, Barrier, Progress};
 use super::direction::Regularisation;
-use super::feasibility::Phase;
 use super::lengths::Lengths;
+use super::violations::Phase;
 use crate::ocp::filter::Filter;
 use crate::ocp::log::Iteration;
 use crate::qp::Residuals;

@@ -40,7 +40,7 @@ where
     ) -> Next {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         if state.lengths.alone {
-            let next = feasibility::judge(ocp, state, work.penalties, &self.options);
+            let next = feasibility::judge(ocp, state, (work.penalties, work.units), &self.options);
             if let Some(next) = next {
                 return next;
             }

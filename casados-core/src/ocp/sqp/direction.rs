@@ -137,7 +137,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.relax(DIGITS * penalty);
         row.elastic = true;
-        let (worst, bounds) = ocp.worst(self.penalties(ocp));
+        let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
         let gaps = ocp.gaps();
         let before = bounds + gaps;
         if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
@@ -233,7 +233,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// The sum of violations that the solution of the QP leaves, by its linearisation.
     fn violation_of_solution<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
-        let (_, sum) = ocp.worst(self.penalties(ocp));
+        let (_, sum) = ocp.worst(self.penalties(ocp), &[]);
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
         sum
     }

@@ -261,7 +261,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
                 let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
                 if let (_, true) = self.run(qp, soft, over, solution)
                     && let (Some(worst), _) =
-                        violation::worst(qp, solution.v, |place, row| linear_penalties(qp, place, row))
+                        violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row))
                     && worst.violation > self.options.tolerance
                 {
                     return Err(worst.into());
