@@ -132,6 +132,23 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !(may_help && self.options.elastic) {
             return Err(error);
         }
+        self.elastic_direction(ocp, state, row, error)
+    }
+
+    /// The step where bounds have penalties, since the QP had no solution; or that violations stay.
+    ///
+    /// # Errors
+    /// The error of the QP with hard bounds, where that with penalties has no solution either.
+    fn elastic_direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+        error: QpError,
+    ) -> Result<Direction, QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
