@@ -7,15 +7,13 @@
 
 #[path = "../models/awe.rs"]
 mod awe;
-#[path = "../../tests/data/mod.rs"]
-mod data;
 
 use awe::Awe;
 use awe::awe::{LENGTH, State, TETHER_SCALE, power};
 use casados::plot::{Figure, Panel, Space};
 use casados::prelude::*;
 use casados::result::Hessian;
-use data::Record;
+use reference_data::Record;
 use nalgebra::{SMatrix, SVector};
 use std::error::Error;
 use std::path::{Path, PathBuf};

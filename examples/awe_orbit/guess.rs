@@ -1,7 +1,7 @@
 //! Guesses of the orbit, from the data of the tests.
 
 use super::problem::INTERVALS;
-use crate::data::Record;
+use reference_data::Record;
 use std::error::Error;
 
 /// States at all nodes and controls of all intervals of a guess.

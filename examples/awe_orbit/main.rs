@@ -17,8 +17,6 @@
 #[path = "../models/awe.rs"]
 mod awe;
 mod conditions;
-#[path = "../../tests/data/mod.rs"]
-mod data;
 mod guess;
 mod pictures;
 mod problem;
@@ -30,7 +28,7 @@ use casados::ocp::{
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use conditions::Conditions;
-use data::Record;
+use reference_data::Record;
 use guess::guess;
 use pictures::Picture;
 use std::error::Error;

@@ -10,14 +10,12 @@
 mod chain;
 #[path = "../models/chain_problem.rs"]
 mod chain_problem;
-#[path = "../../tests/data/mod.rs"]
-mod data;
 
 use casados::ocp::{HeapSqp, Outcome, Shooting};
 use casados::plot::{Curve, Figure, Panel};
 use casados::prelude::*;
 use chain::Chain;
-use data::Record;
+use reference_data::Record;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -10,8 +10,6 @@
 mod chain;
 #[path = "../models/chain_problem.rs"]
 mod chain_problem;
-#[path = "../../tests/data/mod.rs"]
-mod data;
 #[path = "../models/pendulum.rs"]
 mod pendulum;
 
@@ -19,7 +17,7 @@ use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Problem, Sh
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use chain::Chain;
-use data::Record;
+use reference_data::Record;
 use nalgebra::{SVector, Vector1, Vector3, Vector4, vector};
 use pendulum::Pendulum;
 use std::error::Error;

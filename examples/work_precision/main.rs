@@ -9,8 +9,6 @@
 //! and written between the marks `<!-- work_precision -->` and `<!-- end -->` of FILE; then all
 //! runs are printed; plots are drawn in FOLDER (`plots/work_precision`).
 
-#[path = "../../tests/data/mod.rs"]
-mod data;
 #[path = "../models/ivp/mod.rs"]
 mod models;
 mod peers;

@@ -2,7 +2,7 @@
 //! `benches/`, which is built when it is first asked for, and CVODES and IDAS by Python with
 //! CasADi.
 
-use super::data::Record;
+use reference_data::Record;
 use super::problems::Problem;
 use super::record::Run;
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! The problems, and the methods of this library on them.
 
-use super::data::Record;
+use reference_data::Record;
 use super::models::chemistry::{AkzoNobel, E5Conserved, Hires, Oregonator, Robertson};
 use super::models::circuits::{RingModulator, TransistorAmplifier};
 use super::models::mechanics::{Pleiades, Squeezer};

@@ -1,6 +1,6 @@
 //! What was measured of one run, and what is best among many.
 
-use super::data::Record;
+use reference_data::Record;
 use super::problems::Problem;
 
 /// One solver at one accuracy.

@@ -230,7 +230,6 @@ fn times() -> Test {
 }
 
 /// However many threads there are, results are the same to the last bit.
-#[cfg(feature = "parallel")]
 #[test]
 fn t34_threads() -> Test {
     for count in COUNTS {

@@ -229,7 +229,6 @@ fn statistics() -> Test {
 }
 
 /// However many threads there are, results are the same to the last bit.
-#[cfg(feature = "parallel")]
 #[test]
 fn threads() -> Test {
     let horizon = quadrotor(40);

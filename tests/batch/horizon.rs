@@ -1,6 +1,6 @@
 //! Horizons of the example models, and every call of a batch against single calls.
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;

@@ -1,7 +1,5 @@
 //! Many intervals in one call.
 
-#[path = "../data/mod.rs"]
-mod data;
 #[allow(dead_code)] // Each program takes a part.
 #[path = "../../examples/models"]
 mod models {

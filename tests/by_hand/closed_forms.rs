@@ -165,7 +165,6 @@ fn integrators_can_move_to_other_threads() {
 }
 
 /// What the models of these tests say about themselves is true.
-#[cfg(feature = "testing")]
 #[test]
 fn patterns_and_facts() {
     use casados_core::testing::{Points, check_pattern};

@@ -6,7 +6,6 @@ mod models;
 mod closed_forms;
 mod derivatives;
 mod errors;
-#[cfg(feature = "casadi")]
 mod external;
 mod pendulum;
 mod pendulum_reference;

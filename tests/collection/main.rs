@@ -2,8 +2,6 @@
 //! minima and its iterations (`tests/data/ocp/collection.json`), and what is said of problems that
 //! have no solution.
 
-#[path = "../data/mod.rs"]
-mod data;
 
 mod astray;
 mod climb;
@@ -17,7 +15,7 @@ mod units;
 
 use casados::ocp::{Exact, Formulation, HeapOcp, HeapSqp, Iteration, Outcome, Part, SecondOrder, Status};
 use casados::qp::{Side, residuals};
-use data::Record;
+use reference_data::Record;
 
 type Test = Result<(), Box<dyn std::error::Error>>;
 

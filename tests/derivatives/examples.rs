@@ -1,7 +1,7 @@
 //! The example models: their derivative code three ways.
 
 use crate::check;
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;

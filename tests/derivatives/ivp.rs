@@ -4,7 +4,7 @@
 use casados::testing::{Points, check_derivatives, check_pattern};
 use casados::{Dae, GraphDae};
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::ivp::chemistry::{
     AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved,
 };

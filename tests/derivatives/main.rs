@@ -6,8 +6,6 @@ use casados::GraphDae;
 use casados::testing::{Points, Report, check_derivatives, check_pattern};
 use std::path::Path;
 
-#[path = "../data/mod.rs"]
-mod data;
 #[allow(clippy::all, dead_code, unused_parens, unused_variables)]
 #[path = "../generated/models.rs"]
 mod generated;
@@ -28,7 +26,7 @@ mod ivp;
 /// The file of random models is what the generator writes, and it covers the language.
 #[test]
 fn generated_file_is_up_to_date() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/generated/models.rs");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("generated/models.rs");
     let text = generator::file();
     if std::env::var_os("CASADOS_WRITE").is_some() {
         std::fs::write(&path, &text).expect("tests/generated can be written");

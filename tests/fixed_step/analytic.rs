@@ -116,7 +116,7 @@ struct Problem {
 }
 
 fn problem(name: &str) -> Problem {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/analytic/analytic.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/analytic/analytic.json");
     let text = std::fs::read_to_string(path).expect("the collection is there");
     let all: Value = serde_json::from_str(&text).expect("the collection is JSON");
     let all = all.as_array().expect("the collection is a list");

@@ -1,7 +1,7 @@
 //! Explicit integrators against reference values of an independent code: pendulum and chains, RK4,
 //! one step.
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::{Erk, Options, Rk4};

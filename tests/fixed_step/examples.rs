@@ -1,6 +1,6 @@
 //! The example models: the identities of their sensitivities.
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::interval::{check, options};
 use crate::models::awe::Awe;
 use crate::models::chain::Chain;

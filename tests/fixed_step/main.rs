@@ -1,8 +1,6 @@
 //! Integrators with steps of one size: against closed forms, independent implementations and
 //! differences.
 
-#[path = "../data/mod.rs"]
-mod data;
 #[path = "../interval/mod.rs"]
 mod interval;
 #[allow(dead_code)]

@@ -14,7 +14,7 @@ use casados::{
 };
 use nalgebra::SVector;
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::ivp::chemistry::{
     AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved,
 };

@@ -1,7 +1,5 @@
 //! The set of initial value problems: errors at the ends, and derivatives.
 
-#[path = "../data/mod.rs"]
-mod data;
 #[path = "../../examples/models"]
 mod models {
     pub mod ivp;

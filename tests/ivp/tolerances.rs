@@ -5,7 +5,7 @@
 //! are allowed, or where SciPy's `Radau` is off by more, no more than that. Stiff components:
 //! `tests/ivp/vibrations.rs`.
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::ivp::mechanics::Pleiades;
 use crate::models::ivp::vibrations::{ExplicitBeam, Kepler, RodPendulum, SpringPendulum};
 use casados::{

@@ -6,7 +6,7 @@
 //! its tolerance.
 
 use super::tolerances::tell;
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::ivp::vibrations::{Beam, Modes, Rope, SpringPendulum, Turning};
 use casados::{Adaptive, AdaptiveOptions, Radau};
 use nalgebra::SVector;

@@ -4,7 +4,7 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use crate::data::Record;
+use reference_data::Record;
 use casados::__private::Scalar;
 use casados::ocp::{Convexification, Exact, Globalisation, HeapSqp, Shooting};
 use casados::prelude::*;
@@ -101,7 +101,6 @@ fn explicit_methods_side_by_side() -> Test {
 /// A solver of QPs whose own tolerances are relative, and larger than what is asked for: it is told
 /// what is needed.
 #[test]
-#[cfg(feature = "clarabel")]
 fn clarabel_is_as_accurate_as_needed() -> Test {
     let record = Record::load("ocp/chain_6.json")?;
     let mut ocp = problem!(27, &record, batch!(27, 2, 2));

@@ -3,7 +3,7 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use crate::data::Record;
+use reference_data::Record;
 use casados::ocp::{
     Collocation, Constraint, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon,
     LeastSquaresCost, Problem, SecondOrder,

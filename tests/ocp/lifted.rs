@@ -4,7 +4,7 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use crate::data::Record;
+use reference_data::Record;
 use casados::model::{VectorU, VectorX};
 use casados::ocp::{HeapSqp, Shooting};
 use casados::prelude::*;

@@ -6,8 +6,6 @@
 mod chain_model;
 #[path = "../../examples/models/chain_problem.rs"]
 mod chain_problem;
-#[path = "../data/mod.rs"]
-mod data;
 #[path = "../runs/mod.rs"]
 mod runs;
 

@@ -192,7 +192,6 @@ fn restored() -> Test {
     Ok(())
 }
 
-#[cfg(feature = "serde")]
 #[test]
 fn saved_and_read() -> Test {
     let mut ocp = solved()?;

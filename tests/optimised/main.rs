@@ -1,8 +1,6 @@
 //! What optimised programs have to show as well: agreement with the references, where loops are
 //! unrolled, and a million steps. `cargo test --release --test optimised`.
 
-#[path = "../data/mod.rs"]
-mod data;
 #[allow(dead_code)] // Each program takes a part.
 #[path = "../../examples/models"]
 mod models {

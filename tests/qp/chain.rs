@@ -1,7 +1,7 @@
 //! The QPs of the chain of masses.
 
 use crate::Test;
-use crate::data::Record;
+use reference_data::Record;
 use casados::Real;
 use casados::qp::{
     BlockMut, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims, residuals,
@@ -238,7 +238,6 @@ fn relative_tolerances() -> Test {
 }
 
 /// Clarabel, which shares nothing with the other solver, and the interface to it.
-#[cfg(feature = "clarabel")]
 #[test]
 fn clarabel_agrees() -> Test {
     let chain = Chain::load(3)?;

@@ -2,7 +2,6 @@
 //! deadlines, and who refuses.
 
 use crate::{Test, solve_to};
-#[cfg(feature = "clarabel")]
 use casados::qp::Clarabel;
 use casados::qp::{
     Condensing, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, QpError, QpSolver, QpStart, StageDims,
@@ -69,7 +68,6 @@ fn problem(seed: u64, stages: usize) -> Result<HeapQp<f64>, QpError> {
 /// Both find the same minimum. Products of slacks and multipliers of 1e-9, of at most 200 sides,
 /// leave 2e-7 of the objective.
 #[test]
-#[cfg(feature = "clarabel")]
 fn same_minimum_as_clarabel() -> Test {
     for seed in 0..120 {
         let qp = problem(seed, 3 + seed as usize % 11)?;

@@ -192,7 +192,6 @@ fn options() -> Test {
 }
 
 /// Settings of clarabel are checked and count in every call; those of the call before do not.
-#[cfg(feature = "clarabel")]
 #[test]
 fn clarabel_settings() -> Test {
     use casados::qp::Clarabel;

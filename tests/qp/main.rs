@@ -2,8 +2,6 @@
 //! mistakes, and random ones against clarabel. Every solution is judged by `residuals`, which is
 //! written from the definition of the problem.
 
-#[path = "../data/mod.rs"]
-mod data;
 #[path = "../runs/mod.rs"]
 mod runs;
 
@@ -14,7 +12,6 @@ mod coupling;
 mod errors;
 mod hard;
 mod known;
-#[cfg(feature = "clarabel")]
 mod random;
 mod unstable;
 

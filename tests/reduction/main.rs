@@ -3,8 +3,6 @@
 mod car_axis;
 mod circuit;
 mod consistent;
-#[path = "../data/mod.rs"]
-mod data;
 mod divided;
 mod double_pendulum;
 mod everywhere;

@@ -1,7 +1,7 @@
 //! Andrews' squeezing mechanism from its constraints, of index 3, against the reference of the test
 //! set.
 
-use crate::data::Record;
+use reference_data::Record;
 use bytemuck::Zeroable;
 use casados::__private::function::ArrayV;
 use casados::prelude::*;

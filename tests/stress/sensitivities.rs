@@ -1,7 +1,7 @@
 //! Derivatives: identities, independent ways to the same numbers, what cancels, and what an
 //! iteration that stops early leaves.
 
-use super::data::Record;
+use reference_data::Record;
 use super::everything::Everything;
 use crate::models::chemistry::{AkzoNobel, Robertson};
 use crate::models::oscillators::VanDerPol;

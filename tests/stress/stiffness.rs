@@ -1,6 +1,6 @@
 //! Stiffness up to 1e12, and small numbers beside large ones.
 
-use super::data::Record;
+use reference_data::Record;
 use super::pollution::{self, Pollution};
 use crate::models::chemistry::{E5Conserved, Hires, Oregonator, Robertson};
 use crate::models::oscillators::VanDerPolScaled;

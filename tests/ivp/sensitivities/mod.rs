@@ -11,7 +11,7 @@ use casados::{
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use crate::data::Record;
+use reference_data::Record;
 use crate::models::ivp::chemistry::{AkzoNobel, Oregonator, Robertson};
 use crate::models::ivp::oscillators::{VanDerPol, VanDerPolScaled};
 

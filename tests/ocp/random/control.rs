@@ -7,15 +7,10 @@ use casados::ocp::{Formulation, HeapOcp, HeapRealTime, OcpError};
 use casados::qp::{QpError, QpView, residuals};
 
 /// Whether clarabel finds a solution, too.
-#[cfg(feature = "clarabel")]
 fn is_solved_by_clarabel(qp: QpView<'_, f64>) -> Result<bool, QpError> {
     use casados::qp::{Clarabel, HeapSolution, QpSolver, QpStart};
     let mut solution = HeapSolution::new(qp.dims())?;
     Ok(Clarabel::new().solve(qp, QpStart::Cold, solution.view_mut()).is_ok())
-}
-#[cfg(not(feature = "clarabel"))]
-fn is_solved_by_clarabel(_: QpView<'_, f64>) -> Result<bool, QpError> {
-    Ok(false)
 }
 
 /// Some samples of a controller, of states near the start and far from it, beside another one that

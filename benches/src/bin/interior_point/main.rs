@@ -15,8 +15,6 @@
 mod awe;
 #[path = "../../../../examples/models/chain_problem.rs"]
 mod chain_problem;
-#[path = "../../../../tests/data/mod.rs"]
-mod data;
 #[path = "../../../../examples/awe_orbit/guess.rs"]
 mod guess;
 #[path = "../../../../examples/awe_orbit/problem.rs"]
@@ -33,7 +31,7 @@ use casados_benches::peer::Peer;
 use casados_benches::record::{insert, load, numbers};
 use casados_benches::time::pin;
 use cpu_time::ThreadTime;
-use data::Record;
+use reference_data::Record;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;

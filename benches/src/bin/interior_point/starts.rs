@@ -3,7 +3,7 @@
 use super::{Failure, Guess, OPTIONS, Runner, guess, median, problem, rest, runner};
 use super::{chain, chain_batch, chain_collocation, chain_problem, chain_request};
 use crate::awe::Awe;
-use crate::data::Record;
+use reference_data::Record;
 use casados::ocp::{Collocation, Shooting};
 use casados::prelude::*;
 use casados_benches::models::Chain;

@@ -3,8 +3,6 @@
 //! The parser may be off by one unit in the last place of a double, which is far below every
 //! tolerance.
 
-#![allow(dead_code)] // Each program that includes it takes a part.
-
 use nalgebra::{SMatrix, SVector};
 use serde_json::Value;
 use std::path::Path;
@@ -21,7 +19,7 @@ impl From<Value> for Record {
 impl Record {
     /// Reads a file of `tests/data`.
     pub fn load(name: &str) -> Result<Self, String> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name);
         let text =
             std::fs::read_to_string(&path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
         let value = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
