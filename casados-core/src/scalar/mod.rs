@@ -170,7 +170,11 @@ pub trait Scalar: Field {
     fn together<F: elementary::Elementary<K, R>, const K: usize, const R: usize, const N: usize>(
         a: [[Self; K]; N],
     ) -> [[Self; R]; N] {
-        a.map(F::of)
+        let mut results = [[Self::from_f64(0.0); R]; N];
+        each!(n < N => {
+            results[n] = F::of(a[n]);
+        });
+        results
     }
     /// What real parts lead to, each lane by itself: constants, as their derivatives are zero
     /// wherever they exist.

@@ -91,27 +91,27 @@ macro_rules! widest_register {
 }
 pub(crate) use widest_register;
 
-/// Runs a computation on slices in a function that is compiled for the registers.
+/// Runs a computation on slices in a function that is compiled for the registers. These functions
+/// are long: each number type has them for the registers that pay (record 0089).
 macro_rules! packed_registers {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline]
         fn registers<C: crate::scalar::Registers<Self>>(computation: C) {
             use crate::scalar::Scalar;
-            use crate::scalar::lanes::{Inside, Level, level, $base};
-            match level() {
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx512 => {
-                    use crate::scalar::lanes::$avx512 as Register;
-                    Register::<$most>::vectorize(Inside::<Register<$most>, _, Self>::new(computation));
-                }
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx2 => {
-                    use crate::scalar::lanes::$avx2 as Register;
-                    Register::<$more>::vectorize(Inside::<Register<$more>, _, Self>::new(computation));
-                }
-                Level::Single => computation.run::<Self>(),
-                _ => $base::<$few>::vectorize(Inside::<$base<$few>, _, Self>::new(computation)),
+            use crate::scalar::lanes::{self, Inside};
+            // Registers of sixteen numbers are no faster than those of eight.
+            #[cfg(target_arch = "x86_64")]
+            if const { $most <= 8 } && lanes::level() == lanes::Level::Avx512 {
+                type Register = lanes::$avx512<$most>;
+                return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
+            #[cfg(target_arch = "x86_64")]
+            if lanes::level() >= lanes::Level::Avx2 {
+                type Register = lanes::$avx2<$more>;
+                return Register::vectorize(Inside::<Register, _, Self>::new(computation));
+            }
+            type Register = lanes::$base<$few>;
+            Register::vectorize(Inside::<Register, _, Self>::new(computation));
         }
     };
 }

@@ -8,7 +8,7 @@ use core::marker::PhantomData;
 /// The first and the last arguments of two functions, and of four.
 macro_rules! ends {
     ($name:ident, $ops:ident, $a:ident: $($index:literal)*) => {
-        [$($a[$index][0], $a[$index][K - 1]),*].map(|a| whole!($name, $ops, a))
+        [$(whole!($name, $ops, $a[$index][0]), whole!($name, $ops, $a[$index][K - 1])),*]
     };
 }
 
@@ -16,9 +16,11 @@ macro_rules! ends {
 macro_rules! results {
     ($results:expr) => {{
         let (found, mut results) = ($results, [[Self::splat(0.0); R]; COUNT]);
-        for (to, from) in results.as_flattened_mut().iter_mut().zip(found.as_flattened()) {
-            *to = Self(from.0);
-        }
+        each!(n < COUNT => {
+            each!(r < R => {
+                results[n][r] = Self(found[n][r].0);
+            });
+        });
         results
     }};
 }
@@ -42,12 +44,15 @@ macro_rules! abreast {
                 // All of them would not fit sixteen registers.
                 let first = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1));
                 let second = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 2 3));
-                let all = [first, second];
-                results!(all.as_flattened())
+                results!([first[0], first[1], second[0], second[1]])
             } else if const { COUNT == 2 } {
                 results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1)))
             } else {
-                $a.map(F::of)
+                let mut results = [[Self::splat(0.0); R]; COUNT];
+                each!(n < COUNT => {
+                    results[n] = F::of($a[n]);
+                });
+                results
             }
         }
     };
@@ -68,14 +73,15 @@ macro_rules! of_fours {
             const { 2 * N <= $ops::WIDTH && COUNT % 2 == 0 } => {
                 let mut results = [[Self($ops::splat(0.0)); R]; COUNT];
                 for k in (0..COUNT - 1).step_by(2) {
-                    let mut joined = a[k].map(|a| whole!($name, $ops, a));
-                    for (joined, other) in joined.iter_mut().zip(a[k + 1]) {
-                        *joined = $name($ops::low_halves(joined.0, other.0));
-                    }
-                    for (r, joined) in F::of(joined).iter().enumerate() {
-                        results[k][r] = Self($ops::low_halves(joined.0, joined.0));
-                        results[k + 1][r] = Self($ops::high_halves(joined.0, joined.0));
-                    }
+                    let mut joined = [whole!($name, $ops, a[k][0]); K];
+                    each!(j < K => {
+                        joined[j] = $name($ops::low_halves(a[k][j].0, a[k + 1][j].0));
+                    });
+                    let of_both = F::of(joined);
+                    each!(r < R => {
+                        results[k][r] = Self($ops::low_halves(of_both[r].0, of_both[r].0));
+                        results[k + 1][r] = Self($ops::high_halves(of_both[r].0, of_both[r].0));
+                    });
                 }
                 results
             },
