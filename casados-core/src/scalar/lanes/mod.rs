@@ -72,7 +72,7 @@ pub use drivers::*;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
-    /// None: numbers one at a time. Computations on slices take those of `Base` where there are any.
+    /// None: numbers one at a time. Computations on slices take `Base` where there is such.
     Single,
     /// Those that every machine of this kind has: `F64x2`, `F32x4`.
     Base,

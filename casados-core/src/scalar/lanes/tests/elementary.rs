@@ -319,8 +319,8 @@ fn sine_and_cosine_together_are_what_they_are_alone() {
     on_every_register!(check);
 }
 
-/// Several arguments at once have the values that one after the other has. It is compiled a thousand
-/// times: in loops, and what does not depend on the function is outside of it.
+/// Several arguments at once have the values that one after the other has. It is compiled hundreds
+/// of times: in loops, and what does not depend on the function is outside of it.
 fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize, const N: usize>(_: F) {
     let values = specials();
     inside::<L>(|| {
