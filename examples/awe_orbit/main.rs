@@ -28,9 +28,9 @@ use casados::ocp::{
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use conditions::Conditions;
-use reference_data::Record;
 use guess::guess;
 use pictures::Picture;
+use reference_data::Record;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;

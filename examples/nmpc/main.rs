@@ -17,9 +17,9 @@ use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Problem, Sh
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use chain::Chain;
-use reference_data::Record;
 use nalgebra::{SVector, Vector1, Vector3, Vector4, vector};
 use pendulum::Pendulum;
+use reference_data::Record;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,9 +2,9 @@
 //! `benches/`, which is built when it is first asked for, and CVODES and IDAS by Python with
 //! CasADi.
 
-use reference_data::Record;
 use super::problems::Problem;
 use super::record::Run;
+use reference_data::Record;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,5 @@
 //! The problems, and the methods of this library on them.
 
-use reference_data::Record;
 use super::models::chemistry::{AkzoNobel, E5Conserved, Hires, Oregonator, Robertson};
 use super::models::circuits::{RingModulator, TransistorAmplifier};
 use super::models::mechanics::{Pleiades, Squeezer};
@@ -9,6 +8,7 @@ use casados::{
     Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Irk, Options, Radau, RadauIIA,
 };
 use nalgebra::SVector;
+use reference_data::Record;
 
 /// What a call gave: the values at the end, and what it took.
 #[derive(Clone, Debug, Default)]

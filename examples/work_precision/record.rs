@@ -1,7 +1,7 @@
 //! What was measured of one run, and what is best among many.
 
-use reference_data::Record;
 use super::problems::Problem;
+use reference_data::Record;
 
 /// One solver at one accuracy.
 #[derive(Clone, Debug)]

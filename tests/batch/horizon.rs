@@ -1,6 +1,5 @@
 //! Horizons of the example models, and every call of a batch against single calls.
 
-use reference_data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;
@@ -11,6 +10,7 @@ use casados::prelude::*;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use casados::{Real, batch};
 use nalgebra::{SVector, Vector1, vector};
+use reference_data::Record;
 
 pub type Test = Result<(), Box<dyn std::error::Error>>;
 

@@ -2,7 +2,6 @@
 //! minima and its iterations (`tests/data/ocp/collection.json`), and what is said of problems that
 //! have no solution.
 
-
 mod astray;
 mod climb;
 mod guesses;

@@ -1,11 +1,11 @@
 //! The example models: their derivative code three ways.
 
 use crate::check;
-use reference_data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::testing::Points;
+use reference_data::Record;
 
 #[test]
 fn pendulum_derivatives() {

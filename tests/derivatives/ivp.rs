@@ -4,13 +4,13 @@
 use casados::testing::{Points, check_derivatives, check_pattern};
 use casados::{Dae, GraphDae};
 
-use reference_data::Record;
 use crate::models::ivp::chemistry::{
     AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved,
 };
 use crate::models::ivp::circuits::{RingModulator, TransistorAmplifier, TransistorCapacitors};
 use crate::models::ivp::mechanics::{Pleiades, Squeezer};
 use crate::models::ivp::oscillators::{VanDerPol, VanDerPolScaled};
+use reference_data::Record;
 
 fn derivatives<M: GraphDae>(points: &Points<M>) {
     check_derivatives(points).assert();

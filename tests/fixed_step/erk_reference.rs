@@ -1,11 +1,11 @@
 //! Explicit integrators against reference values of an independent code: pendulum and chains, RK4,
 //! one step.
 
-use reference_data::Record;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::{Erk, Options, Rk4};
 use nalgebra::SMatrix;
+use reference_data::Record;
 
 /// The reference has 17 digits; each value is a sum of some 100 terms of the size of the largest,
 /// with roundings of both codes.

@@ -1,12 +1,12 @@
 //! The example models: the identities of their sensitivities.
 
-use reference_data::Record;
 use crate::interval::{check, options};
 use crate::models::awe::Awe;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::{DormandPrince5, Erk, Gauss, Irk, RadauIIA, Rk4};
 use nalgebra::SVector;
+use reference_data::Record;
 
 #[test]
 fn pendulum_sensitivities() {

@@ -14,13 +14,13 @@ use casados::{
 };
 use nalgebra::SVector;
 
-use reference_data::Record;
 use crate::models::ivp::chemistry::{
     AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved,
 };
 use crate::models::ivp::circuits::{RingModulator, TransistorAmplifier, TransistorCapacitors};
 use crate::models::ivp::mechanics::{Pleiades, Squeezer};
 use crate::models::ivp::oscillators::{VanDerPol, VanDerPolScaled};
+use reference_data::Record;
 
 /// A problem of the set: its data, and how its values follow from the states of a model.
 struct Problem {

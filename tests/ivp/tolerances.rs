@@ -5,7 +5,6 @@
 //! are allowed, or where SciPy's `Radau` is off by more, no more than that. Stiff components:
 //! `tests/ivp/vibrations.rs`.
 
-use reference_data::Record;
 use crate::models::ivp::mechanics::Pleiades;
 use crate::models::ivp::vibrations::{ExplicitBeam, Kepler, RodPendulum, SpringPendulum};
 use casados::{
@@ -13,6 +12,7 @@ use casados::{
 };
 use core::f64::consts::TAU;
 use nalgebra::{SVector, vector};
+use reference_data::Record;
 
 const TOLERANCES: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 const ALLOWED: f64 = 30.0;

@@ -6,10 +6,10 @@
 //! its tolerance.
 
 use super::tolerances::tell;
-use reference_data::Record;
 use crate::models::ivp::vibrations::{Beam, Modes, Rope, SpringPendulum, Turning};
 use casados::{Adaptive, AdaptiveOptions, Radau};
 use nalgebra::SVector;
+use reference_data::Record;
 
 const TOLERANCES: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 const ALLOWED: f64 = 30.0;

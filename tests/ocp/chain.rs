@@ -4,12 +4,12 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use reference_data::Record;
 use casados::__private::Scalar;
 use casados::ocp::{Convexification, Exact, Globalisation, HeapSqp, Shooting};
 use casados::prelude::*;
 use casados::qp::{Condensing, HeapInteriorPoint};
 use nalgebra::{SVector, Vector3};
+use reference_data::Record;
 
 /// The problem of a size with dynamics.
 macro_rules! problem {

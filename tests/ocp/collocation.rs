@@ -3,12 +3,12 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use reference_data::Record;
 use casados::ocp::{
     Collocation, Constraint, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon,
     LeastSquaresCost, Problem, SecondOrder,
 };
 use casados::prelude::*;
+use reference_data::Record;
 
 type Failure = Box<dyn std::error::Error>;
 

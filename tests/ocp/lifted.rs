@@ -4,10 +4,10 @@
 use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
-use reference_data::Record;
 use casados::model::{VectorU, VectorX};
 use casados::ocp::{HeapSqp, Shooting};
 use casados::prelude::*;
+use reference_data::Record;
 
 /// Solves a problem to `1e-9` by Gauss-Newton steps, or by those of its exact Hessian.
 macro_rules! solve {

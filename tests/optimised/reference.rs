@@ -5,13 +5,13 @@
 //! rounding and differentiate them exactly; what is left is rounding, of the size ε times the
 //! condition of the Newton matrix (ε = 2.2e-16), in the integrator and in the reference alike.
 
-use reference_data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::Method;
 use casados::prelude::*;
 use nalgebra::{SMatrix, SVector};
+use reference_data::Record;
 use std::error::Error;
 
 type Test = Result<(), Box<dyn Error>>;

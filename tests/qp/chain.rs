@@ -1,11 +1,11 @@
 //! The QPs of the chain of masses.
 
 use crate::Test;
-use reference_data::Record;
 use casados::Real;
 use casados::qp::{
     BlockMut, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims, residuals,
 };
+use reference_data::Record;
 
 /// Elements of a list of matrices, of which the last one repeats.
 struct Repeated {

@@ -1,12 +1,12 @@
 //! Andrews' squeezing mechanism from its constraints, of index 3, against the reference of the test
 //! set.
 
-use reference_data::Record;
 use bytemuck::Zeroable;
 use casados::__private::function::ArrayV;
 use casados::prelude::*;
 use casados::{Consistent, Constrained};
 use nalgebra::SVector;
+use reference_data::Record;
 
 /// Seven bodies in a plane: x = [angles β Θ γ Φ δ Ω ε, their rates], z = [six multipliers].
 ///

@@ -281,8 +281,8 @@ fn t35_near_singular_matrices() {
 /// with algebraic states.
 #[test]
 fn t23_rank_deficient_mass() {
-    use reference_data::Record;
     use crate::models::circuits::{TransistorAmplifier, TransistorCapacitors};
+    use reference_data::Record;
     let set = Record::load("ivp/ends.json").expect("the reference is there");
     let y: SVector<f64, 8> = set.record("transistor_amplifier").expect("a problem").vector("x0").expect("x0");
     let options = Options { steps: 40, ..Default::default() };

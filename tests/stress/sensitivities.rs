@@ -1,7 +1,6 @@
 //! Derivatives: identities, independent ways to the same numbers, what cancels, and what an
 //! iteration that stops early leaves.
 
-use reference_data::Record;
 use super::everything::Everything;
 use crate::models::chemistry::{AkzoNobel, Robertson};
 use crate::models::oscillators::VanDerPol;
@@ -11,6 +10,7 @@ use casados::{
     Rk4, ode,
 };
 use nalgebra::{Complex, SVector, vector};
+use reference_data::Record;
 
 /// A pendulum with friction: g/l = p₀, friction p₁, pushed.
 #[ode]

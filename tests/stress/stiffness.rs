@@ -1,6 +1,5 @@
 //! Stiffness up to 1e12, and small numbers beside large ones.
 
-use reference_data::Record;
 use super::pollution::{self, Pollution};
 use crate::models::chemistry::{E5Conserved, Hires, Oregonator, Robertson};
 use crate::models::oscillators::VanDerPolScaled;
@@ -8,6 +7,7 @@ use casados::__private::Matrix;
 use casados::model::{VectorP, VectorX};
 use casados::{Adaptive, AdaptiveOptions, Dae, Error, Gauss, Irk, Options, Radau, RadauIIA, Shape, ode};
 use nalgebra::{SVector, vector};
+use reference_data::Record;
 
 /// `sin t`, whatever the stiffness.
 #[ode]

@@ -11,9 +11,9 @@ use casados::{
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use reference_data::Record;
 use crate::models::ivp::chemistry::{AkzoNobel, Oregonator, Robertson};
 use crate::models::ivp::oscillators::{VanDerPol, VanDerPolScaled};
+use reference_data::Record;
 
 fn problem(name: &str) -> (Vec<f64>, Vec<f64>) {
     // Of this one there are derivatives only.

@@ -3,12 +3,12 @@
 use super::{Failure, Guess, OPTIONS, Runner, guess, median, problem, rest, runner};
 use super::{chain, chain_batch, chain_collocation, chain_problem, chain_request};
 use crate::awe::Awe;
-use reference_data::Record;
 use casados::ocp::{Collocation, Shooting};
 use casados::prelude::*;
 use casados_benches::models::Chain;
 use casados_benches::peer::Peer;
 use casados_benches::record::{load, numbers};
+use reference_data::Record;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
