@@ -8,6 +8,7 @@ mod models {
 }
 
 mod ends;
+mod explicit;
 mod kinks;
 mod rough;
 mod sensitivities;
