@@ -163,6 +163,8 @@ pub enum Error {
         t: f64,
         /// How many steps were tried.
         steps: usize,
+        /// Whether the method is explicit and its stability limited most of them, not the error.
+        stiff: bool,
     },
     /// A time outside the interval of the last successful call.
     OutsideInterval {

@@ -6,6 +6,7 @@ mod models {
 }
 
 mod ends;
+mod explicit;
 mod kinks;
 mod rough;
 mod sensitivities;

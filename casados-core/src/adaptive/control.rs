@@ -4,7 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 
 /// Where the first estimate is asked for this much less than the solution, or even less, its
 /// tolerance says nothing of components that lose their order; where it is asked for about as much,
@@ -149,9 +149,10 @@ pub struct Refusals {
     watched: usize,
 }
 
+/// An error that is refused by much.
+const MUCH: f64 = 8.0;
+
 impl Refusals {
-    /// An error that is refused by much.
-    const MUCH: f64 = 8.0;
     /// Where so much is left, as after refusals of two steps one after the other, the solution is
     /// not smooth.
     const NOT_SMOOTH: usize = 3;
@@ -166,7 +167,7 @@ impl Refusals {
 
     /// A step with this error was refused.
     pub fn refused(&mut self, error: f64) {
-        if error >= Self::MUCH {
+        if error >= MUCH {
             self.count = (self.count + 2).min(2 * Self::NOT_SMOOTH);
             self.watched = Self::WATCHED;
         }
@@ -210,11 +211,32 @@ pub struct Proportional {
     control: Control,
     /// The length of the last accepted step, and its error.
     last: (f64, f64),
+    /// Up to here a force may jump, or a derivative of it.
+    doubted: f64,
 }
 
 impl Proportional {
+    /// Where a force jumps between two stages, or its slope, the error of a step is up to so many
+    /// times the difference of the two methods, whose weights cancel there.
+    const OVER_DIFFERENCE: f64 = 8.0;
+    /// A step is as good as can be that is no more than so many times as long as times are fine.
+    const FINE: f64 = 1e4;
+
     pub fn new(control: Control) -> Self {
-        Self { control, last: (f64::INFINITY, control.before) }
+        Self { control, last: (f64::INFINITY, control.before), doubted: f64::NEG_INFINITY }
+    }
+
+    /// What the error of a step from `t` counts: more where a step that was refused by much went.
+    /// Of shorter steps over a jump the difference of the methods is small by chance at last, and
+    /// the one that is accepted is one of these.
+    pub fn doubt<T: Real>(&mut self, direction: f64, t: T, h: T, error: f64) -> f64 {
+        let (at, h) = (direction * t.to_f64(), h.to_f64().abs());
+        let fine = T::EPSILON.to_f64() * at.abs();
+        let doubted = at < self.doubted && h > Self::FINE * fine;
+        if error >= MUCH {
+            self.doubted = self.doubted.max(at + h);
+        }
+        if doubted { Self::OVER_DIFFERENCE * error } else { error }
     }
 
     /// The factor for the step size after a step of size `h`, within a range.

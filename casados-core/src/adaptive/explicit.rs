@@ -163,7 +163,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             h = span.end - t;
         }
         if tried >= run.options.max_steps {
-            return Err(Error::TooManySteps { t: t.to_f64(), steps: tried });
+            return Err(Error::TooManySteps { t: t.to_f64(), steps: tried, stiff: step.is_stiff() });
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
@@ -176,6 +176,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
+        let error = controller.doubt(direction, t, h, error);
         let factor = controller.factor(h.to_f64().abs(), error);
         if error > 1.0 {
             run.statistics.rejected += 1;

@@ -62,6 +62,8 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
+    /// Whether stability limited most of the steps since the start of the run.
+    fn is_stiff(&self) -> bool;
     /// How often the model was evaluated since this was asked for last.
     fn count(&mut self) -> usize;
 }
@@ -69,6 +71,8 @@ pub trait Take<M: Dae, T: Real> {
 pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<Memory<M, T, S>>,
+    /// More of the steps were limited by stability than by their errors, by so many.
+    stiff: i64,
     method: PhantomData<fn() -> B>,
 }
 
@@ -76,7 +80,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     pub fn new() -> Result<Self, Error> {
         let bytes = size_of::<Memory<M, T, S>>();
         let memory = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
-        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, method: PhantomData })
+        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, stiff: 0, method: PhantomData })
     }
 
     /// The derivative at a state.
@@ -101,7 +105,8 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     /// How often an error counts in an interval of so many steps: once where the Jacobian takes it
     /// back, as where it is damped, and by [`Pair::PERSISTENCE`] where it turns it or lets it grow.
     /// The last stage `Y` is at the end, as the step is; of the difference `d` of the two and `J d`
-    /// the cosine is asked.
+    /// the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of stability, or not
+    /// (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.2).
     fn persistence(&mut self, steps: f64) -> f64 {
         let count = B::PERSISTENCE.count(steps);
         if count <= 1.0 {
@@ -119,6 +124,9 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
             distances = distances + distance * distance;
             changes = changes + change * change;
         }
+        // Scales have the factor `h`, and so have the changes.
+        let at_bound = changes.to_f64() > B::STABLE * B::STABLE * distances.to_f64();
+        self.stiff += if at_bound { 1 } else { -1 };
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
         let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
         if damped.is_nan() { count } else { count + (1.0 - count) * damped.min(1.0) }
@@ -139,6 +147,7 @@ fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
     fn go(&mut self, inputs: &[T], x: &[T]) {
+        self.stiff = 0;
         let Memory { point, record, .. } = &mut *self.memory;
         point.variables_mut().copy_from_slice(inputs);
         // An explicit model is evaluated at `ẋ = 0`.
@@ -247,6 +256,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
             *to = start + theta * (change + rest * (bend + theta * (cubic + *to)));
         }
         Ok(())
+    }
+
+    fn is_stiff(&self) -> bool {
+        self.stiff > 0
     }
 
     fn count(&mut self) -> usize {

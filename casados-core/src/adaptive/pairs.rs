@@ -18,6 +18,8 @@ pub trait Pair<const S: usize>: Method<S> {
     const COARSE: Option<[f64; S]>;
     /// How often the error counts of what is not damped.
     const PERSISTENCE: Persistence;
+    /// Steps are at the bound of stability where `h |J d|/|d|` is this much, on the real axis.
+    const STABLE: f64;
     /// `b` less the coefficients of the last stage, which is at the end of the step.
     const LAST: [f64; S] = {
         let mut last = *Self::TABLEAU.b();
@@ -81,6 +83,7 @@ impl Pair<6> for DormandPrince5 {
     );
     const COARSE: Option<[f64; 6]> = None;
     const PERSISTENCE: Persistence = Persistence { steps: 180.0, most: 16.0 };
+    const STABLE: f64 = 3.25;
     const CONTROL: Control =
         Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
     const MORE: &'static [More<6>] = &[];
@@ -124,6 +127,7 @@ impl Pair<12> for DormandPrince8 {
         Some(coarse)
     };
     const PERSISTENCE: Persistence = Persistence { steps: 10.0, most: 40.0 };
+    const STABLE: f64 = 6.1;
     // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
     const CONTROL: Control = Control {
         order: 8.0,

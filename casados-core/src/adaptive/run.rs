@@ -131,7 +131,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 continue;
             }
             if walk.tried >= self.options.max_steps {
-                return Err(Error::TooManySteps { t: walk.t.to_f64(), steps: walk.tried });
+                return Err(Error::TooManySteps { t: walk.t.to_f64(), steps: walk.tried, stiff: false });
             }
             self.check_step(walk.t, walk.h, walk.refusal)?;
             walk.tried += 1;

@@ -145,8 +145,12 @@ impl fmt::Display for Error {
                 };
                 write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
             }
-            Error::TooManySteps { t, steps } => {
-                write!(f, "t = {t} was reached after {steps} steps, and more are not allowed")
+            Error::TooManySteps { t, steps, stiff } => {
+                write!(f, "t = {t} was reached after {steps} steps, and more are not allowed")?;
+                if stiff {
+                    f.write_str("; the model is stiff, so that an implicit method takes fewer: Radau")?;
+                }
+                Ok(())
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
