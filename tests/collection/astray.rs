@@ -98,7 +98,7 @@ fn curvature_on_the_way() -> Test {
     line(&mut ocp, &[0.0, 0.0, 0.0, 0.0, 1.0], &[10.0, 5.0, 45.0, 0.0, 1.0], &[0.0])?;
     let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
     assert!(outcome.is_converged() && outcome.iterations <= 25, "{outcome}");
-    // The table of COPS has 0.554577 for 200 intervals.
-    assert!((outcome.objective - 0.55457).abs() < 1e-4, "{outcome}");
+    // IPOPT's (CasADi 3.8.2, the same discretisation and guess, a tolerance of 1e-6).
+    assert!((outcome.objective - 0.5545954638).abs() < 1e-7, "{outcome}");
     Ok(())
 }

@@ -124,9 +124,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result.map(|()| outcome)
     }
 
-    /// Whether a run that failed begins again: once, at a simulation with the controls of its guess,
-    /// with steps that are damped as those of Gauss and Newton are. It was long steps at first that
-    /// led astray, or gaps that were to be closed over unstable dynamics.
+    /// Whether a run that failed begins again: once, at a simulation with the controls of its
+    /// guess, with steps that are damped as those of Gauss and Newton are. It was long steps at
+    /// first that led astray, or gaps that were to be closed over unstable dynamics.
     fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -146,25 +146,27 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         *state = State { again: true, damping: AGAIN, sizes: state.sizes, ..State::new() };
         self.weights.multipliers_mut().fill(T::ZERO);
         ocp.iterate.copy_from(&self.weights);
-        if !P::Dynamics::LIFTED {
-            self.simulate_guess(ocp);
+        if !P::Dynamics::LIFTED && self.simulate_guess(ocp) && ocp.linearise(self.curvature).is_err() {
+            ocp.iterate.copy_from(&self.weights);
         }
         self.forget_weights(ocp, state);
         true
     }
 
-    /// The guess, moved into its bounds, with the states that follow from its controls; as it is
-    /// where these have no values.
-    fn simulate_guess<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) {
+    /// The guess, moved into its bounds, with the states that follow from its controls, if these
+    /// have values.
+    fn simulate_guess<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> bool {
         self.trial.copy_from(&ocp.iterate);
         ocp.clip();
         core::mem::swap(&mut ocp.iterate, &mut self.trial);
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if ocp.simulate(&mut self.trial, ends, &[], f64::INFINITY) {
+        let has_values = ocp.simulate(&mut self.trial, ends, &[], f64::INFINITY);
+        if has_values {
             ocp.iterate.copy_from(&self.trial);
             ocp.join_controls();
             ocp.join_states();
         }
+        has_values
     }
 
     /// One iteration; a status if it is the last one.
