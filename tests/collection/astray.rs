@@ -1,11 +1,14 @@
 //! Problems on which long first steps lead astray: the run begins again with steps that are damped,
 //! or steps are shortened where the merit function turns before their ends.
 
+use super::ocps::line;
+use super::units::fix;
 use super::{Test, change_by_residuals, solve};
-use casados::ocp::{Exact, GeneralCost, Horizon, Problem};
+use casados::ocp::{Exact, GeneralCost, HeapIpm, Horizon, Problem};
 use casados::prelude::*;
 use casados::qp::residuals;
 use casados::{Erk, Rk4};
+use std::f64::consts::PI;
 
 /// An F-8 aircraft over `τ ∈ [0, 1]`: angle of attack, pitch, pitch rate, and the time that
 /// everything takes; the deflection of the elevator. W. L. Garrard, J. M. Jordan, "Design of
@@ -62,5 +65,40 @@ fn time_that_is_too_short() -> Test {
     // Residuals of both solvers are below 1e-6, and IPOPT relaxes bounds by 1e-8.
     let tolerance = (2.0 * 1e-6 + 1e-8) * change_by_residuals(&ocp);
     assert!((outcome.objective - 5.730851135986).abs() <= tolerance, "{outcome}, {tolerance:e}");
+    Ok(())
+}
+
+/// A particle that is steered over `τ ∈ [0, 1]`: position, velocity, and the time that everything
+/// takes; the angle of a constant force. E. D. Dolan, J. J. Moré, T. S. Munson, "Benchmarking
+/// optimization software with COPS 3.0", 2004, problem 9.
+#[ode]
+fn particle(x: [f64; 5], u: [f64; 1]) -> [f64; 5] {
+    let ([_, _, vx, vy, time], (s, c)) = (x, u[0].sin_cos());
+    [time * vx, time * vy, time * 100.0 * c, time * 100.0 * s, 0.0]
+}
+
+#[function]
+fn steering_time(x: [f64; 5], _u: [f64; 1]) -> f64 {
+    x[4]
+}
+
+/// Far from a feasible point multipliers give the Hessian a curvature that needs a `δ_w` which
+/// makes them larger: without that curvature nine iterations are enough, with it there were 63
+/// (IPOPT 16).
+#[test]
+fn curvature_on_the_way() -> Test {
+    let n = 50;
+    let mut ocp = Problem::new(Erk::<Particle, Rk4>::new(Options::default())?)
+        .terminal_cost(GeneralCost::<SteeringTime>::new())
+        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+    ocp.free_initial_state();
+    ocp.bound("u", .., -PI / 2.0, PI / 2.0)?.bound("x[4]", .., 0.0, f64::INFINITY)?;
+    fix(&mut ocp, 0, &[(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.0)])?;
+    fix(&mut ocp, n, &[(1, 5.0), (2, 45.0), (3, 0.0)])?;
+    line(&mut ocp, &[0.0, 0.0, 0.0, 0.0, 1.0], &[10.0, 5.0, 45.0, 0.0, 1.0], &[0.0])?;
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged() && outcome.iterations <= 25, "{outcome}");
+    // IPOPT's (CasADi 3.8.2, the same discretisation and guess, a tolerance of 1e-6).
+    assert!((outcome.objective - 0.5545954638).abs() < 1e-7, "{outcome}");
     Ok(())
 }

@@ -32,7 +32,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Moves states and controls of the iterate into their bounds.
-    fn clip(&mut self) {
+    pub(super) fn clip(&mut self) {
         let Self { qp, iterate, .. } = self;
         for (k, stage) in qp.view().stages().enumerate() {
             let Some(point) = iterate.stage_mut(k) else { return };

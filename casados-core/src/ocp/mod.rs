@@ -125,6 +125,7 @@ mod return_map;
 mod sensitivities;
 #[cfg(feature = "alloc")]
 mod shooting;
+mod simulation;
 mod single;
 mod soften;
 mod sqp;

@@ -14,7 +14,6 @@ const FLAT: f64 = 1e-6;
 const LEAST: f64 = 1e-20;
 /// Where this is not enough nothing is.
 const MOST: f64 = 1e20;
-
 /// What is remembered of `δ_w`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Regularisation {

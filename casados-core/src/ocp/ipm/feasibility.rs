@@ -23,7 +23,7 @@ use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
 use crate::qp::element::set;
 use crate::qp::interior::{Sides, at};
-use crate::qp::{Places, StageDims, Store, part, part_mut};
+use crate::qp::{StageDims, Store};
 use crate::scalar::{Real, Scalar};
 
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
@@ -96,34 +96,9 @@ where
         let Self { trial, work, .. } = self;
         let work = Work::new(ocp.ends(), capacity, work.as_mut());
         trial.copy_from(&ocp.iterate);
-        ocp.has_algebraic = false;
-        let (mut farthest, mut gaps) = (0.0, 0.0);
-        for pass in 0..=ocp.intervals() {
-            if ocp.evaluate(trial, work.ends).is_err() {
-                return;
-            }
-            let mut moved = 0.0;
-            let v = trial.view_mut().v;
-            for (k, place) in Places::<T>::new(ocp.qp().dims).enumerate().skip(1) {
-                let ends = part(work.ends, (k - 1) * place.nx, place.nx);
-                let units = part(work.units, place.row, place.nx);
-                for ((x, &end), &unit) in part_mut(v, place.v, place.nx).iter_mut().zip(ends).zip(units) {
-                    moved += ((end - *x) / unit).abs().to_f64();
-                    *x = end;
-                }
-            }
-            if pass == 0 {
-                gaps = moved;
-            }
-            farthest += moved;
-            if farthest.is_nan() || farthest > FAR * gaps {
-                return;
-            }
-            if moved == 0.0 {
-                break;
-            }
+        if ocp.simulate(trial, work.ends, work.units, FAR) {
+            ocp.iterate.copy_from(trial);
         }
-        ocp.iterate.copy_from(trial);
     }
 }
 

@@ -25,7 +25,8 @@ use crate::ocp::watch::Watch;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// A step lets the violation grow to this multiple of it, to one, or to what it was at the start.
+/// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
+/// it was at the start, or of one: an objective that becomes less leads no farther away.
 const GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
@@ -81,7 +82,7 @@ where
         if state.is_held() {
             self.release(ocp, state)?;
         }
-        let direction = self.direction(ocp, capacity, state, row).and_then(|is_corrected| {
+        let direction = self.direction_within(ocp, capacity, state, row)?.and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
             self.along(ocp, capacity, state, here, is_corrected)
         });
@@ -116,7 +117,7 @@ where
     }
 
     /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
-    fn linearise<P: Formulation<T>>(
+    pub(super) fn linearise<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
@@ -197,43 +198,6 @@ where
         Ok(())
     }
 
-    /// The search direction, and the barrier parameter if that follows it; whether it is corrected.
-    ///
-    /// # Errors
-    /// Those of the recursion, where no regularisation helps.
-    fn direction<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
-        state: &mut State<'_>,
-        row: &mut Iteration,
-    ) -> Result<bool, QpError> {
-        let force = state.lengths.sizes.force;
-        let least = force * barrier::least(self.options.least_error(force));
-        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
-        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
-        iterate.units = units;
-        let probes = state.progress.is_free();
-        let aim = if probes { 0.0 } else { state.mu };
-        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim), force)?;
-        row.regularisation = state.delta;
-        let mean = barrier::mean(&iterate.sides) / force;
-        let monotone = state.progress.count(state.delta > 0.0, state.mu / force, mean);
-        let mut is_corrected = false;
-        if let Some(mu) = monotone {
-            state.mu = mu * force;
-            again(&mut iterate, T::from_f64(state.mu), false)?;
-        } else if probes {
-            state.mu = predictor::probe(&iterate.sides, least);
-            is_corrected = predictor::correct(&mut iterate, state.mu, force)?;
-        }
-        if probes {
-            state.filter.clear();
-        }
-        row.barrier = state.mu;
-        Ok(is_corrected)
-    }
-
     /// Barrier function and violation at the iterate.
     ///
     /// # Errors
@@ -278,11 +242,12 @@ where
     ) -> Result<Direction, QpError> {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let first = state.first_violation.max(1.0);
         let expected = Expected {
             here,
             slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
             small_violation: state.small_violation,
-            most: (GROWTH * here.violation).max(state.first_violation.max(1.0)),
+            most: (GROWTH * here.violation.min(first)).max(first),
             mu: state.mu,
             delta: state.delta,
         };

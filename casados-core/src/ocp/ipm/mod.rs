@@ -22,6 +22,7 @@
 //! a factor of Cholesky.
 
 mod barrier;
+mod curved;
 mod direction;
 mod elastic;
 mod feasibility;

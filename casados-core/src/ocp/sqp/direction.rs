@@ -32,6 +32,9 @@ const DIGITS: f64 = 1e-13;
 const STAYS: f64 = 1.0 - 1e-3;
 /// Gaps are closed that are no more than this part of the violations of bounds.
 const CLOSED: f64 = 1e-2;
+/// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
+/// are not closed any further: a step that closes them opens as large ones.
+const CLOSING: usize = 4;
 /// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
 /// penalty; then those of an easier QP.
 const FLAT: [(f64, f64); 2] = [(2e-5, DIGITS), (2e-3, 1e-9)];
@@ -200,7 +203,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             state.rewritten = true;
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if solved && gaps <= bounds {
+        if solved && gaps <= bounds && state.elastic_steps >= CLOSING {
             return Ok(Direction::Infeasible(worst));
         }
         state.penalty = 0.0;

@@ -8,6 +8,7 @@ use super::secant::Take;
 use super::state::{State, Taken};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::Curvature;
+use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
@@ -123,8 +124,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result.map(|()| outcome)
     }
 
-    /// Whether a run that failed begins again at its guess: once, with steps that are damped as
-    /// those of Gauss and Newton are. It was long steps at first that led astray.
+    /// Whether a run that failed begins again: once, at a simulation with the controls of its
+    /// guess, with steps that are damped as those of Gauss and Newton are. It was long steps at
+    /// first that led astray, or gaps that were to be closed over unstable dynamics.
     fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -144,8 +146,27 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         *state = State { again: true, damping: AGAIN, sizes: state.sizes, ..State::new() };
         self.weights.multipliers_mut().fill(T::ZERO);
         ocp.iterate.copy_from(&self.weights);
+        if !P::Dynamics::LIFTED && self.simulate_guess(ocp) && ocp.linearise(self.curvature).is_err() {
+            ocp.iterate.copy_from(&self.weights);
+        }
         self.forget_weights(ocp, state);
         true
+    }
+
+    /// The guess, moved into its bounds, with the states that follow from its controls, if these
+    /// have values.
+    fn simulate_guess<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> bool {
+        self.trial.copy_from(&ocp.iterate);
+        ocp.clip();
+        core::mem::swap(&mut ocp.iterate, &mut self.trial);
+        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        let has_values = ocp.simulate(&mut self.trial, ends, &[], f64::INFINITY);
+        if has_values {
+            ocp.iterate.copy_from(&self.trial);
+            ocp.join_controls();
+            ocp.join_states();
+        }
+        has_values
     }
 
     /// One iteration; a status if it is the last one.
