@@ -36,7 +36,7 @@ fn check<M: Dae>(file: &str) {
         assert!(line.chars().count() <= 96, "{line}");
         assert_eq!(line, line.trim_end(), "a line ends in spaces");
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/language/description").join(file);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("language/description").join(file);
     if std::env::var_os("CASADOS_WRITE").is_some() {
         std::fs::write(&path, &text).expect("tests/language/description can be written");
     }
