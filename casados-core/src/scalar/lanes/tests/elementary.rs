@@ -4,7 +4,7 @@ use super::reference::{self, Function};
 use super::{cell, inside, on_every_register, same, specials};
 use crate::scalar::lanes::functions::{self, Call, Elementary};
 use crate::scalar::lanes::*;
-use crate::scalar::{Lanes, Scalar};
+use crate::scalar::{Lanes, Scalar, each};
 use std::vec::Vec;
 
 /// xorshift64*, Vigna 2016
@@ -326,18 +326,18 @@ fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize, const 
     inside::<L>(|| {
         for i in 0..values.len() {
             let mut a = [[L::from_f64(0.0); K]; N];
-            for n in 0..N {
-                for k in 0..K {
+            each!(n < N => {
+                each!(k < K => {
                     a[n][k] = argument::<L>(&values, i, n, k);
-                }
-            }
+                });
+            });
             let together = L::together::<F, K, R, N>(a);
-            for n in 0..N {
-                let each = F::of(a[n]);
-                for r in 0..R {
-                    assert_same_lanes(together[n][r], each[r], a[n][0]);
-                }
-            }
+            each!(n < N => {
+                let alone = F::of(a[n]);
+                each!(r < R => {
+                    assert_same_lanes(together[n][r], alone[r], a[n][0]);
+                });
+            });
         }
     });
 }
