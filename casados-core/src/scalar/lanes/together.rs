@@ -16,8 +16,8 @@ macro_rules! ends {
 macro_rules! results {
     ($results:expr) => {{
         let (found, mut results) = ($results, [[Self::splat(0.0); R]; COUNT]);
-        each!(n < COUNT => {
-            each!(r < R => {
+        crate::scalar::each!(n < COUNT => {
+            crate::scalar::each!(r < R => {
                 results[n][r] = Self(found[n][r].0);
             });
         });
@@ -49,7 +49,7 @@ macro_rules! abreast {
                 results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1)))
             } else {
                 let mut results = [[Self::splat(0.0); R]; COUNT];
-                each!(n < COUNT => {
+                crate::scalar::each!(n < COUNT => {
                     results[n] = F::of($a[n]);
                 });
                 results
@@ -74,11 +74,11 @@ macro_rules! of_fours {
                 let mut results = [[Self($ops::splat(0.0)); R]; COUNT];
                 for k in (0..COUNT - 1).step_by(2) {
                     let mut joined = [whole!($name, $ops, a[k][0]); K];
-                    each!(j < K => {
+                    crate::scalar::each!(j < K => {
                         joined[j] = $name($ops::low_halves(a[k][j].0, a[k + 1][j].0));
                     });
                     let of_both = F::of(joined);
-                    each!(r < R => {
+                    crate::scalar::each!(r < R => {
                         results[k][r] = Self($ops::low_halves(of_both[r].0, of_both[r].0));
                         results[k + 1][r] = Self($ops::high_halves(of_both[r].0, of_both[r].0));
                     });
