@@ -83,8 +83,7 @@ fn steering_time(x: [f64; 5], _u: [f64; 1]) -> f64 {
 }
 
 /// Far from a feasible point multipliers give the Hessian a curvature that needs a `δ_w` which
-/// makes them larger: without that curvature nine iterations are enough, with it there were 63
-/// (IPOPT 16).
+/// makes them larger: without that curvature few iterations are enough.
 #[test]
 fn curvature_on_the_way() -> Test {
     let n = 50;

@@ -46,8 +46,7 @@ macro_rules! follows {
 }
 
 /// Where a force jumps between two stages the difference of the two methods may be an eightieth of
-/// the error. After a refusal by much it counts eight times: before, Dormand-Prince 5 was off by up
-/// to 61 and 151 tolerances.
+/// the error. After a refusal by much it counts eight times.
 #[test]
 fn differences_over_a_jump_are_doubted() {
     follows!(Friction, DormandPrince5, FRICTION);

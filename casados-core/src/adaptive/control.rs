@@ -211,32 +211,32 @@ pub struct Proportional {
     control: Control,
     /// The length of the last accepted step, and its error.
     last: (f64, f64),
-    /// Up to here a force may jump, or a derivative of it.
-    doubted: f64,
+    /// The farthest end of a step that was refused by much: up to here a force may jump, or its
+    /// slope.
+    refused_to: f64,
 }
 
 impl Proportional {
     /// Where a force jumps between two stages, or its slope, the error of a step is up to so many
     /// times the difference of the two methods, whose weights cancel there.
     const OVER_DIFFERENCE: f64 = 8.0;
-    /// A step is as good as can be that is no more than so many times as long as times are fine.
-    const FINE: f64 = 1e4;
+    /// Steps that are no more than so many roundoff errors of the time are not made shorter.
+    const SHORTEST: f64 = 1e4;
 
     pub fn new(control: Control) -> Self {
-        Self { control, last: (f64::INFINITY, control.before), doubted: f64::NEG_INFINITY }
+        Self { control, last: (f64::INFINITY, control.before), refused_to: f64::NEG_INFINITY }
     }
 
-    /// What the error of a step from `t` counts: more where a step that was refused by much went.
-    /// Of shorter steps over a jump the difference of the methods is small by chance at last, and
-    /// the one that is accepted is one of these.
-    pub fn doubt<T: Real>(&mut self, direction: f64, t: T, h: T, error: f64) -> f64 {
-        let (at, h) = (direction * t.to_f64(), h.to_f64().abs());
-        let fine = T::EPSILON.to_f64() * at.abs();
-        let doubted = at < self.doubted && h > Self::FINE * fine;
-        if error >= MUCH {
-            self.doubted = self.doubted.max(at + h);
+    /// The error of a step from `t` out of the difference of the two methods: larger before the end
+    /// of a step that was refused by much. Of ever shorter steps over a jump one has a small
+    /// difference by chance, and would be accepted.
+    pub fn error_of_difference<T: Real>(&mut self, direction: f64, t: T, h: T, difference: f64) -> f64 {
+        let (t, h) = (direction * t.to_f64(), h.to_f64().abs());
+        let is_over_jump = t < self.refused_to && h > Self::SHORTEST * T::EPSILON.to_f64() * t.abs();
+        if difference >= MUCH {
+            self.refused_to = self.refused_to.max(t + h);
         }
-        if doubted { Self::OVER_DIFFERENCE * error } else { error }
+        if is_over_jump { Self::OVER_DIFFERENCE * difference } else { difference }
     }
 
     /// The factor for the step size after a step of size `h`, within a range.

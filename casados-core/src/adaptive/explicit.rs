@@ -176,7 +176,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
-        let error = controller.doubt(direction, t, h, error);
+        let error = controller.error_of_difference(direction, t, h, error);
         let factor = controller.factor(h.to_f64().abs(), error);
         if error > 1.0 {
             run.statistics.rejected += 1;

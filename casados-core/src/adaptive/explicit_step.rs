@@ -62,7 +62,8 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
-    /// Whether stability limited most of the steps since the start of the run.
+    /// Whether stability limited most of the steps since the start of the run, of those whose
+    /// errors may count more than once.
     fn is_stiff(&self) -> bool;
     /// How often the model was evaluated since this was asked for last.
     fn count(&mut self) -> usize;
@@ -71,8 +72,8 @@ pub trait Take<M: Dae, T: Real> {
 pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<Memory<M, T, S>>,
-    /// More of the steps were limited by stability than by their errors, by so many.
-    stiff: i64,
+    /// Steps at the bound of stability less those that are not.
+    at_bound: i64,
     method: PhantomData<fn() -> B>,
 }
 
@@ -80,7 +81,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     pub fn new() -> Result<Self, Error> {
         let bytes = size_of::<Memory<M, T, S>>();
         let memory = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
-        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, stiff: 0, method: PhantomData })
+        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, at_bound: 0, method: PhantomData })
     }
 
     /// The derivative at a state.
@@ -125,8 +126,8 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
             changes = changes + change * change;
         }
         // Scales have the factor `h`, and so have the changes.
-        let at_bound = changes.to_f64() > B::STABLE * B::STABLE * distances.to_f64();
-        self.stiff += if at_bound { 1 } else { -1 };
+        let is_at_bound = changes.to_f64() > B::STABLE * B::STABLE * distances.to_f64();
+        self.at_bound += if is_at_bound { 1 } else { -1 };
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
         let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
         if damped.is_nan() { count } else { count + (1.0 - count) * damped.min(1.0) }
@@ -147,7 +148,7 @@ fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
     fn go(&mut self, inputs: &[T], x: &[T]) {
-        self.stiff = 0;
+        self.at_bound = 0;
         let Memory { point, record, .. } = &mut *self.memory;
         point.variables_mut().copy_from_slice(inputs);
         // An explicit model is evaluated at `ẋ = 0`.
@@ -259,7 +260,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     }
 
     fn is_stiff(&self) -> bool {
-        self.stiff > 0
+        self.at_bound > 0
     }
 
     fn count(&mut self) -> usize {

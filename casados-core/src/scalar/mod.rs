@@ -1,8 +1,7 @@
 //! The numbers that model code and kernels are generic over.
 //!
 //! - [`Field`]: what can be added, multiplied, divided, and compared in size.
-//! - [`Scalar`]: anything that can be computed with: `f32`, `f64`, registers of them, duals,
-//!   complex numbers.
+//! - [`Scalar`]: what models compute with: `f32`, `f64`, registers, duals, complex numbers.
 //! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
 //! - [`Real`]: one real number, which can be compared: what decisions are made on.
 
@@ -54,8 +53,7 @@ macro_rules! own_cell {
 }
 pub(crate) use own_cell;
 
-/// Who has one runs where the instructions of fused kernels are: AVX2 and FMA, and AVX-512 if it is
-/// `WIDE`.
+/// Who has one runs where the instructions of fused kernels are: AVX2, FMA, if `WIDE` AVX-512.
 ///
 /// Numbers are computed with in these registers without asking. The crate alone can make one, and
 /// does so in kernels that it entered after detection; so no safe program reaches instructions that

@@ -1,71 +1,113 @@
-//! The search direction: Newton's step, with as much on the diagonal as makes the reduced Hessian
-//! positive definite.
+//! The search direction of an iteration, with or without the curvature that multipliers give.
 
-use super::newton::step;
-use crate::qp::QpError;
-use crate::qp::interior::Iterate;
+use super::lengths::Lengths;
+use super::newton::{again, attach, evaluate};
+use super::state::State;
+use super::work::Work;
+use super::{Ipm, barrier, predictor};
+use crate::ocp::dynamics::SecondOrder;
+use crate::ocp::error::OcpError;
+use crate::ocp::instance::Ocp;
+use crate::ocp::log::Iteration;
+use crate::ocp::problem::Formulation;
+use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
 
-/// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
-const FIRST: f64 = 1e-4;
-/// With this on the diagonal, directions without curvature may be left alone.
-const FLAT: f64 = 1e-6;
-/// `δ_w` is never less.
-const LEAST: f64 = 1e-20;
-/// Where this is not enough nothing is.
-const MOST: f64 = 1e20;
-/// What is remembered of `δ_w`.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Regularisation {
-    last: f64,
-}
+/// Curvature that needs a larger `δ_w` than this, in units, is that of multipliers on the way to a
+/// feasible point: it leaves steps of the size of rounding errors, and the multipliers that these
+/// have grow with it.
+const MOST_REGULARISATION: f64 = 10.0;
+/// Where violations and gaps are no more than this, in units, multipliers are those of a solution.
+const CLOSE: f64 = 1.0;
 
-impl Regularisation {
-    /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
-    ///
-    /// # Errors
-    /// Those of the recursion.
-    pub fn direction<T: Real>(
+impl<T, D, M, I> Ipm<T, D, M, I>
+where
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
+    I: Store<u32>,
+{
+    /// The search direction; without the curvature of dynamics and constraints where that needs too
+    /// much regularisation, far from a feasible point.
+    pub(super) fn search_direction<P: Formulation<T>>(
         &mut self,
-        iterate: &mut Iterate<'_, T>,
-        mu: T,
-        force: f64,
-    ) -> Result<f64, QpError> {
-        let mut failed = match self.attempt(iterate, mu, 0.0, force) {
-            Ok(()) => return Ok(0.0),
-            Err(failed) => failed,
-        };
-        let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
-        while delta < MOST {
-            match self.attempt(iterate, mu, delta, force) {
-                Ok(()) => {
-                    self.last = delta;
-                    return Ok(delta * force);
-                }
-                Err(error) => failed = error,
-            }
-            delta *= if self.last > 0.0 { 8.0 } else { 100.0 };
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<Result<bool, QpError>, OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        let before = (state.regularisation, state.progress, state.mu);
+        let direction = self.regularised_direction(ocp, capacity, state, row);
+        let is_regularised =
+            direction.is_err() || state.delta > MOST_REGULARISATION * state.lengths.sizes.force;
+        if !is_regularised || state.violation <= CLOSE {
+            return Ok(direction);
         }
-        Err(failed)
+        (state.regularisation, state.progress, state.mu) = before;
+        self.forget_curvature(ocp, capacity, state)?;
+        Ok(self.regularised_direction(ocp, capacity, state, row))
     }
 
-    /// One factorisation; a step that is not finite is no step.
-    fn attempt<T: Real>(
-        &self,
-        iterate: &mut Iterate<'_, T>,
-        mu: T,
-        delta: f64,
-        force: f64,
-    ) -> Result<(), QpError> {
-        match step(iterate, mu, T::from_f64(delta * force)) {
-            Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
-                Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
-            }
-            // Directions in which pivots vanished would not move at all.
-            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
-                Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
-            }
-            result => result,
+    /// The QP at the iterate without multipliers of dynamics and constraints, on which no step
+    /// depends but by the curvature that they give to the Hessian.
+    fn forget_curvature<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+    ) -> Result<(), OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        ocp.iterate.view_mut().dynamics.fill(T::ZERO);
+        Work::new(ocp.ends(), capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
+        self.linearise(ocp, capacity, state)?;
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut view = solution.view_mut();
+        evaluate(&mut iterate, &mut view);
+        iterate.store(&mut view);
+        Ok(())
+    }
+
+    /// The regularised Newton step, and the barrier parameter if that follows it; whether it is
+    /// corrected.
+    ///
+    /// # Errors
+    /// Those of the recursion, where no regularisation helps.
+    fn regularised_direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<bool, QpError> {
+        let force = state.lengths.sizes.force;
+        let least = force * barrier::least(self.options.least_error(force));
+        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
+        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        iterate.units = units;
+        let probes = state.progress.is_free();
+        let aim = if probes { 0.0 } else { state.mu };
+        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim), force)?;
+        row.regularisation = state.delta;
+        let mean = barrier::mean(&iterate.sides) / force;
+        let monotone = state.progress.count(state.delta > 0.0, state.mu / force, mean);
+        let mut is_corrected = false;
+        if let Some(mu) = monotone {
+            state.mu = mu * force;
+            again(&mut iterate, T::from_f64(state.mu), false)?;
+        } else if probes {
+            state.mu = predictor::probe(&iterate.sides, least);
+            is_corrected = predictor::correct(&mut iterate, state.mu, force)?;
         }
+        if probes {
+            state.filter.clear();
+        }
+        row.barrier = state.mu;
+        Ok(is_corrected)
     }
 }

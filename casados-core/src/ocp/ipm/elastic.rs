@@ -1,8 +1,8 @@
 //! Penalties where no step makes progress, and what they tell of a problem without a solution.
 
 use super::IpmOptions;
-use super::direction::Regularisation;
 use super::lengths::Lengths;
+use super::regularisation::Regularisation;
 use super::state::State;
 use crate::ocp::elastic::Worst;
 use crate::ocp::instance::Ocp;

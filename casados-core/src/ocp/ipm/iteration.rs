@@ -82,7 +82,7 @@ where
         if state.is_held() {
             self.release(ocp, state)?;
         }
-        let direction = self.direction_within(ocp, capacity, state, row)?.and_then(|is_corrected| {
+        let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
             self.along(ocp, capacity, state, here, is_corrected)
         });

@@ -22,7 +22,6 @@
 //! a factor of Cholesky.
 
 mod barrier;
-mod curved;
 mod direction;
 mod elastic;
 mod feasibility;
@@ -38,6 +37,7 @@ mod multipliers;
 mod newton;
 mod options;
 mod predictor;
+mod regularisation;
 mod run;
 mod scaling;
 mod start;

@@ -2,8 +2,8 @@
 
 use super::IpmOptions;
 use super::barrier::{self, Barrier, Progress};
-use super::direction::Regularisation;
 use super::lengths::Lengths;
+use super::regularisation::Regularisation;
 use super::violations::Phase;
 use crate::ocp::filter::Filter;
 use crate::ocp::log::Iteration;

@@ -1,0 +1,71 @@
+//! Newton's step, with as much on the diagonal (`δ_w`) as makes the reduced Hessian positive
+//! definite.
+
+use super::newton::step;
+use crate::qp::QpError;
+use crate::qp::interior::Iterate;
+use crate::scalar::Real;
+
+/// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
+const FIRST: f64 = 1e-4;
+/// With this on the diagonal, directions without curvature may be left alone.
+const FLAT: f64 = 1e-6;
+/// `δ_w` is never less.
+const LEAST: f64 = 1e-20;
+/// Where this is not enough nothing is.
+const MOST: f64 = 1e20;
+/// What is remembered of `δ_w`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Regularisation {
+    last: f64,
+}
+
+impl Regularisation {
+    /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
+    ///
+    /// # Errors
+    /// Those of the recursion.
+    pub fn direction<T: Real>(
+        &mut self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        force: f64,
+    ) -> Result<f64, QpError> {
+        let mut failed = match self.attempt(iterate, mu, 0.0, force) {
+            Ok(()) => return Ok(0.0),
+            Err(failed) => failed,
+        };
+        let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
+        while delta < MOST {
+            match self.attempt(iterate, mu, delta, force) {
+                Ok(()) => {
+                    self.last = delta;
+                    return Ok(delta * force);
+                }
+                Err(error) => failed = error,
+            }
+            delta *= if self.last > 0.0 { 8.0 } else { 100.0 };
+        }
+        Err(failed)
+    }
+
+    /// One factorisation; a step that is not finite is no step.
+    fn attempt<T: Real>(
+        &self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        delta: f64,
+        force: f64,
+    ) -> Result<(), QpError> {
+        match step(iterate, mu, T::from_f64(delta * force)) {
+            Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
+            }
+            // Directions in which pivots vanished would not move at all.
+            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
+            }
+            result => result,
+        }
+    }
+}
