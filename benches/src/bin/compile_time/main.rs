@@ -42,8 +42,24 @@ inherits = "release"
 codegen-units = 1
 "#;
 
-/// Profiles of the package: that of cargo, the same with one codegen unit, and that for debugging.
-const PROFILES: [&str; 3] = ["release", "one", "dev"];
+/// A way to build the package.
+struct Build {
+    profile: &'static str,
+    /// Whether it names the processor of this machine.
+    native: bool,
+}
+
+/// As cargo does it, with one codegen unit, with the processor named, and for debugging.
+const BUILDS: [Build; 4] = [
+    Build { profile: "release", native: false },
+    Build { profile: "one", native: false },
+    Build { profile: "release", native: true },
+    Build { profile: "dev", native: false },
+];
+const RELEASE: &Build = &BUILDS[0];
+const ONE: &Build = &BUILDS[1];
+const NATIVE: &Build = &BUILDS[2];
+const DEBUG: &Build = &BUILDS[3];
 
 /// One compilation of the package.
 #[derive(Clone, Copy)]
@@ -54,6 +70,13 @@ struct Measured {
     memory: f64,
     /// Of the program, in KB.
     size: f64,
+}
+
+impl Build {
+    /// Where it builds: what is native has dependencies of its own.
+    fn target(&self) -> &'static str {
+        if self.native { "native" } else { "target" }
+    }
 }
 
 /// The package in which all programs are built.
@@ -78,17 +101,18 @@ impl Package {
         }
         fs::write(folder.join("src/main.rs"), "fn main() {}\n")?;
         let package = Self { folder };
-        for profile in PROFILES {
-            eprintln!("building the dependencies ({profile})");
-            package.build(profile)?;
+        for build in &BUILDS {
+            eprintln!("building the dependencies ({}, native: {})", build.profile, build.native);
+            package.build(build)?;
         }
         Ok(package)
     }
 
-    fn build(&self, profile: &str) -> Result<Measured, Failure> {
+    fn build(&self, build: &Build) -> Result<Measured, Failure> {
         let times = self.folder.join("measured");
         let output = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "--target-dir", "target", "--profile", profile])
+            .args(["build", "--quiet", "--profile", build.profile, "--target-dir", build.target()])
+            .env("RUSTFLAGS", if build.native { "-C target-cpu=native" } else { "" })
             .env("RUSTC_WORKSPACE_WRAPPER", self.folder.join("measure.sh"))
             .env("CASADOS_MEASURED", &times)
             .current_dir(&self.folder)
@@ -100,21 +124,21 @@ impl Package {
         let mut numbers = text.split_whitespace();
         let mut next = || numbers.next().and_then(|n| n.parse::<f64>().ok()).ok_or("what GNU time says");
         let (seconds, kilobytes) = (next()?, next()?);
-        let size = fs::metadata(self.binary(profile))?.len() as f64 / 1e3;
+        let size = fs::metadata(self.binary(build))?.len() as f64 / 1e3;
         Ok(Measured { seconds, memory: kilobytes / 1e3, size })
     }
 
-    fn binary(&self, profile: &str) -> PathBuf {
-        let folder = if profile == "dev" { "debug" } else { profile };
-        self.folder.join("target").join(folder).join("compile-time")
+    fn binary(&self, build: &Build) -> PathBuf {
+        let folder = if build.profile == "dev" { "debug" } else { build.profile };
+        self.folder.join(build.target()).join(folder).join("compile-time")
     }
 
     /// Builds a program three times; the medians.
-    fn measure(&self, program: &Program, profile: &str) -> Result<Measured, Failure> {
+    fn measure(&self, program: &Program, build: &Build) -> Result<Measured, Failure> {
         let mut all = Vec::new();
         for edit in 0..3 {
             fs::write(self.folder.join("src/main.rs"), program.edited(edit))?;
-            all.push(self.build(profile)?);
+            all.push(self.build(build)?);
         }
         let median = |of: fn(&Measured) -> f64| {
             let mut values: Vec<f64> = all.iter().map(of).collect();
@@ -132,19 +156,21 @@ impl Package {
 /// The table of programs.
 fn uses(package: &Package) -> Result<String, Failure> {
     let mut table = String::from(
-        "| program | s | MB | KB | one unit: s | MB | KB |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+        "| program | s | MB | KB | one unit: s | MB | KB | native: s | MB | KB |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
+",
     );
     for program in programs::uses()? {
         let mut line = format!("| {} |", program.name);
-        for profile in ["release", "one"] {
-            let m = package.measure(&program, profile)?;
+        for build in [RELEASE, ONE, NATIVE] {
+            let m = package.measure(&program, build)?;
             line += &format!(" {:.1} | {:.0} | {:.0} |", m.seconds, m.memory, m.size);
         }
         eprintln!("{line}");
         table += &format!("{line}\n");
     }
     let quadrotor = programs::quadrotor()?;
-    let debug = package.measure(&quadrotor, "dev")?;
+    let debug = package.measure(&quadrotor, DEBUG)?;
     table += &format!(
         "\nIn a debug build with optimised dependencies, after an edit of a weight: the quadrotor {:.1} s.\n",
         debug.seconds
@@ -159,8 +185,8 @@ fn growth(package: &Package) -> Result<String, Failure> {
     );
     let mut points = Vec::new();
     for program in programs::growing()? {
-        let seconds = package.measure(&program, "release")?.seconds;
-        let output = Command::new(package.binary("release")).output()?;
+        let seconds = package.measure(&program, RELEASE)?.seconds;
+        let output = Command::new(package.binary(RELEASE)).output()?;
         let operations: f64 = String::from_utf8(output.stdout)?.trim().parse()?;
         points.push((operations, seconds));
         let each = 1e6 * seconds / operations;

@@ -61,7 +61,7 @@ pub(in crate::irk) fn multiply<
         terms = match first.rows {
             3 if const { MOST_ROWS >= 3 } => of.rows::<A, M, 3>(terms, g),
             2 if const { MOST_ROWS >= 2 } => of.rows::<A, M, 2>(terms, g),
-            _ => of.rows::<A, M, 1>(terms, g),
+            _ => of.row::<A, M, 1>(terms, g, 0),
         };
     }
 }
@@ -85,7 +85,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
-        if const { R == 1 || !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
+        if const { !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
             let mut others = terms;
             for row in 0..R {
                 others = self.row::<A, M, R>(terms, g, row);

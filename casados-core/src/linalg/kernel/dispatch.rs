@@ -10,9 +10,9 @@ use super::arithmetic::Arithmetic;
 use super::arithmetic::Fused;
 use super::arithmetic::Separate;
 #[cfg(target_arch = "x86_64")]
-use crate::scalar::lanes::{Level, level};
+use crate::scalar::lanes::{Level, level, may_be, may_reach};
 #[cfg(target_arch = "x86_64")]
-use core::mem::ManuallyDrop;
+use core::{marker::PhantomData, mem::ManuallyDrop};
 
 /// A computation that is worth being compiled for the machine it runs on.
 pub trait Kernel {
@@ -80,13 +80,17 @@ pub fn beside<K: Kernel>(kernel: K) -> K::Output {
 mod compiled {
     pub mod base {
         use super::super::{Kernel, Separate};
+        use core::mem::ManuallyDrop;
 
         // Never inlined beside others, so that callers are small. Where it is the only one, the
         // optimiser is to see from outside that nothing in it panics.
+        /// # Safety
+        /// Nobody else may take the kernel.
         #[cfg_attr(feature = "std", inline(never))]
         #[cfg_attr(not(feature = "std"), inline(always))]
-        pub fn run<K: Kernel>(kernel: K) -> K::Output {
-            kernel.run::<Separate>()
+        pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
+            // SAFETY: the caller's promise; and nobody drops it.
+            unsafe { ManuallyDrop::take(kernel) }.run::<Separate>()
         }
     }
 
@@ -119,46 +123,76 @@ mod compiled {
     }
 }
 
+/// The functions by which a kernel is entered: those that are for its numbers and for machines that
+/// may run the program. They are constants, so that the compiler looks into no others: of functions
+/// behind `if const` it looks into all.
+#[cfg(target_arch = "x86_64")]
+struct Entries<K>(PhantomData<K>);
+
+/// It takes the kernel, which nobody may do after it.
+#[cfg(target_arch = "x86_64")]
+type Entry<K> = unsafe fn(&mut ManuallyDrop<K>) -> <K as Kernel>::Output;
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Kernel> Entries<K> {
+    /// Numbers that are registers, which are aligned to themselves, need what these are made of,
+    /// and nothing else.
+    const OF_REGISTERS: Option<Entry<K>> = match align_of::<K::Number>() {
+        0..32 => None,
+        32 => Some(compiled::avx2::run::<K>),
+        _ => Some(compiled::avx512::run::<K>),
+    };
+    /// Unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
+    /// the one copy that runs everywhere.
+    const SINGLE: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
+    /// Short kernels are faster without AVX-512.
+    const AVX512: Option<Entry<K>> = if Self::SINGLE && K::WIDE && may_be(Level::Avx512) {
+        Some(compiled::avx512::run::<K>)
+    } else {
+        None
+    };
+    const AVX2: Option<Entry<K>> =
+        if Self::SINGLE && (may_be(Level::Avx2) || !K::WIDE && may_reach(Level::Avx2)) {
+            Some(compiled::avx2::run::<K>)
+        } else {
+            None
+        };
+    /// Where no machine needs it, one of the others: nobody gets here.
+    const BASE: Entry<K> = match (Self::AVX2, Self::AVX512) {
+        (Some(run), _) | (_, Some(run)) if !may_be(Level::Base) => run,
+        _ => compiled::base::run::<K>,
+    };
+}
+
 /// Runs a kernel as this machine does it best.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    use compiled::{avx2, avx512, base};
-    // Numbers that are registers, which are aligned to themselves, need what these are made of, and
-    // nothing else. Of other kernels short ones are faster without AVX-512; and unoptimised
-    // programs, where each copy of a kernel is much to compile and none is fast, have the one copy
-    // that runs everywhere.
-    if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
-        return base::run(kernel);
-    }
     // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
-    if const { align_of::<K::Number>() > 32 } {
+    if let Some(run) = Entries::<K>::OF_REGISTERS {
         // SAFETY: the other condition of calling a function with target features is that the
         // machine has them. Numbers are `Real`, registers, or made of such, and no type of a user's
         // can be any of these (`Lanes` is sealed). So what is aligned like this is made of
-        // registers of AVX-512, with which drivers compute only after detection; see the head of
-        // `lanes`.
-        unsafe { avx512::run(&mut kernel) }
-    } else if const { align_of::<K::Number>() == 32 } {
-        // SAFETY: the same of AVX2.
-        unsafe { avx2::run(&mut kernel) }
-    } else if const { K::WIDE } {
-        match level() {
-            // SAFETY: `level` says what the machine has.
-            Level::Avx512 => unsafe { avx512::run(&mut kernel) },
-            // SAFETY: as above.
-            Level::Avx2 => unsafe { avx2::run(&mut kernel) },
-            _ => base::run(ManuallyDrop::into_inner(kernel)),
-        }
-    } else {
-        match level() {
-            // SAFETY: as above.
-            Level::Avx512 | Level::Avx2 => unsafe { avx2::run(&mut kernel) },
-            _ => base::run(ManuallyDrop::into_inner(kernel)),
-        }
+        // registers of AVX2 or AVX-512, with which drivers compute only after detection; see the
+        // head of `lanes`.
+        return unsafe { run(&mut kernel) };
     }
+    if let Some(run) = Entries::<K>::AVX512
+        && level() == Level::Avx512
+    {
+        // SAFETY: `level` says what the machine has.
+        return unsafe { run(&mut kernel) };
+    }
+    if let Some(run) = Entries::<K>::AVX2
+        && level() >= Level::Avx2
+    {
+        // SAFETY: as above.
+        return unsafe { run(&mut kernel) };
+    }
+    // SAFETY: every machine has what this needs.
+    unsafe { Entries::<K>::BASE(&mut kernel) }
 }
 
 /// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one

@@ -175,12 +175,25 @@ impl<V: AtSupernode> AtPivot for Single<'_, V> {
 fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode: &'static Supernode) {
     let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..).unwrap_or_default();
     match (supernode.count, pivots) {
-        (4, [a, b, c, d, ..]) => visit.at::<A, 4>([a, b, c, d]),
-        (3, [a, b, c, ..]) => visit.at::<A, 3>([a, b, c]),
-        (2, [a, b, ..]) => visit.at::<A, 2>([a, b]),
+        (4, [a, b, c, d, ..]) if const { has_supernode::<M>(4) } => visit.at::<A, 4>([a, b, c, d]),
+        (3, [a, b, c, ..]) if const { has_supernode::<M>(3) } => visit.at::<A, 3>([a, b, c]),
+        (2, [a, b, ..]) if const { has_supernode::<M>(2) } => visit.at::<A, 2>([a, b]),
         (1, [a, ..]) => visit.at::<A, 1>([a]),
         _ => {}
     }
+}
+
+/// Whether a plan has a supernode of so many pivots.
+const fn has_supernode<M: Dae>(count: u32) -> bool {
+    let supernodes = M::STRUCTURE.elimination.supernodes;
+    let mut index = 0;
+    while index < supernodes.len() {
+        if supernodes[index].count == count {
+            return true;
+        }
+        index += 1;
+    }
+    false
 }
 
 /// Whether kernels that go through all blocks of a plan are long.

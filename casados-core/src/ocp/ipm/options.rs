@@ -16,7 +16,7 @@ use crate::scalar::Real;
 /// use casados::ocp::{Barrier, IpmOptions};
 ///
 /// let options = IpmOptions { tolerance: 1e-10, ..IpmOptions::new::<f64>() };
-/// assert_eq!((options.barrier, options.max_iterations), (Barrier::Adaptive, 200));
+/// assert_eq!((options.barrier, options.max_iterations), (Barrier::Adaptive, 500));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
@@ -32,7 +32,7 @@ pub struct IpmOptions {
     pub acceptable_tolerance: f64,
     /// Default 15.
     pub acceptable_iterations: usize,
-    /// Default 200.
+    /// Default 500: from starts far away a few hundred are taken.
     pub max_iterations: usize,
     /// The first barrier parameter `μ`, in units of forces. Default 0.1.
     pub start_mu: f64,
@@ -78,7 +78,7 @@ impl IpmOptions {
             tolerance,
             acceptable_tolerance,
             acceptable_iterations: 15,
-            max_iterations: 200,
+            max_iterations: 500,
             start_mu: 0.1,
             final_mu: 0.0,
             barrier: Barrier::Adaptive,

@@ -39,12 +39,16 @@ macro_rules! side_by_side {
             // Two numbers have a register of four where there is one: with fused products,
             // elementary functions in it take half the time of those in a register of two.
             #[cfg(target_arch = "x86_64")]
-            if const { S > 1 && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
+            if const { S > 1 && S <= $more && lanes::may_reach(lanes::Level::Avx2) }
+                && lanes::level() >= lanes::Level::Avx2
+            {
                 computation.call::<lanes::$avx2<S>>();
                 return Ok(());
             }
             #[cfg(target_arch = "x86_64")]
-            if const { S > $more && S <= $most } && lanes::level() >= lanes::Level::Avx512 {
+            if const { S > $more && S <= $most && lanes::may_be(lanes::Level::Avx512) }
+                && lanes::level() == lanes::Level::Avx512
+            {
                 computation.call::<lanes::$avx512<S>>();
                 return Ok(());
             }
@@ -64,16 +68,14 @@ pub(crate) use side_by_side;
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
-            use crate::scalar::lanes::{Level, level};
-            match level() {
-                Level::Avx512 if lanes >= $most => {
-                    Ok(computation.call::<crate::scalar::lanes::$avx512<$most>>())
-                }
-                Level::Avx512 | Level::Avx2 if lanes >= $more => {
-                    Ok(computation.call::<crate::scalar::lanes::$avx2<$more>>())
-                }
-                _ => Err(computation),
+            use crate::scalar::lanes::{self, Level, level, may_be, may_reach};
+            if const { may_be(Level::Avx512) } && level() == Level::Avx512 && lanes >= $most {
+                return Ok(computation.call::<lanes::$avx512<$most>>());
             }
+            if const { may_reach(Level::Avx2) } && level() >= Level::Avx2 && lanes >= $more {
+                return Ok(computation.call::<lanes::$avx2<$more>>());
+            }
+            Err(computation)
         }
     };
 }
@@ -101,17 +103,23 @@ macro_rules! packed_registers {
             use crate::scalar::lanes::{self, Inside};
             // Registers of sixteen numbers are no faster than those of eight.
             #[cfg(target_arch = "x86_64")]
-            if const { $most <= 8 } && lanes::level() == lanes::Level::Avx512 {
+            if const { $most <= 8 && lanes::may_be(lanes::Level::Avx512) }
+                && lanes::level() == lanes::Level::Avx512
+            {
                 type Register = lanes::$avx512<$most>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
             #[cfg(target_arch = "x86_64")]
-            if lanes::level() >= lanes::Level::Avx2 {
+            if const { lanes::may_be(lanes::Level::Avx2) || $most > 8 && lanes::may_be(lanes::Level::Avx512) }
+                && lanes::level() >= lanes::Level::Avx2
+            {
                 type Register = lanes::$avx2<$more>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
-            type Register = lanes::$base<$few>;
-            Register::vectorize(Inside::<Register, _, Self>::new(computation));
+            if const { lanes::may_be(lanes::Level::Base) } {
+                type Register = lanes::$base<$few>;
+                Register::vectorize(Inside::<Register, _, Self>::new(computation));
+            }
         }
     };
 }

@@ -87,6 +87,18 @@ pub use cache::limit_cache;
 #[cfg(feature = "alloc")]
 pub(crate) use cache::second_level_cache;
 
+/// What machines are asked for each level.
+macro_rules! registers {
+    ($level:expr, $has:ident) => {
+        match $level {
+            Level::Single => true,
+            Level::Base => REGISTERS,
+            Level::Avx2 => $has!("avx2" "fma"),
+            Level::Avx512 => $has!("avx512f" "avx512dq" "avx512vl" "avx2" "fma"),
+        }
+    };
+}
+
 /// The level that is used; [`UNKNOWN`] until somebody asks.
 static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
 const UNKNOWN: u8 = u8::MAX;
@@ -98,9 +110,38 @@ pub fn limit(limit: Level) {
     LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
 }
 
-/// The widest registers that this machine has and [`limit`] allows.
+/// The registers that the build names (`-C target-cpu=native`): every machine has them that may run
+/// the program, and there is code for no others.
+const NAMED: Option<Level> = if is_named(Level::Avx512) {
+    Some(Level::Avx512)
+} else if is_named(Level::Avx2) {
+    Some(Level::Avx2)
+} else {
+    None
+};
+
+/// Whether this may be the [`level`] of a machine that runs the program. Without `std` nobody asks
+/// the machine, and it has what the program was compiled for.
+pub const fn may_be(level: Level) -> bool {
+    match NAMED {
+        Some(named) => level as u8 == named as u8,
+        None => cfg!(feature = "std") || (level as u8) <= Level::Base as u8,
+    }
+}
+
+/// Whether this [`level`] or a higher one may be.
+pub const fn may_reach(level: Level) -> bool {
+    let above = matches!(level, Level::Single | Level::Base);
+    may_be(level) || may_be(Level::Avx512) || above && may_be(Level::Avx2)
+}
+
+/// The widest registers that this machine has and [`limit`] allows; those that the build names,
+/// where it does.
 #[inline(always)]
 pub fn level() -> Level {
+    if let Some(named) = NAMED {
+        return named;
+    }
     let level = match LEVEL.load(Ordering::Relaxed) {
         level if level == Level::Single as u8 => Level::Single,
         level if level == Level::Base as u8 => Level::Base,
@@ -110,18 +151,9 @@ pub fn level() -> Level {
     };
     // What there cannot be the compiler leaves out.
     match level {
-        Level::Avx512 if may_be(Level::Avx512) => Level::Avx512,
-        Level::Avx2 | Level::Avx512 if may_be(Level::Avx2) => Level::Avx2,
-        Level::Single => Level::Single,
-        _ => Level::Base,
+        Level::Avx512 | Level::Avx2 if !may_reach(Level::Avx2) => Level::Base,
+        level => level,
     }
-}
-
-/// Whether a machine that runs this may have these registers: without `std` nobody asks it, and it
-/// has what the program was compiled for. What is for others is not in the program then.
-#[inline(always)]
-fn may_be(level: Level) -> bool {
-    cfg!(feature = "std") || is_there(level)
 }
 
 #[cold]
@@ -136,6 +168,14 @@ fn widest(limit: Level) -> Level {
     levels.into_iter().find(|&level| level <= limit && is_there(level)).unwrap_or(Level::Single)
 }
 
+/// Whether the build says that every machine has these registers.
+const fn is_named(level: Level) -> bool {
+    macro_rules! has {
+        ($($feature:tt)*) => { $(cfg!(target_feature = $feature))&&* };
+    }
+    registers!(level, has)
+}
+
 /// Whether the machine has these registers.
 #[inline(always)]
 pub fn is_there(level: Level) -> bool {
@@ -147,10 +187,5 @@ pub fn is_there(level: Level) -> bool {
     macro_rules! has {
         ($($feature:tt)*) => { $(cfg!(target_feature = $feature))&&* };
     }
-    match level {
-        Level::Single => true,
-        Level::Base => REGISTERS,
-        Level::Avx2 => has!("avx2" "fma"),
-        Level::Avx512 => has!("avx512f" "avx512dq" "avx512vl" "avx2" "fma"),
-    }
+    registers!(level, has)
 }
