@@ -36,6 +36,7 @@ mod real_time;
 mod return_map;
 mod scaling;
 mod secant;
+mod second_attempt;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;

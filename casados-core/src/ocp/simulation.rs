@@ -36,7 +36,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 gaps = moved;
             }
             farthest += moved;
-            if !(farthest <= far * gaps && farthest.is_finite()) {
+            if farthest > far * gaps || !farthest.is_finite() {
                 return false;
             }
             if moved == 0.0 {

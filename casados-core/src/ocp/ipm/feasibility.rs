@@ -116,7 +116,7 @@ fn begin<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 }
 
 /// Ends it: bounds are as hard as they were.
-fn leave<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(super) fn leave<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
     penalties: &[T],

@@ -46,6 +46,7 @@ impl<T: Real> HeapIpm<T> {
             options: IpmOptions::new::<T>(),
             trial: Solution::new(dims)?,
             best: Solution::new(dims)?,
+            guess: Solution::new(dims)?,
             numbers: Vec::new(),
             indices: Vec::new(),
             work: Vec::new(),

@@ -32,7 +32,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
             return (usize::MAX, usize::MAX);
         }
         let [numbers, work, indices] = lengths::<P, T>(dims, bounds, equations);
-        (solution.saturating_mul(2).saturating_add(numbers).saturating_add(work), indices)
+        (solution.saturating_mul(3).saturating_add(numbers).saturating_add(work), indices)
     }
 
     /// For problems of these dimensions with at most so many bounds and equations, in given memory
@@ -57,12 +57,14 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         let [_, work, _] = lengths::<P, T>(dims, bounds, equations);
         let (trial, rest) = numbers.split_at_mut_checked(length).unwrap_or_default();
         let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (guess, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         // What is more than that is for couplings.
         let (work, numbers) = rest.split_at_mut_checked(work).unwrap_or_default();
         Ok(Self {
             options: IpmOptions::new::<T>(),
             trial: Solution::in_memory(dims, trial)?,
             best: Solution::in_memory(dims, best)?,
+            guess: Solution::in_memory(dims, guess)?,
             numbers,
             indices,
             work,

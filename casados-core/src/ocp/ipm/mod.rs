@@ -12,6 +12,7 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
+//! | `again` | a second attempt, from a simulation |
 //! | `feasibility`, `violations` | violations alone where no step makes progress, and that they stay |
 //! | `elastic` | penalties where that does not help |
 //! | `verdict` | how a run may end |
@@ -21,6 +22,7 @@
 //! Riccati recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has
 //! a factor of Cholesky.
 
+mod again;
 mod barrier;
 mod direction;
 mod elastic;
@@ -67,9 +69,10 @@ use alloc::vec::Vec;
 /// equal are equations; soft ones have their penalties. An iteration costs one evaluation with
 /// Hessians, one Riccati factorisation, and one simulation for each point that the line search
 /// tries. Where no step makes progress, violations of bounds of states and constraints alone are
-/// made small; where they stay, the bound that is violated most is named. The iterate of the
-/// problem is the best one afterwards, whatever the status; where violations stay, the one at which
-/// they do.
+/// made small; where they stay, the bound that is violated most is named. Before it gives up it
+/// begins again, once, at a simulation with the controls of its guess, if that violates less. The
+/// iterate of the problem is the best one afterwards, whatever the status; where violations stay,
+/// the one at which they do.
 ///
 /// [`HeapIpm`] allocates its memory; [`Ipm::in_memory`] takes it, and then a run allocates nothing
 /// but its log, with the feature `alloc`.
@@ -108,6 +111,8 @@ pub struct Ipm<T, D, M, I> {
     trial: Solution<T, D, M>,
     /// The best iterate.
     best: Solution<T, D, M>,
+    /// The first iterate.
+    guess: Solution<T, D, M>,
     /// Of Newton's equations.
     numbers: M,
     indices: I,

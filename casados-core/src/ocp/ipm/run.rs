@@ -126,7 +126,9 @@ where
                 }
                 self.log.push(row);
             }
-            if let Some(status) = end {
+            if let Some(status) = end
+                && !self.begin_again(ocp, &capacity, &mut state, status)
+            {
                 outcome.status = status;
                 break Ok(());
             }
@@ -175,6 +177,7 @@ where
         self.trial.copy_from(iterate);
         push_inside(qp, lengths.fixed, push, work.units, &mut iterate.view_mut());
         ocp.join_controls();
+        self.guess.copy_from(&ocp.iterate);
         let stays = self.trial.vectors().0 == ocp.iterate.vectors().0;
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);

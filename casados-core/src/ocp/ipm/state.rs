@@ -38,6 +38,8 @@ pub(super) struct State<'c> {
     pub delta: f64,
     /// The penalty, if bounds are soft.
     pub elastic: Option<f64>,
+    /// Whether this is a second attempt.
+    pub again: bool,
     /// Phases in which violations alone are made small.
     pub phase: Phase,
     /// The largest gap or violation, in units.
@@ -91,6 +93,7 @@ impl<'c> State<'c> {
             regularisation: Regularisation::default(),
             delta: 0.0,
             elastic: None,
+            again: false,
             phase: Phase::default(),
             violation: f64::INFINITY,
             gaps: f64::INFINITY,
