@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Solves, and checks the conditions of optimality by code that is not the solver's: the QP at the
 /// iterate, element by element.
-fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+pub fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
 ) -> Result<casados::ocp::Outcome, Box<dyn std::error::Error>> {
     let mut ipm = HeapIpm::new(ocp)?;
@@ -25,7 +25,7 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
 
 /// A pendulum on a cart, M = 1, m = 0.1, l = 0.8, g = 9.81.
 #[ode]
-fn cart_pole(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
+pub fn cart_pole(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
     let [_, theta, v, omega] = x;
     let (s, c) = theta.sin_cos();
     let d = 1.1 - 0.1 * c * c;
@@ -38,7 +38,7 @@ fn cart_pole(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
 }
 
 #[function]
-fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
+pub fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
     1e-2 * (u[0] * u[0] + x[1] * x[1]) + 1e-3 * (x[0] * x[0] + x[2] * x[2] + x[3] * x[3])
 }
 

@@ -6,6 +6,22 @@ use crate::qp::{Places, Solution, StageDims, part, part_mut};
 use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Makes a guess the iterate, moved into its bounds, with the states that follow from its
+    /// controls; what was the iterate is in `guess` then. Whether these have values: otherwise the
+    /// iterate stays.
+    pub(super) fn simulate_guess(&mut self, guess: &mut Solution<T, D, M>, ends: &mut [T]) -> bool {
+        core::mem::swap(&mut self.iterate, guess);
+        self.clip();
+        core::mem::swap(&mut self.iterate, guess);
+        let has_values = self.simulate(guess, ends, &[], f64::INFINITY);
+        if has_values {
+            core::mem::swap(&mut self.iterate, guess);
+            self.join_controls();
+            self.join_states();
+        }
+        has_values
+    }
+
     /// Moves the states of a point to the ends of the intervals before them, until all gaps are
     /// closed. Whether that has values, and ends no farther away than `far` times the gaps that
     /// there were, in `units` if there are any.

@@ -10,7 +10,7 @@ use super::arithmetic::Arithmetic;
 use super::arithmetic::Fused;
 use super::arithmetic::Separate;
 #[cfg(target_arch = "x86_64")]
-use crate::scalar::lanes::{Level, level, may_be, may_reach};
+use crate::scalar::lanes::{Level, level, may_be};
 #[cfg(target_arch = "x86_64")]
 use core::{marker::PhantomData, mem::ManuallyDrop};
 
@@ -135,15 +135,8 @@ type Entry<K> = unsafe fn(&mut ManuallyDrop<K>) -> <K as Kernel>::Output;
 
 #[cfg(target_arch = "x86_64")]
 impl<K: Kernel> Entries<K> {
-    /// Numbers that are registers, which are aligned to themselves, need what these are made of,
-    /// and nothing else.
-    const OF_REGISTERS: Option<Entry<K>> = match align_of::<K::Number>() {
-        0..32 => None,
-        32 => Some(compiled::avx2::run::<K>),
-        _ => Some(compiled::avx512::run::<K>),
-    };
-    /// Unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
-    /// the one copy that runs everywhere.
+    /// Whether its numbers are single, and fast. Unoptimised programs, where each copy of a kernel
+    /// is much to compile and none is fast, have the one copy that runs everywhere.
     const SINGLE: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
     /// Short kernels are faster without AVX-512.
     const AVX512: Option<Entry<K>> = if Self::SINGLE && K::WIDE && may_be(Level::Avx512) {
@@ -152,15 +145,19 @@ impl<K: Kernel> Entries<K> {
         None
     };
     const AVX2: Option<Entry<K>> =
-        if Self::SINGLE && (may_be(Level::Avx2) || !K::WIDE && may_reach(Level::Avx2)) {
+        if Self::SINGLE && (may_be(Level::Avx2) || !K::WIDE && may_be(Level::Avx512)) {
             Some(compiled::avx2::run::<K>)
         } else {
             None
         };
-    /// Where no machine needs it, one of the others: nobody gets here.
-    const BASE: Entry<K> = match (Self::AVX2, Self::AVX512) {
-        (Some(run), _) | (_, Some(run)) if !may_be(Level::Base) => run,
-        _ => compiled::base::run::<K>,
+    /// Where the machine has neither, or the kernel. Numbers that are registers, which are aligned
+    /// to themselves, need what these are made of. Where the build names more than every machine
+    /// has, nobody gets here.
+    const OTHERWISE: Entry<K> = match (align_of::<K::Number>(), Self::AVX2, Self::AVX512) {
+        (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be(Level::Base) => run,
+        (0..32, ..) => compiled::base::run::<K>,
+        (32, ..) => compiled::avx2::run::<K>,
+        _ => compiled::avx512::run::<K>,
     };
 }
 
@@ -171,14 +168,6 @@ impl<K: Kernel> Entries<K> {
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
-    if let Some(run) = Entries::<K>::OF_REGISTERS {
-        // SAFETY: the other condition of calling a function with target features is that the
-        // machine has them. Numbers are `Real`, registers, or made of such, and no type of a user's
-        // can be any of these (`Lanes` is sealed). So what is aligned like this is made of
-        // registers of AVX2 or AVX-512, with which drivers compute only after detection; see the
-        // head of `lanes`.
-        return unsafe { run(&mut kernel) };
-    }
     if let Some(run) = Entries::<K>::AVX512
         && level() == Level::Avx512
     {
@@ -191,8 +180,12 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         // SAFETY: as above.
         return unsafe { run(&mut kernel) };
     }
-    // SAFETY: every machine has what this needs.
-    unsafe { Entries::<K>::BASE(&mut kernel) }
+    // SAFETY: the other condition of calling a function with target features is that the machine
+    // has them. Single numbers need none here. Numbers are `Real`, registers, or made of such, and
+    // no type of a user's can be any of these (`Lanes` is sealed). So what is aligned more is made
+    // of registers of AVX2 or AVX-512, with which drivers compute only after detection; see the
+    // head of `lanes`.
+    unsafe { Entries::<K>::OTHERWISE(&mut kernel) }
 }
 
 /// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one

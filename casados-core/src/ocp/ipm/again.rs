@@ -46,16 +46,10 @@ where
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let here = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
         let left = if status == Status::NoProgress { state.best_violation } else { here };
-        self.trial.copy_from(&ocp.iterate);
-        ocp.iterate.copy_from(&self.guess);
-        ocp.clip();
-        core::mem::swap(&mut ocp.iterate, &mut self.trial);
-        if !ocp.simulate(&mut self.trial, work.ends, work.units, f64::INFINITY) {
+        self.trial.copy_from(&self.guess);
+        if !ocp.simulate_guess(&mut self.trial, work.ends) {
             return false;
         }
-        core::mem::swap(&mut ocp.iterate, &mut self.trial);
-        ocp.join_controls();
-        ocp.join_states();
         let is_linearised = ocp.linearise(Slopes).is_ok();
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);

@@ -146,27 +146,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         *state = State { again: true, damping: AGAIN, sizes: state.sizes, ..State::new() };
         self.weights.multipliers_mut().fill(T::ZERO);
         ocp.iterate.copy_from(&self.weights);
-        if !P::Dynamics::LIFTED && self.simulate_guess(ocp) && ocp.linearise(self.curvature).is_err() {
+        self.trial.copy_from(&self.weights);
+        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        let is_simulated = !P::Dynamics::LIFTED && ocp.simulate_guess(&mut self.trial, ends);
+        if is_simulated && ocp.linearise(self.curvature).is_err() {
             ocp.iterate.copy_from(&self.weights);
         }
         self.forget_weights(ocp, state);
         true
-    }
-
-    /// The guess, moved into its bounds, with the states that follow from its controls, if these
-    /// have values.
-    fn simulate_guess<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> bool {
-        self.trial.copy_from(&ocp.iterate);
-        ocp.clip();
-        core::mem::swap(&mut ocp.iterate, &mut self.trial);
-        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        let has_values = ocp.simulate(&mut self.trial, ends, &[], f64::INFINITY);
-        if has_values {
-            ocp.iterate.copy_from(&self.trial);
-            ocp.join_controls();
-            ocp.join_states();
-        }
-        has_values
     }
 
     /// One iteration; a status if it is the last one.

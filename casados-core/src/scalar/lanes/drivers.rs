@@ -39,9 +39,7 @@ macro_rules! side_by_side {
             // Two numbers have a register of four where there is one: with fused products,
             // elementary functions in it take half the time of those in a register of two.
             #[cfg(target_arch = "x86_64")]
-            if const { S > 1 && S <= $more && lanes::may_reach(lanes::Level::Avx2) }
-                && lanes::level() >= lanes::Level::Avx2
-            {
+            if const { S > 1 && S <= $more && lanes::AVX2 } && lanes::level() >= lanes::Level::Avx2 {
                 computation.call::<lanes::$avx2<S>>();
                 return Ok(());
             }
@@ -68,11 +66,11 @@ pub(crate) use side_by_side;
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
-            use crate::scalar::lanes::{self, Level, level, may_be, may_reach};
+            use crate::scalar::lanes::{self, Level, level, may_be};
             if const { may_be(Level::Avx512) } && level() == Level::Avx512 && lanes >= $most {
                 return Ok(computation.call::<lanes::$avx512<$most>>());
             }
-            if const { may_reach(Level::Avx2) } && level() >= Level::Avx2 && lanes >= $more {
+            if const { lanes::AVX2 } && level() >= Level::Avx2 && lanes >= $more {
                 return Ok(computation.call::<lanes::$avx2<$more>>());
             }
             Err(computation)

@@ -129,11 +129,8 @@ pub const fn may_be(level: Level) -> bool {
     }
 }
 
-/// Whether this [`level`] or a higher one may be.
-pub const fn may_reach(level: Level) -> bool {
-    let above = matches!(level, Level::Single | Level::Base);
-    may_be(level) || may_be(Level::Avx512) || above && may_be(Level::Avx2)
-}
+/// Whether a machine that runs the program may have AVX2.
+pub const AVX2: bool = may_be(Level::Avx2) || may_be(Level::Avx512);
 
 /// The widest registers that this machine has and [`limit`] allows; those that the build names,
 /// where it does.
@@ -151,7 +148,7 @@ pub fn level() -> Level {
     };
     // What there cannot be the compiler leaves out.
     match level {
-        Level::Avx512 | Level::Avx2 if !may_reach(Level::Avx2) => Level::Base,
+        Level::Avx512 | Level::Avx2 if !AVX2 => Level::Base,
         level => level,
     }
 }
