@@ -237,30 +237,33 @@ fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
     1e-2 * (u[0] * u[0] + x[1] * x[1]) + 1e-3 * (x[0] * x[0] + x[2] * x[2] + x[3] * x[3])
 }
 
-/// Milliseconds of an iteration over the number of intervals, and of a recursion with periodic
-/// states and without.
+/// The time of an iteration over the number of intervals of a second, and that of a recursion with
+/// periodic states and without.
 fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
     use casados::ocp::{GeneralCost, Horizon, Problem};
     writeln!(
         table,
         "| intervals | iterations | microseconds of an iteration for each interval |\n| --- | --- | --- |"
     )?;
+    let mut horizons = Vec::new();
     for n in [20, 40, 80, 160, 320, 640] {
         let batch = Batch::<CartPole, Gauss<2>>::new(Options::default())?;
         let mut ocp = Problem::new(Shooting::new(batch))
             .stage_cost(GeneralCost::<Effort>::new())
-            .on(Horizon::uniform(n, 0.05))?;
+            .on(Horizon::uniform(n, 1.0 / n as f64))?;
         ocp.fix_initial_state(&[0.0, 0.4, 0.0, 0.0])?.bound("u", .., -5.0, 5.0)?;
         ocp.bound("x[0]", 1.., -0.5, 0.5)?;
-        let guess = [vec![vec![0.0; 4]; n + 1], vec![vec![0.0]; n]];
-        let mut run = runner(ocp)?;
-        let mut runs = Vec::new();
-        for _ in 0..ROUNDS {
-            runs.push(run(&guess)?);
+        horizons.push((n, runner(ocp)?, Vec::new()));
+    }
+    for _ in 0..ROUNDS {
+        for (n, run, runs) in &mut horizons {
+            runs.push(run(&[vec![vec![0.0; 4]; *n + 1], vec![vec![0.0]; *n]])?);
         }
+    }
+    for (n, _, runs) in &horizons {
         let Some(Run { outcome, .. }) = runs.first() else { continue };
         let iterations = outcome.iterations.max(1) as f64;
-        let time = median(runs.iter().map(|run| 1e3 * run.milliseconds / iterations / n as f64));
+        let time = median(runs.iter().map(|run| 1e3 * run.milliseconds / iterations / *n as f64));
         writeln!(table, "| {n} | {} | {time:.2} |", outcome.iterations)?;
     }
     let h = orbit.number("T")?;

@@ -3,15 +3,13 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
+use super::kernels::MORE;
 use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
 use crate::qp::element::set;
-use crate::qp::layout::{Place, Places, take_mut};
+use crate::qp::layout::{Place, Places, pad, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
-
-/// How many parameters go side by side: the columns of the widest tile of a product.
-pub(super) const SIDE: usize = 6;
 
 /// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
 /// that programs that cannot ask for couplings do not contain them.
@@ -47,18 +45,19 @@ pub struct Coupling<'a, T> {
     pub step: &'a mut [T],
     /// Columns of `M` of shared controls, over the variables of all stages.
     pub columns: &'a mut [T],
-    /// `Γ` at the first stage, column after column.
-    pub gamma: &'a mut [T],
-    /// `S`, the lower triangle.
+    /// How many variables there are.
+    pub length: usize,
+    /// `S`, the lower triangle. Its columns, and those of the three matrices below, are of one
+    /// padded length: an element for each parameter.
     pub schur: &'a mut [T],
     /// `s`
     pub linear: &'a mut [T],
-    /// Gradients of the parameters at work, and their `−γ₊`, side by side.
+    /// `Γᵀ` of the stage at work over all its variables, and `−Γᵀ` of the stage behind it.
     pub group: &'a mut [T],
     pub minus: &'a mut [T],
-    /// `Σ γ₊ᵀ r`, the part of `s` that residuals of the dynamics have.
+    /// `Σ Γ₊ᵀ r`, the part of `s` that residuals of the dynamics have.
     pub offset: &'a mut [T],
-    /// `L⁻¹ M_u·` of every parameter, over the variables of all stages.
+    /// `L⁻¹ M_u·` of all parameters, a column for each variable of all stages.
     pub eliminated: &'a mut [T],
     /// `p` at the first stage.
     pub first: &'a mut [T],
@@ -72,20 +71,16 @@ pub struct Coupling<'a, T> {
 impl<'a, T: Real> Coupling<'a, T> {
     /// How many numbers it takes for so many periodic states and shared controls.
     pub const fn memory(dims: &[StageDims], conditions: usize, shared: usize) -> usize {
-        let Extent { ld, end, .. } = Extent::of::<T>(dims);
-        let (v, nx) = (end.v, first_nx(dims));
+        let Extent { n, nx, end, .. } = Extent::of::<T>(dims);
         let count = conditions + shared;
-        let n = nx + count;
-        let group = SIDE * ld;
-        2 * group
+        let columns = n + MORE + nx + 1 + count + MORE + end.v;
+        let (first, border) = (first_nx(dims), first_nx(dims) + count);
+        pad::<T>(count) * columns
             + 2 * conditions
-            + 3 * count
-            + shared * v
-            + nx * count
-            + count * count
-            + count * v
-            + nx
-            + n * (n + 2)
+            + 2 * count
+            + shared * end.v
+            + first
+            + border * (border + 2)
     }
 
     /// That of a QP.
@@ -106,7 +101,7 @@ impl<'a, T: Real> Coupling<'a, T> {
             return None;
         }
         let _exists = EXISTS?;
-        let (v, nx) = (extent.end.v, first_nx(qp.dims));
+        let (v, nx, ld) = (extent.end.v, first_nx(qp.dims), pad::<T>(count));
         let n = nx + count;
         Some(Self {
             _exists,
@@ -119,13 +114,13 @@ impl<'a, T: Real> Coupling<'a, T> {
             theta: take_mut(memory, conditions),
             step: take_mut(memory, count),
             columns: take_mut(memory, parameters * v),
-            gamma: take_mut(memory, nx * count),
-            schur: take_mut(memory, count * count),
+            length: v,
+            schur: take_mut(memory, ld * (count + MORE)),
             linear: take_mut(memory, count),
-            group: take_mut(memory, SIDE * extent.ld),
-            minus: take_mut(memory, SIDE * extent.ld),
-            offset: take_mut(memory, count),
-            eliminated: take_mut(memory, count * v),
+            group: take_mut(memory, ld * (extent.n + MORE)),
+            minus: take_mut(memory, ld * extent.nx),
+            offset: take_mut(memory, ld),
+            eliminated: take_mut(memory, ld * v),
             first: take_mut(memory, nx),
             matrix: take_mut(memory, n * n),
             right: take_mut(memory, n),

@@ -66,10 +66,12 @@ pub struct Riccati<'a, T> {
 /// place behind the last stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    n: usize,
+    /// The most variables of a stage.
+    pub n: usize,
     /// The longest column of a stage.
     pub ld: usize,
-    nx: usize,
+    /// The most states of a stage.
+    pub nx: usize,
     next_and_ng: usize,
     pub end: Place,
 }
