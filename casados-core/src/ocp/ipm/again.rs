@@ -17,6 +17,8 @@ use crate::scalar::Real;
 /// A simulation is a better place where it violates bounds by less than this part of what the first
 /// attempt leaves.
 const BETTER: f64 = 0.5;
+/// It is asked for after so many steps in a row that are short, or of a phase for violations, too.
+const STRAYING: usize = 16;
 
 impl<T, D, M, I> Ipm<T, D, M, I>
 where
@@ -25,27 +27,32 @@ where
     M: AsRef<[T]> + AsMut<[T]> + Store<T>,
     I: Store<u32>,
 {
-    /// Whether a run that failed begins again: once, where a simulation with the controls of the
-    /// guess violates bounds by less than the point where it failed. Over unstable dynamics gaps
-    /// may be what leads astray, and violations that stay there say nothing of the problem.
+    /// Whether a run that failed, or goes on and on to make violations small, begins again: once,
+    /// where a simulation with the controls of the guess violates bounds by less than the point
+    /// that it is at. Over unstable dynamics gaps may be what leads astray, and violations that
+    /// stay there say nothing of the problem.
     pub(super) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
         state: &mut State<'_>,
-        status: Status,
+        end: Option<Status>,
     ) -> bool
     where
         P::Dynamics: SecondOrder<T>,
     {
-        let failed = matches!(status, Status::Infeasible { .. } | Status::NoProgress);
-        if !failed || state.again || P::Dynamics::LIFTED {
+        let strays = end.is_none() && state.straying == STRAYING;
+        let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
+        if !(failed || strays) || state.again || P::Dynamics::LIFTED {
             return false;
         }
-        state.again = true;
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let here = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
-        let left = if status == Status::NoProgress { state.best_violation } else { here };
+        let left = match end {
+            Some(Status::NoProgress) => state.best_violation,
+            Some(_) => here,
+            None => state.violation.max(here),
+        };
         self.trial.copy_from(&self.guess);
         if !ocp.simulate_guess(&mut self.trial, work.ends) {
             return false;
@@ -55,10 +62,11 @@ where
         let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
         if !(is_linearised && found < BETTER * left) {
             core::mem::swap(&mut ocp.iterate, &mut self.trial);
+            state.is_linearised = false;
             return false;
         }
         leave(ocp, state, work.penalties, &self.options);
-        (state.phase, state.is_linearised) = (Phase::default(), true);
+        (state.phase, state.is_linearised, state.again) = (Phase::default(), true, true);
         true
     }
 }

@@ -109,6 +109,7 @@ where
             return Ok(self.recover(ocp, capacity, state));
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
+        state.count_straying(row.step);
         self.accept(ocp, capacity, state, &direction, accepted)?;
         let least =
             (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);

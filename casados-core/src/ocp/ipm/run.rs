@@ -126,8 +126,9 @@ where
                 }
                 self.log.push(row);
             }
+            let again = self.begin_again(ocp, &capacity, &mut state, end);
             if let Some(status) = end
-                && !self.begin_again(ocp, &capacity, &mut state, status)
+                && !again
             {
                 outcome.status = status;
                 break Ok(());

@@ -19,6 +19,9 @@ pub(super) const MARGIN: f64 = 1e-8;
 const HELD: usize = 3;
 const CRAWLS: f64 = 0.9;
 
+/// Steps that are no longer lead nowhere if there are many of them.
+const SHORT: f64 = 1.0 / 32.0;
+
 /// What a run remembers from one iteration to the next.
 pub(super) struct State<'c> {
     /// Whether the time is over.
@@ -56,6 +59,8 @@ pub(super) struct State<'c> {
     pub acceptable: usize,
     /// Iterations one after the other in which complementarity is all that is left, and stays.
     pub held: usize,
+    /// Steps one after the other that are short, or of phases for violations.
+    pub straying: usize,
     /// Whether slacks that multipliers held were released.
     pub released: bool,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
@@ -102,6 +107,7 @@ impl<'c> State<'c> {
             stationary_violation: f64::INFINITY,
             acceptable: 0,
             held: 0,
+            straying: 0,
             released: false,
             has_slacks: false,
             is_linearised,
@@ -110,6 +116,12 @@ impl<'c> State<'c> {
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
         }
+    }
+
+    /// Counts a step of this length.
+    pub fn count_straying(&mut self, step: f64) {
+        let strays = self.phase.force.is_some() || step <= SHORT;
+        self.straying = if strays { self.straying + 1 } else { 0 };
     }
 
     /// The next barrier parameter, from residuals and with a unit of products in which errors are

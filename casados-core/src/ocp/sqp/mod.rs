@@ -12,8 +12,10 @@
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `scaled` | the QP in units |
 //! | `run` | the iterations, and how they end |
+//! | `again` | the second attempt, from a simulation |
 
 mod acceptance;
+mod again;
 mod direction;
 mod measure;
 mod multipliers;

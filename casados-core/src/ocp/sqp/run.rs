@@ -8,7 +8,6 @@ use super::secant::Take;
 use super::state::{State, Taken};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::Curvature;
-use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
@@ -32,8 +31,8 @@ const PASSING: usize = 4;
 /// The regularisation of directions, where no step along the one before is short enough.
 const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
 const MOST_DAMPING: f64 = 1e2;
-/// That of the first direction after a failure.
-const AGAIN: f64 = 1.0;
+/// After so many steps with penalties in a row a simulation is asked whether it violates less.
+const STRAYING: usize = 16;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -106,6 +105,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 outcome.status = status;
                 break;
             }
+            if end.is_none() && state.elastic_steps >= STRAYING && !state.asked {
+                self.ask_simulation(ocp, &mut state, &row);
+            }
             if observer(&row).is_break() {
                 outcome.status = Status::Stopped;
                 break;
@@ -122,38 +124,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
-    }
-
-    /// Whether a run that failed begins again: once, at a simulation with the controls of its
-    /// guess, with steps that are damped as those of Gauss and Newton are. It was long steps at
-    /// first that led astray, or gaps that were to be closed over unstable dynamics.
-    fn begin_again<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
-        status: Status,
-        iterations: usize,
-    ) -> bool
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        let failed = matches!(status, Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_));
-        let can = C::EXACT && !state.again && iterations < self.options.max_iterations;
-        if !(failed && can && self.curvature.convexification() == Convexification::Reduced) {
-            return false;
-        }
-        self.leave_elastic(ocp, state);
-        *state = State { again: true, damping: AGAIN, sizes: state.sizes, ..State::new() };
-        self.weights.multipliers_mut().fill(T::ZERO);
-        ocp.iterate.copy_from(&self.weights);
-        self.trial.copy_from(&self.weights);
-        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        let is_simulated = !P::Dynamics::LIFTED && ocp.simulate_guess(&mut self.trial, ends);
-        if is_simulated && ocp.linearise(self.curvature).is_err() {
-            ocp.iterate.copy_from(&self.weights);
-        }
-        self.forget_weights(ocp, state);
-        true
     }
 
     /// One iteration; a status if it is the last one.

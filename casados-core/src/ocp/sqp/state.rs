@@ -12,6 +12,8 @@ pub(super) struct State<T> {
     pub begins: bool,
     /// The run failed, and began again.
     pub again: bool,
+    /// A simulation was asked whether it violates less.
+    pub asked: bool,
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
@@ -63,6 +65,7 @@ impl<T> State<T> {
         Self {
             begins: true,
             again: false,
+            asked: false,
             search: Search::new(),
             elastic: false,
             regularisation: 0.0,
