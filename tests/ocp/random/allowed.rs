@@ -3,8 +3,8 @@
 use super::Draw;
 use casados::ocp::{IpmOptions, SqpOptions};
 
-/// Sizes of guesses in [`Draw::forces`] are at most this.
-const FARTHEST: f64 = 10.0;
+/// Guesses are at most this, but for those that are moved to bounds or have no objective.
+const FARTHEST: f64 = 30.0;
 
 /// How large residuals may be, where derivatives of the objective at the guess are so large.
 pub(super) trait Allowed {
@@ -26,7 +26,7 @@ impl Allowed for IpmOptions {
 
 impl Draw {
     /// More than what the objective changes by at the guess, where a variable changes by its size
-    /// or by one. Guesses that are farther off are moved to bounds.
+    /// or by one.
     pub(super) fn forces(&self) -> f64 {
         let sizes = |i: usize| self.guess.iter().map(move |guess| guess[i].abs().min(FARTHEST));
         let of = |i: usize| sizes(i).fold(1.0, f64::max) + self.reference[i].abs();

@@ -102,7 +102,7 @@ where
             again(&mut iterate, T::from_f64(state.mu), false)?;
         } else if probes {
             state.mu = predictor::probe(&iterate.sides, least);
-            is_corrected = predictor::correct(&mut iterate, state.mu, force)?;
+            is_corrected = predictor::correct(&mut iterate, state.mu, force, state.violation)?;
         }
         if probes {
             state.filter.clear();
