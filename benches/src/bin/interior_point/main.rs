@@ -23,7 +23,7 @@ mod starts;
 
 use awe::Awe;
 use casados::ocp::{
-    Collocation, Exact, Formulation, HeapIpm, HeapOcp, HeapSqp, Outcome, SecondOrder, Shooting,
+    Barrier, Collocation, Exact, Formulation, HeapIpm, HeapOcp, HeapSqp, Outcome, SecondOrder, Shooting,
 };
 use casados::prelude::*;
 use casados_benches::models::Chain;
@@ -287,12 +287,13 @@ fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Milliseconds of search directions that needed one factorisation.
+/// Milliseconds of search directions that needed one factorisation, without corrections: a
+/// recursion for one right-hand side.
 fn directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
 ) -> Result<Vec<f64>, Failure> {
     let mut ipm = HeapIpm::new(ocp)?;
-    ipm.options.max_iterations = 12;
+    (ipm.options.max_iterations, ipm.options.barrier) = (12, Barrier::Monotone);
     ipm.solve(ocp)?;
     let plain = ipm.log().0.iter().filter(|i| i.regularisation == 0.0 && i.step > 0.0);
     Ok(plain.map(|iteration| 1e3 * iteration.times.qp).collect())
