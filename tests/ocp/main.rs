@@ -19,6 +19,7 @@ mod convex;
 mod coupled_derivatives;
 mod coupling;
 mod curvature;
+mod deadlines;
 mod degenerate;
 mod errors;
 mod estimation;

@@ -262,12 +262,46 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: A
     /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::NonFiniteDerivative`],
     /// [`OcpError::Qp`]
     pub fn feedback(self, x0: &[T]) -> Result<Feedback<'a, T>, OcpError> {
+        self.feedback_until(x0, &mut || false)
+    }
+
+    /// As [`Prepared::feedback`], until the time is over; see [`QpSolver::solve_until`].
+    ///
+    /// # Errors
+    /// As [`Prepared::feedback`], and [`OcpError::Qp`] with
+    /// [`QpError::OutOfTime`](crate::qp::QpError::OutOfTime): then the first control of the plan,
+    /// which is as it was, is what is left to apply.
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// use casados::qp::QpError;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let mut controller = HeapRealTime::new(ocp)?;
+    /// let late = controller.prepare()?.feedback_until(&[0.8], &mut || true).map(|feedback| feedback.u[0]);
+    /// assert!(matches!(late, Err(OcpError::Qp(QpError::OutOfTime { .. }))));
+    /// assert_eq!(controller.ocp().stage(0)?.u, [0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn feedback_until(
+        self,
+        x0: &[T],
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Feedback<'a, T>, OcpError> {
         let Self { qp_solver, ocp, solution, warm } = self;
         ocp.fix_initial_state(x0)?;
         solution.copy_from(&ocp.iterate);
         let start = if *warm { QpStart::Warm } else { QpStart::Cold };
         let statistics = qp_solver
-            .solve(ocp.qp(), start, solution.view_mut())
+            .solve_until(ocp.qp(), start, solution.view_mut(), over)
             .map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;
         *warm = true;
         core::mem::swap(&mut ocp.iterate, solution);

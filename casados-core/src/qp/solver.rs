@@ -79,6 +79,22 @@ pub trait QpSolver<T> {
         solution: SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError>;
 
+    /// As [`QpSolver::solve`], until the time is over: `over`, a clock or a counter of cycles, is
+    /// asked again and again. A solver that cannot make use of it takes the time that it takes.
+    ///
+    /// # Errors
+    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`].
+    fn solve_until(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: QpStart,
+        solution: SolutionView<'_, T>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<QpStatistics, QpError> {
+        let _ = over;
+        self.solve(qp, start, solution)
+    }
+
     /// Asks for residuals below a tolerance for now, but not for less than its options say. A
     /// solver that cannot make use of it solves as well as always.
     fn relax(&mut self, tolerance: f64) {

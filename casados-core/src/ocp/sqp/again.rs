@@ -24,7 +24,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         status: Status,
         iterations: usize,
     ) -> bool
@@ -49,7 +49,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn ask_simulation<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &Iteration,
     ) where
         C: Curvature<P::Dynamics, T>,
@@ -91,8 +91,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Nothing is remembered of the first attempt.
-    fn forget<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<T>) {
-        *state = State { again: true, asked: true, damping: DAMPING, sizes: state.sizes, ..State::new() };
+    fn forget<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>) {
+        let (over, sizes) = (state.over.take(), state.sizes);
+        *state = State { over, again: true, asked: true, damping: DAMPING, sizes, ..State::new() };
         self.forget_weights(ocp, state);
     }
 }

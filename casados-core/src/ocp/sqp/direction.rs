@@ -56,7 +56,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn set_elastic<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         penalty: f64,
     ) {
         let memory = penalties_mut(self.work.as_mut(), ocp);
@@ -73,7 +73,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn leave_elastic<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
     ) {
         if state.elastic {
             // What is remembered is in units.
@@ -89,7 +89,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
     ) -> Result<Result<Direction, QpError>, OcpError>
     where
@@ -116,7 +116,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn direction_in_units<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
     ) -> Result<Direction, QpError>
     where
@@ -145,7 +145,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn elastic_direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
         error: QpError,
     ) -> Result<Direction, QpError>
@@ -213,7 +213,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The step to the nearest point; the QP has another objective than that of the iterate.
-    fn go_near(state: &mut State<T>, row: &mut Iteration) -> Direction {
+    fn go_near(state: &mut State<'_, T>, row: &mut Iteration) -> Direction {
         (state.nearest, row.regularisation) = (true, 0.0);
         Direction::Step
     }
@@ -228,7 +228,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn nearest<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
         violation: f64,
     ) -> Result<(), QpError> {
@@ -241,7 +241,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (flat, digits) in FLAT {
             self.qp_solver.relax(digits * penalty);
             ocp.forget_objective(T::from_f64(flat * penalty / violation));
-            result = self.solve_qp(ocp, QpStart::Cold, row);
+            result = self.solve_qp(ocp, state, QpStart::Cold, row);
             if result.is_ok() {
                 break;
             }
@@ -262,7 +262,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn regularised<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError>
@@ -276,7 +276,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             row.regularisation = state.damping;
         }
         loop {
-            let error = match self.solve_qp(ocp, start, row) {
+            let error = match self.solve_qp(ocp, state, start, row) {
                 Ok(()) => break,
                 Err(error) => error,
             };
@@ -312,13 +312,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
         start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError> {
         let mut start = start;
         loop {
             self.solution.copy_from(&ocp.iterate);
-            let result = self.qp_solver.solve(ocp.qp(), start, self.solution.view_mut());
+            let over = &mut || state.is_over();
+            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
             row.qp_iterations += match &result {
                 Ok(QpStatistics { iterations, .. })
                 | Err(QpError::MaxIterations { iterations, .. } | QpError::Stalled { iterations, .. }) => {
@@ -327,7 +329,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 Err(_) => 0,
             };
             let Err(error) = result else { return Ok(()) };
-            if start == QpStart::Cold || matches!(error, QpError::NotConvex { .. }) {
+            if start == QpStart::Cold
+                || matches!(error, QpError::NotConvex { .. } | QpError::OutOfTime { .. })
+            {
                 return Err(error);
             }
             start = QpStart::Cold;

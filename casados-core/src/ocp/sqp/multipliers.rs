@@ -31,7 +31,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn first_multipliers<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<T>,
+        state: &State<'_, T>,
     ) -> Result<(), OcpError>
     where
         C: Curvature<P::Dynamics, T>,

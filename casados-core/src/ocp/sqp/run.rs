@@ -62,10 +62,59 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
+        self.run(ocp, observer, &mut || false)
+    }
+
+    /// As [`Sqp::solve`], until the time is over: `over`, a clock or a counter of cycles, is asked
+    /// after each linearisation, and in every iteration of a QP, as far as its solver makes use of
+    /// that. Then the status is [`Status::OutOfTime`], and the iterate the best one.
+    ///
+    /// # Errors
+    /// As [`Sqp::solve`].
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// use std::time::{Duration, Instant};
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    /// #     .on(Horizon::uniform(10, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let deadline = Instant::now() + Duration::from_secs(60);
+    /// let mut sqp = HeapSqp::new(&ocp)?;
+    /// assert_eq!(sqp.solve_until(&mut ocp, &mut || true)?.status, Status::OutOfTime);
+    /// assert!(sqp.solve_until(&mut ocp, &mut || Instant::now() > deadline)?.is_converged());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn solve_until<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
+    }
+
+    fn run<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
         ocp.fits(self.solution.dims())?;
         self.options.check()?;
         self.qp_solver.refine(self.options.tolerance);
-        let mut state = State::new();
+        let mut state = State { over: Some(over), ..State::new() };
         if C::KEEPS {
             ocp.check_without_algebraic()?;
             self.curvature.follow(f64::INFINITY);
@@ -130,7 +179,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn iterate<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
     ) -> Result<Option<Status>, OcpError>
     where
@@ -182,6 +231,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if row.iteration >= self.options.max_iterations {
             return Ok(Some(Status::MaxIterations));
         }
+        if state.is_over() {
+            return Ok(Some(Status::OutOfTime));
+        }
         let taken = match self.step(ocp, state, row, &mut watch)? {
             ControlFlow::Continue(taken) => taken,
             ControlFlow::Break(status) => return Ok(Some(status)),
@@ -201,7 +253,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The curvature of the QP along its step, of which the iterate has gone a part.
-    fn curvature_of_step<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> f64 {
+    fn curvature_of_step<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_, T>,
+    ) -> f64 {
         self.scale(ocp, state, Way::Into);
         let curvature = ocp.curvature(&self.solution);
         self.scale(ocp, state, Way::Back);
@@ -209,7 +265,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Compares the length of the full step with that of the one before.
-    fn follow<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<T>)
+    fn follow<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>)
     where
         C: Curvature<P::Dynamics, T>,
     {
@@ -225,7 +281,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn go<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
     ) -> Result<Option<Taken>, OcpError>
     where
@@ -243,7 +299,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn step<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
         watch: &mut Watch,
     ) -> Result<ControlFlow<Status, Taken>, OcpError>
@@ -272,6 +328,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let direction = self.direction(ocp, state, row)?;
             row.times.qp += watch.lap();
             failure = direction.as_ref().err().copied();
+            if state.late {
+                return Ok(ControlFlow::Break(Status::OutOfTime));
+            }
             match direction {
                 Ok(Direction::Step) => {
                     self.follow(ocp, state);

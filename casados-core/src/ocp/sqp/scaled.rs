@@ -136,7 +136,11 @@ impl<T: Real> Scale<'_, T> {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Finds the units at the iterate, where the QP is written.
-    pub(super) fn find_units<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<T>) {
+    pub(super) fn find_units<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+    ) {
         let rows = self.work.as_mut().get_mut(penalties_end(ocp)..).unwrap_or_default();
         let Sizes { force, .. } = ocp.find_units(rows, self.trial.view_mut().v);
         let force = if (1.0 / WIDE..=WIDE).contains(&force) { 1.0 } else { power::<T>(force) };
@@ -155,7 +159,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP, the iterate and the solution, into units or back.
-    pub(super) fn scale<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>, way: Way) {
+    pub(super) fn scale<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_, T>,
+        way: Way,
+    ) {
         let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
         let scale = Scale { units, way, judges: false };
         scale.qp(&mut ocp.qp);
@@ -167,7 +176,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn scale_weights<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
-        state: &State<T>,
+        state: &State<'_, T>,
         way: Way,
     ) {
         let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
@@ -180,7 +189,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn judge<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<T>,
+        state: &State<'_, T>,
         residuals: &Residuals,
     ) -> f64 {
         let Some(units) = units(self.work.as_ref(), ocp, state) else { return residuals.largest() };
@@ -211,7 +220,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// The units in the memory of a run, where they are not all one.
-fn units<'s, P, T, D, M>(work: &'s [T], ocp: &Ocp<P, T, D, M>, state: &State<T>) -> Option<Units<'s, T>>
+fn units<'s, P, T, D, M>(work: &'s [T], ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) -> Option<Units<'s, T>>
 where
     P: Formulation<T>,
     T: Real,

@@ -36,7 +36,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn search<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         row: &mut Iteration,
     ) -> Result<Option<Taken>, OcpError>
     where
@@ -85,7 +85,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Weights of violations before the first line search: those of a filter are the inverses of
     /// units and stay.
-    pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<T>) {
+    pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
         let weighted = self.options.globalisation == Globalisation::Merit;
         self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
         if !weighted {
@@ -98,7 +98,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn measure_at<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<T>,
+        state: &State<'_, T>,
         length: f64,
     ) -> Option<Measure> {
         let Self { solution, trial, work, weights, .. } = self;
@@ -122,7 +122,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn shortened<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         line: &Line,
         mut length: f64,
         mut there: Measure,
@@ -144,14 +144,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
-    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> Line {
+    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
         let (here, slope) = self.weigh(ocp, state);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn weigh<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<T>) -> (Measure, f64) {
+    fn weigh<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_, T>,
+    ) -> (Measure, f64) {
         if self.options.globalisation != Globalisation::Merit {
             let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
@@ -182,7 +186,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn try_linearised<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         line: &Line,
     ) -> bool
     where
@@ -208,7 +212,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn corrected<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<T>,
+        state: &mut State<'_, T>,
         line: &Line,
         row: &mut Iteration,
     ) -> bool {
@@ -218,7 +222,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // It is the trial that is solved for, and scaled back.
         core::mem::swap(&mut self.solution, &mut self.trial);
         self.scale(ocp, state, Way::Into);
-        let solved = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
+        let solved =
+            self.qp_solver
+                .solve_until(ocp.qp(), QpStart::Warm, self.solution.view_mut(), &mut || state.is_over());
         self.scale(ocp, state, Way::Back);
         core::mem::swap(&mut self.solution, &mut self.trial);
         let Ok(statistics) = solved else { return false };

@@ -7,7 +7,11 @@ use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
 /// What a run remembers from one iteration to the next.
-pub(super) struct State<T> {
+pub(super) struct State<'c, T> {
+    /// Whether the time is over.
+    pub over: Option<&'c mut dyn FnMut() -> bool>,
+    /// Whether it was.
+    pub late: bool,
     /// Nothing has been done yet.
     pub begins: bool,
     /// The run failed, and began again.
@@ -59,10 +63,12 @@ const FORGET: f64 = 0.1;
 const LEAST: f64 = 1e-8;
 const MOST: f64 = 1e2;
 
-impl<T> State<T> {
+impl<T> State<'_, T> {
     /// That of a run that begins.
     pub fn new() -> Self {
         Self {
+            over: None,
+            late: false,
             begins: true,
             again: false,
             asked: false,
@@ -83,6 +89,12 @@ impl<T> State<T> {
             reach: f64::INFINITY,
             number: PhantomData,
         }
+    }
+
+    /// Asks the clock, once it is late no more.
+    pub fn is_over(&mut self) -> bool {
+        self.late = self.late || self.over.as_mut().is_some_and(|over| over());
+        self.late
     }
 
     /// The unit of forces.

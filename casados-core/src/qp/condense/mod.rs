@@ -132,7 +132,17 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         &mut self,
         qp: QpView<'_, T>,
         start: QpStart,
+        solution: SolutionView<'_, T>,
+    ) -> Result<QpStatistics, QpError> {
+        self.solve_until(qp, start, solution, &mut || false)
+    }
+
+    fn solve_until(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: QpStart,
         mut solution: SolutionView<'_, T>,
+        over: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError> {
         super::check::check_all_bounds(qp)?;
         solution.fits(qp)?;
@@ -165,7 +175,7 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         if start == QpStart::Warm {
             copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), false);
         }
-        let result = solver.solve(condensed.view(), start, start_and_solution.view_mut());
+        let result = solver.solve_until(condensed.view(), start, start_and_solution.view_mut(), over);
         copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), true);
         let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
         T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });

@@ -289,7 +289,17 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         start: QpStart,
         solution: SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError> {
-        self.solve_until(qp, start, solution, &mut || false)
+        Self::solve_until(self, qp, start, solution, &mut || false)
+    }
+
+    fn solve_until(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: QpStart,
+        solution: SolutionView<'_, T>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<QpStatistics, QpError> {
+        Self::solve_until(self, qp, start, solution, over)
     }
 
     fn relax(&mut self, tolerance: f64) {
