@@ -80,10 +80,33 @@ pub trait QpSolver<T> {
     ) -> Result<QpStatistics, QpError>;
 
     /// As [`QpSolver::solve`], until the time is over: `over`, a clock or a counter of cycles, is
-    /// asked again and again. A solver that cannot make use of it takes the time that it takes.
+    /// asked before each iteration of an interior point. A solver that cannot make use of it takes
+    /// the time that it takes.
     ///
     /// # Errors
-    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`].
+    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`]; then the solution holds the iterate.
+    ///
+    /// # Example
+    /// ```
+    /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims};
+    /// use std::time::{Duration, Instant};
+    ///
+    /// let dims = [StageDims::new(1, 1, 0), StageDims::new(1, 0, 0)];
+    /// let mut qp = HeapQp::<f64>::new(&dims)?;
+    /// for mut stage in qp.stages_mut().take(1) {
+    ///     stage.a_mut().set(0, 0, 1.0);
+    ///     stage.b_mut().set(0, 0, 1.0);
+    ///     stage.r_mut().set(0, 0, 1.0);
+    ///     stage.u_bounds_mut().set(0, 0.5, 1.0);
+    /// }
+    /// qp.fix_initial_state(&[1.0])?;
+    /// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+    /// let deadline = Instant::now() + Duration::from_secs(60);
+    /// solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || Instant::now() > deadline)?;
+    /// let late = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || true);
+    /// assert!(matches!(late, Err(QpError::OutOfTime { .. })));
+    /// # Ok::<(), QpError>(())
+    /// ```
     fn solve_until(
         &mut self,
         qp: QpView<'_, T>,

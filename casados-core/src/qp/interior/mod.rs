@@ -289,53 +289,10 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         start: QpStart,
         solution: SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError> {
-        Self::solve_until(self, qp, start, solution, &mut || false)
+        self.solve_until(qp, start, solution, &mut || false)
     }
 
     fn solve_until(
-        &mut self,
-        qp: QpView<'_, T>,
-        start: QpStart,
-        solution: SolutionView<'_, T>,
-        over: &mut dyn FnMut() -> bool,
-    ) -> Result<QpStatistics, QpError> {
-        Self::solve_until(self, qp, start, solution, over)
-    }
-
-    fn relax(&mut self, tolerance: f64) {
-        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
-    }
-}
-
-impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
-    /// As [`QpSolver::solve`], until the time is over: `over` is asked before each iteration of the
-    /// interior point. A clock, or a counter of cycles.
-    ///
-    /// # Errors
-    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`]; then the solution holds the iterate.
-    ///
-    /// # Example
-    /// ```
-    /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, StageDims, QpStart};
-    /// use std::time::{Duration, Instant};
-    ///
-    /// let dims = [StageDims::new(1, 1, 0), StageDims::new(1, 0, 0)];
-    /// let mut qp = HeapQp::<f64>::new(&dims)?;
-    /// for mut stage in qp.stages_mut().take(1) {
-    ///     stage.a_mut().set(0, 0, 1.0);
-    ///     stage.b_mut().set(0, 0, 1.0);
-    ///     stage.r_mut().set(0, 0, 1.0);
-    ///     stage.u_bounds_mut().set(0, 0.5, 1.0);
-    /// }
-    /// qp.fix_initial_state(&[1.0])?;
-    /// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
-    /// let deadline = Instant::now() + Duration::from_secs(60);
-    /// solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || Instant::now() > deadline)?;
-    /// let late = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || true);
-    /// assert!(matches!(late, Err(QpError::OutOfTime { .. })));
-    /// # Ok::<(), QpError>(())
-    /// ```
-    pub fn solve_until(
         &mut self,
         qp: QpView<'_, T>,
         start: QpStart,
@@ -362,5 +319,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             }
             solved => solved,
         }
+    }
+
+    fn relax(&mut self, tolerance: f64) {
+        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }
