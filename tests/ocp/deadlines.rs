@@ -3,13 +3,11 @@
 use super::Test;
 use super::ipm::{CartPole, swing_up};
 use casados::ocp::{
-    Convexification, Exact, HeapIpm, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem,
-    Status,
+    Convexification, Exact, Formulation, GaussNewton, HeapIpm, HeapOcp, HeapRealTime, HeapSqp, Horizon,
+    LeastSquaresCost, OcpError, Problem, Status,
 };
 use casados::prelude::*;
-use casados::qp::{
-    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims, residuals,
-};
+use casados::qp::{Condensing, HeapInteriorPoint, HeapSolution, QpError, QpSolver, QpStart, residuals};
 
 /// The clock ends a run wherever it is, with the best iterate: more time leaves no worse one.
 #[test]
@@ -69,16 +67,20 @@ fn swing(x: [f64; 4], u: [f64; 1]) -> [f64; 5] {
     [x[0], x[1], 0.1 * x[2], 0.1 * x[3], 0.1 * u[0]]
 }
 
+/// A pendulum upright on a cart, which a force holds.
+fn upright(x0: &[f64; 4]) -> Result<HeapOcp<impl Formulation<f64>>, Box<dyn std::error::Error>> {
+    let mut ocp = Problem::new(Erk::<CartPole, Rk4>::new(Options::default())?)
+        .stage_cost(LeastSquaresCost::<Swing>::diagonal(&[1.0; 5]))
+        .on(Horizon::uniform(20, 0.05))?;
+    ocp.fix_initial_state(x0)?.bound("u", .., -20.0, 20.0)?.guess(x0, &[0.0])?;
+    Ok(ocp)
+}
+
 /// A sample that is late leaves the plan as it was, bit by bit, and the next one is in time.
 #[test]
 fn late_samples_leave_the_plan() -> Test {
-    let erk = Erk::<CartPole, Rk4>::new(Options::default())?;
-    let mut ocp = Problem::new(erk)
-        .stage_cost(LeastSquaresCost::<Swing>::diagonal(&[1.0; 5]))
-        .on(Horizon::uniform(20, 0.05))?;
     let x0 = [0.0, 0.1, 0.0, 0.0];
-    ocp.fix_initial_state(&x0)?.bound("u", .., -20.0, 20.0)?.guess(&x0, &[0.0])?;
-    let mut controller = HeapRealTime::new(ocp)?;
+    let mut controller = HeapRealTime::new(upright(&x0)?)?;
     controller.prepare()?.feedback(&x0)?;
     let plan = |controller: &HeapRealTime<_>| -> Vec<f64> {
         controller.ocp().iterate().stages().flat_map(|stage| [stage.x, stage.u].concat()).collect()
@@ -101,21 +103,12 @@ fn late_samples_leave_the_plan() -> Test {
 /// Condensing hands the clock on.
 #[test]
 fn condensed_problems_are_late_too() -> Test {
-    let mut dims = [StageDims::new(1, 1, 0); 5];
-    dims[4].nu = 0;
-    let mut qp = HeapQp::<f64>::new(&dims)?;
-    for mut stage in qp.stages_mut() {
-        stage.a_mut().set(0, 0, 1.0);
-        stage.b_mut().set(0, 0, 1.0);
-        stage.q_mut().set(0, 0, 1.0);
-        stage.r_mut().set(0, 0, 0.1);
-        stage.u_bounds_mut().set(0, -0.4, 0.4);
-    }
-    qp.fix_initial_state(&[1.0])?;
+    let mut ocp = upright(&[0.0, 0.1, 0.0, 0.0])?;
+    ocp.linearise(GaussNewton::default())?;
     let (mut solver, mut solution) =
-        (Condensing::new(2, HeapInteriorPoint::new()), HeapSolution::new(&dims)?);
-    let late = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || true);
+        (Condensing::new(2, HeapInteriorPoint::new()), HeapSolution::new(ocp.qp().dims())?);
+    let late = solver.solve_until(ocp.qp(), QpStart::Cold, solution.view_mut(), &mut || true);
     assert!(matches!(late, Err(QpError::OutOfTime { .. })), "{late:?}");
-    solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || false)?;
+    solver.solve_until(ocp.qp(), QpStart::Cold, solution.view_mut(), &mut || false)?;
     Ok(())
 }

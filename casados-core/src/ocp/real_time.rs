@@ -286,7 +286,7 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: A
     /// #     .on(Horizon::uniform(20, 0.1))?;
     /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
     /// let mut controller = HeapRealTime::new(ocp)?;
-    /// let late = controller.prepare()?.feedback_until(&[0.8], &mut || true).map(|feedback| feedback.u[0]);
+    /// let late = controller.prepare()?.feedback_until(&[0.8], &mut || true);
     /// assert!(matches!(late, Err(OcpError::Qp(QpError::OutOfTime { .. }))));
     /// assert_eq!(controller.ocp().stage(0)?.u, [0.0]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())

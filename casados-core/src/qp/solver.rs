@@ -88,7 +88,7 @@ pub trait QpSolver<T> {
     ///
     /// # Example
     /// ```
-    /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims};
+    /// use casados::qp::*;
     /// use std::time::{Duration, Instant};
     ///
     /// let dims = [StageDims::new(1, 1, 0), StageDims::new(1, 0, 0)];
@@ -102,7 +102,8 @@ pub trait QpSolver<T> {
     /// qp.fix_initial_state(&[1.0])?;
     /// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
     /// let deadline = Instant::now() + Duration::from_secs(60);
-    /// solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || Instant::now() > deadline)?;
+    /// let mut over = || Instant::now() > deadline;
+    /// solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over)?;
     /// let late = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || true);
     /// assert!(matches!(late, Err(QpError::OutOfTime { .. })));
     /// # Ok::<(), QpError>(())

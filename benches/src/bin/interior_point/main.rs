@@ -281,7 +281,7 @@ fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
     let [periodic, plain] = times.map(|times| median(times.into_iter()));
     writeln!(
         table,
-        "\nA search direction with 22 periodic states takes {:.2} times as long as one without: {periodic:.3} and {plain:.3} ms.",
+        "\nA search direction with 22 periodic states takes {:.2} times as long as one without:\n{periodic:.3} and {plain:.3} ms.",
         periodic / plain
     )?;
     Ok(())

@@ -11,14 +11,9 @@ use crate::ocp::dynamics::{Dynamics, SecondOrder};
 use crate::ocp::instance::Ocp;
 use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
+use crate::ocp::simulation::{BETTER, STRAYING};
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
-
-/// A simulation is a better place where it violates bounds by less than this part of what the first
-/// attempt leaves.
-const BETTER: f64 = 0.5;
-/// It is asked for after so many steps in a row that are short, or of a phase for violations, too.
-const STRAYING: usize = 16;
 
 impl<T, D, M, I> Ipm<T, D, M, I>
 where
@@ -27,10 +22,10 @@ where
     M: AsRef<[T]> + AsMut<[T]> + Store<T>,
     I: Store<u32>,
 {
-    /// Whether a run that failed, or goes on and on to make violations small, begins again: once,
-    /// where a simulation with the controls of the guess violates bounds by less than the point
-    /// that it is at. Over unstable dynamics gaps may be what leads astray, and violations that
-    /// stay there say nothing of the problem.
+    /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
+    /// violations, for long: once, where a simulation with the controls of the guess violates
+    /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
+    /// astray, and violations that stay there say nothing of the problem.
     pub(super) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

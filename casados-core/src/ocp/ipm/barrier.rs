@@ -24,9 +24,8 @@ pub enum Barrier {
     /// products of its changes (S. Mehrotra, SIAM J. Optim. 2, 1992), three times near feasible
     /// points, while residuals shrink and the reduced Hessian is positive definite; where they do
     /// not or it is not, it is monotone until they do and it is. It is monotone for good where no
-    /// step is short enough, and where
-    /// [`final_mu`](super::IpmOptions::final_mu) is not zero. J. Nocedal, A. Wächter, R. A. Waltz,
-    /// SIAM J. Optim. 19 (2009).
+    /// step is short enough, and where [`final_mu`](super::IpmOptions::final_mu) is not zero.
+    /// J. Nocedal, A. Wächter, R. A. Waltz, SIAM J. Optim. 19 (2009).
     #[default]
     Adaptive,
 }

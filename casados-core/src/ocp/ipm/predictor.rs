@@ -17,7 +17,7 @@ use crate::scalar::Real;
 /// they cost little beside derivatives, and where a slack and its multiplier both vanish a step
 /// leaves a fifteenth of their product instead of a seventh.
 const CORRECTIONS: usize = 3;
-/// There is one where more than this is violated, in units: there, the QP is not the problem.
+/// One is enough where more than this is violated, in units: there the QP is far from the problem.
 const NEAR: f64 = 0.3;
 /// A corrected step that is shorter than this is not taken: products are too different for the
 /// correction to be right.
@@ -62,7 +62,8 @@ pub(super) fn correct<T: Real>(
     force: f64,
     violation: f64,
 ) -> Result<bool, QpError> {
-    for _ in 0..if violation <= NEAR { CORRECTIONS } else { 1 } {
+    let corrections = if violation <= NEAR { CORRECTIONS } else { 1 };
+    for _ in 0..corrections {
         again(iterate, T::from_f64(mu), true)?;
     }
     let tau = barrier::fraction_to_boundary(mu / force);

@@ -126,10 +126,8 @@ where
                 }
                 self.log.push(row);
             }
-            let again = self.begin_again(ocp, &capacity, &mut state, end);
-            if let Some(status) = end
-                && !again
-            {
+            let begins_again = self.begin_again(ocp, &capacity, &mut state, end);
+            if let (Some(status), false) = (end, begins_again) {
                 outcome.status = status;
                 break Ok(());
             }

@@ -31,8 +31,6 @@ const PASSING: usize = 4;
 /// The regularisation of directions, where no step along the one before is short enough.
 const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
 const MOST_DAMPING: f64 = 1e2;
-/// After so many steps with penalties in a row a simulation is asked whether it violates less.
-const STRAYING: usize = 16;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -148,14 +146,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
                 self.log.push(row);
             }
-            if let Some(status) = end
-                && !self.begin_again(ocp, &mut state, status, outcome.iterations)
-            {
+            let begins_again = self.begin_again(ocp, &mut state, end, &row);
+            if let (Some(status), false) = (end, begins_again) {
                 outcome.status = status;
                 break;
-            }
-            if end.is_none() && state.elastic_steps >= STRAYING && !state.asked {
-                self.ask_simulation(ocp, &mut state, &row);
             }
             if observer(&row).is_break() {
                 outcome.status = Status::Stopped;

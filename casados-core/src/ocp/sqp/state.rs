@@ -14,10 +14,8 @@ pub(super) struct State<'c, T> {
     pub late: bool,
     /// Nothing has been done yet.
     pub begins: bool,
-    /// The run failed, and began again.
+    /// The run began again.
     pub again: bool,
-    /// A simulation was asked whether it violates less.
-    pub asked: bool,
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
@@ -71,7 +69,6 @@ impl<T> State<'_, T> {
             late: false,
             begins: true,
             again: false,
-            asked: false,
             search: Search::new(),
             elastic: false,
             regularisation: 0.0,
@@ -91,7 +88,7 @@ impl<T> State<'_, T> {
         }
     }
 
-    /// Asks the clock, once it is late no more.
+    /// Asks the clock, unless it was late already.
     pub fn is_over(&mut self) -> bool {
         self.late = self.late || self.over.as_mut().is_some_and(|over| over());
         self.late

@@ -59,7 +59,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { coupling, riccati, equations, factor, step, result, .. } = self;
-        let mut apart = Shared::new(coupling.shared, coupling.columns, coupling.length);
+        let mut apart = Shared::new(coupling.shared, coupling.columns, riccati.end.v);
         *result = riccati.backward::<E>(&equations, factor, step, &mut apart);
         if result.is_err() {
             return;
@@ -91,12 +91,12 @@ impl<T: Real> Coupling<'_, T> {
             let Place { nx, nu, n, next, .. } = place;
             let minus = Columns { data: &*self.minus, ld };
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld: place.ld };
-            product::<T, E>(self.group, ld, Source::Zero, minus, matrix, (count, 0..n, next), Part::Full);
+            product::<T, E>(self.gamma, ld, Source::Zero, minus, matrix, (count, 0..n, next), Part::Full);
             // `Γ₊ᵀ r`
             subtract::<T, E>(self.offset, minus, part(dynamics, place.dynamics, next), count, next);
-            self.add_own(&place, qp.dims.len());
+            self.add_own(&place, qp.dims.len(), riccati.end.v);
             self.eliminate_controls(&place, riccati);
-            let (states, controls) = self.group.split_at_mut_checked(nx * ld).unwrap_or_default();
+            let (states, controls) = self.gamma.split_at_mut_checked(nx * ld).unwrap_or_default();
             let signed = Columns { data: &*controls, ld };
             let own = Columns { data: part(self.eliminated, (place.v + nx) * ld, nu * ld), ld };
             let size = (count, 0..count, nu);
@@ -109,30 +109,31 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// Adds what a stage itself has of the parameters: `−E` at the last one, and columns of `M`.
+    /// Adds what a stage itself has of the parameters: `−E` at the last one, and columns of `M`, of
+    /// so many variables of all stages.
     #[inline(always)]
-    fn add_own(&mut self, place: &Place, stages: usize) {
+    fn add_own(&mut self, place: &Place, stages: usize, length: usize) {
         let ld = pad::<T>(self.count);
         if place.stage + 1 == stages {
             for (c, state) in marked(self.periodic).enumerate() {
-                set(self.group, state * ld + c, -T::ONE);
+                set(self.gamma, state * ld + c, -T::ONE);
             }
         }
-        for (w, column) in self.columns.chunks_exact(self.length.max(1)).enumerate() {
+        for (w, column) in self.columns.chunks_exact(length.max(1)).enumerate() {
             for (i, &element) in part(column, place.v, place.n).iter().enumerate() {
-                add(self.group, i * ld + self.conditions + w, element);
+                add(self.gamma, i * ld + self.conditions + w, element);
             }
         }
     }
 
-    /// `Y = L⁻¹ Γ_u` of a stage, which leaves `Y` with the signs of pivots in place of `Γ_u`, and
-    /// adds what belongs to shared controls to `S`.
+    /// `Y = L⁻¹ Γ_u` of a stage. It leaves `Y` with the signs of pivots where `Γ_u` was, and adds
+    /// what belongs to shared controls to `S`.
     #[inline(always)]
     fn eliminate_controls(&mut self, place: &Place, riccati: &Riccati<'_, T>) {
         let (Place { nx, nu, .. }, ld) = (*place, pad::<T>(self.count));
         let begin = place.v + nx;
         let panel = part(riccati.panels, place.factor, place.ld * nu);
-        let controls = part_mut(self.group, nx * ld, nu * ld);
+        let controls = part_mut(self.gamma, nx * ld, nu * ld);
         for (i, &inverse) in part(riccati.inverse, begin, nu).iter().enumerate() {
             let (own, below) = controls.split_at_mut_checked((i + 1) * ld).unwrap_or_default();
             let signed = part_mut(own, i * ld, ld);
@@ -152,7 +153,7 @@ impl<T: Real> Coupling<'_, T> {
         for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
             let (other, y) = (self.conditions + w, part_mut(self.eliminated, (begin + j) * ld, ld));
             for (c, &value) in y.iter().enumerate().take(self.count) {
-                let control = c.checked_sub(self.conditions).map(|control| control * self.length);
+                let control = c.checked_sub(self.conditions).map(|control| control * riccati.end.v);
                 let of_both = control.and_then(|column| self.columns.get(column + begin + j).copied());
                 let of_both = of_both.unwrap_or(T::ZERO);
                 let value = if c < other { value - of_both } else { value };
@@ -211,7 +212,7 @@ impl<T: Real> Coupling<'_, T> {
     /// `[P₀  Γ₀ + E; · S]`, the lower triangle.
     fn write_border(&mut self, riccati: &Riccati<'_, T>) {
         let (nx, count) = (self.free, self.count);
-        let (n, ld, side) = (nx + count, pad::<T>(self.first.len()), pad::<T>(count));
+        let (n, ld, ld_q) = (nx + count, pad::<T>(self.first.len()), pad::<T>(count));
         self.matrix.fill(T::ZERO);
         for j in 0..nx {
             let p = riccati.p.get(j * ld..).unwrap_or_default();
@@ -219,7 +220,7 @@ impl<T: Real> Coupling<'_, T> {
                 set(self.matrix, j * n + i, p);
             }
             for c in 0..count {
-                let gamma = self.group.get(j * side + c).copied().unwrap_or(T::ZERO);
+                let gamma = self.gamma.get(j * ld_q + c).copied().unwrap_or(T::ZERO);
                 set(self.matrix, j * n + nx + c, gamma);
             }
         }
@@ -228,7 +229,7 @@ impl<T: Real> Coupling<'_, T> {
         }
         for b in 0..count {
             for c in b..count {
-                let s = self.schur.get(b * side + c).copied().unwrap_or(T::ZERO);
+                let s = self.schur.get(b * ld_q + c).copied().unwrap_or(T::ZERO);
                 set(self.matrix, (nx + b) * n + nx + c, s);
             }
         }

@@ -45,15 +45,13 @@ pub struct Coupling<'a, T> {
     pub step: &'a mut [T],
     /// Columns of `M` of shared controls, over the variables of all stages.
     pub columns: &'a mut [T],
-    /// How many variables there are.
-    pub length: usize,
     /// `S`, the lower triangle. Its columns, and those of the three matrices below, are of one
     /// padded length: an element for each parameter.
     pub schur: &'a mut [T],
     /// `s`
     pub linear: &'a mut [T],
     /// `Γᵀ` of the stage at work over all its variables, and `−Γᵀ` of the stage behind it.
-    pub group: &'a mut [T],
+    pub gamma: &'a mut [T],
     pub minus: &'a mut [T],
     /// `Σ Γ₊ᵀ r`, the part of `s` that residuals of the dynamics have.
     pub offset: &'a mut [T],
@@ -114,10 +112,9 @@ impl<'a, T: Real> Coupling<'a, T> {
             theta: take_mut(memory, conditions),
             step: take_mut(memory, count),
             columns: take_mut(memory, parameters * v),
-            length: v,
             schur: take_mut(memory, ld * (count + MORE)),
             linear: take_mut(memory, count),
-            group: take_mut(memory, ld * (extent.n + MORE)),
+            gamma: take_mut(memory, ld * (extent.n + MORE)),
             minus: take_mut(memory, ld * extent.nx),
             offset: take_mut(memory, ld),
             eliminated: take_mut(memory, ld * v),
