@@ -1,8 +1,9 @@
-//! Implicit integrators, and the functions they export, on models written by hand, as the contract
-//! of models asks for them.
+//! Implicit integrators, the functions they export, and the checks of both, on models written by
+//! hand, as the contract of models asks for them.
 
 mod models;
 
+mod checks;
 mod closed_forms;
 mod derivatives;
 mod errors;

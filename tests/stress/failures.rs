@@ -103,8 +103,8 @@ fn t20_singular_matrices() {
     check!(Adaptive::<EmptyRow, Radau>::new(AdaptiveOptions::default()));
 }
 
-/// The index is one by construction: what a model shows to be more is no program
-/// (`tests/ui/structurally_singular.rs`: the pendulum of index two is). What shows at run time
+/// The index is one by construction: what a model shows to be more is no program (see
+/// `tests/ui/cases/structurally_singular.rs`, the pendulum of index two). What shows at run time
 /// alone is an error at the start of adaptive integration, and of an interval without length: there
 /// the Newton matrix is `∂f/∂(ẋ, z)`. Steps of a given size have a solution all the same, which is
 /// right: that of the method for index two.

@@ -13,7 +13,7 @@
 //! | 13, 15, 16, 18, 19 | derivatives: adjoint and forward, the complex step, symmetry, cancellation, iterations that stop early | `sensitivities` |
 //! | 14, 17 | derivatives against references | `tests/ivp/sensitivities`; exact zeros in `sensitivities` |
 //! | 20, 21, 23, 35 | singular and nearly singular matrices, rank-deficient mass matrices | `elimination`, `failures` |
-//! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/structurally_singular.rs` |
+//! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/cases/structurally_singular.rs` |
 //! | 24, 25, 33 | inconsistent start values, branches, warm starts | `starts`, `adaptive` |
 //! | 26, 29, 30, 31, 32 | models without a value, jumps, blow-up, divergence, quality of Newton's method | `failures`, `adaptive` |
 //! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive` |

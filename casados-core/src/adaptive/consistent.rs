@@ -1,7 +1,9 @@
 //! Consistent `ẋ` and `z` at a point: the solution of `f(ẋ, x, u, z, p, t) = 0` for given `x`.
 //!
-//! It is one stage of the explicit Euler method, whose stage is at the start of the step.
+//! It is one stage of the explicit Euler method, whose stage is at the start of the step. Explicit
+//! models have their [`Rates`].
 
+use super::rates::Rates;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
@@ -11,16 +13,18 @@ use crate::result::Forward;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use crate::tableau::{Custom, Euler, Method};
+use alloc::boxed::Box;
 use bytemuck::Zeroable;
 
 /// Solves for `(ẋ, z)`.
 pub struct Consistent<M: Dae, T: Real> {
     euler: Option<Integrator<M, Custom<1>, 1, T, Heap>>,
+    rates: Option<Box<Rates<M, T>>>,
 }
 
 impl<M: Dae, T: Real> Default for Consistent<M, T> {
     fn default() -> Self {
-        Self { euler: None }
+        Self { euler: None, rates: None }
     }
 }
 
@@ -33,6 +37,16 @@ pub struct At<'a, M: Dae, T: Real> {
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
+    /// Nothing has to be iterated for.
+    const EXPLICIT: bool = M::STRUCTURE.is_explicit();
+
+    fn rates(&mut self) -> Result<&mut Rates<M, T>, Error> {
+        Ok(match &mut self.rates {
+            Some(rates) => rates,
+            none => none.insert(Rates::new()?),
+        })
+    }
+
     fn euler(
         &mut self,
         at: &At<'_, M, T>,
@@ -59,6 +73,10 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     /// # Errors
     /// [`Error::InconsistentStart`]; the others of Newton's method.
     pub fn solve(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
+        if const { Self::EXPLICIT } {
+            self.rates()?.evaluate(at, y)?;
+            return Ok(1);
+        }
         let euler = self.euler(at, y)?;
         if let Err(error) = euler.solve(at.x, at.u, T::ZERO) {
             return Err(explain(euler, error, at.t));
@@ -74,6 +92,9 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     /// # Errors
     /// As [`Consistent::solve`]; [`Error::NonFiniteStart`].
     pub fn solve_from_afar(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
+        if const { Self::EXPLICIT } {
+            return self.solve(at, y);
+        }
         let start = *y;
         let solved = self.solve(at, y);
         match (&mut self.euler, solved) {
@@ -102,6 +123,9 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         y: &ArrayK<M, T>,
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
+        if const { Self::EXPLICIT } {
+            return self.rates()?.differentiate(at, to);
+        }
         self.forward(at, y)?;
         // The slope of the only stage.
         self.euler.as_mut().ok_or(Error::NoResult)?.slopes(&[1.0], to)

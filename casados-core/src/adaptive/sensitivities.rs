@@ -157,7 +157,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ) -> Result<(), Error> {
         begin(&mut along);
         let second = history.is_some();
-        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let nx = M::Shape::NX;
         let Memory { v: [v, next], hessian, row, .. } = memory;
         let result = &mut hessian.first.forward;
         for (index, row) in v.as_mut().iter_mut().enumerate() {
@@ -203,7 +203,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         for (i, row) in v.as_ref().iter().enumerate() {
             split(row.as_ref(), i, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
         }
-        if !B::ENDS_ON_STAGE && nz > 0 {
+        if const { !B::ENDS_ON_STAGE && M::Shape::NZ > 0 } {
             let y = self.end()?;
             let (x, Base { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
             let at = At { x: &x, u, p: parameters, t: self.span.end };
@@ -211,7 +211,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
             });
         }
-        if nz > 0 {
+        if const { M::Shape::NZ > 0 } {
             let Base { u, parameters, start, .. } = &mut *self.base;
             let at = At { x: x0, u, p: parameters, t: self.span.start };
             let forward = self.consistent.forward(&at, start)?;

@@ -143,7 +143,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
             let known = if *given > T::ZERO { *given } else { value.abs() };
             *magnitude = if known > T::ZERO { known } else { T::ONE };
         }
-        if M::Shape::NZ > 0 {
+        if const { M::Shape::NZ > 0 } {
             let forward = consistent.forward(at, start)?;
             let z = [forward.dz_dx0.as_slice(), forward.dz_du.as_slice(), forward.dz_dp.as_slice()];
             let columns = z.into_iter().flat_map(|matrix| matrix.chunks_exact(M::Shape::NZ));

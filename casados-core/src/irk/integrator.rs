@@ -243,8 +243,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// The stages of every step of the next call, which has only to differentiate them.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    #[doc(hidden)]
     #[cfg(feature = "alloc")]
-    pub(crate) fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+    pub fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         self.run.set_solution(record)
     }
 

@@ -43,25 +43,6 @@ impl Display for Structure {
 }
 
 impl Structure {
-    /// Whether every equation has one derivative of its own, with a constant coefficient, and there
-    /// are no algebraic states.
-    #[must_use]
-    pub fn is_explicit(&self) -> bool {
-        let nx = self.x.len();
-        let mut one = (0..nx).map(|row| {
-            let mut own = (0..self.blocks[1]).filter(move |&e| self.jacobian.at(e).0 == row);
-            own.next().filter(|_| own.next().is_none())
-        });
-        self.z.is_empty()
-            && one.all(|entry| {
-                entry.is_some_and(|entry| {
-                    let column = self.jacobian.at(entry).1;
-                    let others = (0..self.blocks[1]).filter(|&e| self.jacobian.at(e).1 == column);
-                    self.constant.get(entry) == Some(&true) && others.count() == 1
-                })
-            })
-    }
-
     /// The name of a variable `(ẋ, x, z, u, p, t)` by its index.
     #[must_use]
     pub fn variable(&self, index: u32) -> impl Display {

@@ -5,6 +5,7 @@ mod cost;
 mod curvature;
 mod describe;
 mod elimination;
+mod explicit;
 mod reduction;
 
 pub use cost::Cost;

@@ -40,6 +40,3 @@ pub use forward::Forward;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
 pub use sensitivities::check_sensitivities;
-
-#[cfg(test)]
-mod tests;

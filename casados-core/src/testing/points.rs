@@ -127,7 +127,17 @@ impl<M: Dae> Points<M> {
     }
 
     /// The points, the given ones first; random ones are drawn one by one.
-    pub(super) fn iter(&self) -> impl Iterator<Item = ArrayV<M, f64>> {
+    ///
+    /// ```
+    /// # use casados::prelude::*;
+    /// # use casados::testing::Points;
+    /// # #[ode]
+    /// # fn growth(x: [f64; 1]) -> [f64; 1] { x }
+    /// // ẋ, x and t.
+    /// let points = Points::<Growth>::random(3).x(0, 0.0..=1.0);
+    /// assert!(points.iter().all(|[_, x, t]| x >= 0.0 && t.abs() <= 1.0));
+    /// ```
+    pub fn iter(&self) -> impl Iterator<Item = ArrayV<M, f64>> {
         let mut random = Random::new(self.seed);
         let draw = move |_| {
             <ArrayV<M, f64> as Array<f64>>::from_fn(|i| {

@@ -1,0 +1,38 @@
+//! Which models are explicit.
+
+use super::{Pattern, Structure};
+
+/// So many words have a bit for each state.
+const WORDS: usize = 64;
+
+impl Structure {
+    /// Whether every equation has one derivative of its own, with a constant coefficient, and there
+    /// are no algebraic states. Of models with more than 4096 states this is seen only where the
+    /// equations have the order of the states.
+    ///
+    /// The first entries of the Jacobian are then those of `f_ẋ`, one for each equation.
+    #[must_use]
+    pub const fn is_explicit(&self) -> bool {
+        let (nx, Pattern { rows, columns }) = (self.x.len(), self.jacobian);
+        let known = rows.len() >= nx && columns.len() >= nx && self.constant.len() >= nx;
+        if !known || !self.z.is_empty() || self.blocks[1] != nx {
+            return false;
+        }
+        // The derivatives that were met.
+        let mut met = [0_u64; WORDS];
+        let mut row = 0;
+        while row < nx {
+            let column = columns[row] as usize;
+            let (word, bit) = (column / 64, 1_u64 << (column % 64));
+            let first = if word < WORDS { met[word] & bit == 0 } else { column == row };
+            if rows[row] as usize != row || !self.constant[row] || !first {
+                return false;
+            }
+            if word < WORDS {
+                met[word] |= bit;
+            }
+            row += 1;
+        }
+        true
+    }
+}
