@@ -3,15 +3,16 @@
 //! It is one stage of the explicit Euler method, whose stage is at the start of the step. Explicit
 //! models have their [`Rates`].
 
+use super::point::At;
 use super::rates::Rates;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
-use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};
 use crate::options::{Options, Start};
 use crate::result::Forward;
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Shape;
 use crate::tableau::{Custom, Euler, Method};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
@@ -26,14 +27,6 @@ impl<M: Dae, T: Real> Default for Consistent<M, T> {
     fn default() -> Self {
         Self { euler: None, rates: None }
     }
-}
-
-/// A point in time at which the state is known.
-pub struct At<'a, M: Dae, T: Real> {
-    pub x: &'a VectorX<M, T>,
-    pub u: &'a VectorU<M, T>,
-    pub p: &'a VectorP<M, T>,
-    pub t: T,
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
@@ -161,13 +154,5 @@ fn explain<M: Dae, T: Real>(euler: &mut Integrator<M, Custom<1>, 1, T, Heap>, er
         unknown,
         value: number(value),
         singular: worst.is_none(),
-    }
-}
-
-/// Writes `u` and `p` to where they lie in the variables of a model: after `(ẋ, x, z)`.
-pub(super) fn place_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
-    let begin = 2 * M::Shape::NX + M::Shape::NZ;
-    for (to, from) in point.iter_mut().skip(begin).zip(u.as_slice().iter().chain(p.as_slice())) {
-        *to = *from;
     }
 }

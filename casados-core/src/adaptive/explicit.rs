@@ -1,11 +1,11 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::consistent::At;
 use super::control::{Proportional, power};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
+use super::point::At;
 use super::replay::{Replay, Taken};
 use super::run::{Accepted, After, Base, Run, Span};
 use super::sealed::{Engine, Kind};

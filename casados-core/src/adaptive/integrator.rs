@@ -4,8 +4,9 @@ mod calls;
 mod derivatives;
 mod settings;
 
-use super::consistent::{Consistent, place_inputs};
+use super::consistent::Consistent;
 use super::options::{AdaptiveOptions, check_absolute, check_relative};
+use super::point::place_inputs;
 use super::run::{Accepted, Base, Run, Span};
 use super::sealed::{Engine, Kind};
 use super::sensitivities::{Frozen, Memory};

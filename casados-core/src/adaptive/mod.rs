@@ -14,11 +14,11 @@
 //! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels`
 //! its loops, `defect_filter` the second estimate of its error, `levels` the methods of a family
 //! and `implicit` the engine of them, `control` the step size, `start` where a run begins and
-//! `consistent` at which derivatives, those of explicit models by `rates`, `run` the steps of an
-//! interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the
-//! explicit methods, `replay` and `sensitivities` derivatives of runs, `variational` derivatives
-//! that take part in the choice of the steps, `along` an integrand, `segment` one of several
-//! intervals, `piecewise` those with controls of their own, `columns` their derivatives and
+//! `consistent` at which derivatives, those of explicit models by `rates`, at a `point`, `run` the
+//! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit`
+//! the explicit methods, `replay` and `sensitivities` derivatives of runs, `variational`
+//! derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of
+//! several intervals, `piecewise` those with controls of their own, `columns` their derivatives and
 //! `integrals` those of an integrand, `events`, `integrator` what users see.
 
 mod along;
@@ -39,6 +39,7 @@ mod norm;
 mod options;
 mod pairs;
 mod piecewise;
+mod point;
 mod rates;
 mod replay;
 mod run;

@@ -4,7 +4,7 @@
 //! Nothing here is called through a table of functions: a program contains the derivatives that it
 //! asks for, and no others.
 
-use super::consistent::At;
+use super::point::At;
 use crate::error::Error;
 use crate::integrator::Integrator as _;
 use crate::irk::Integrator;

@@ -5,10 +5,11 @@ mod steps;
 mod tolerances;
 mod walk;
 
-use super::consistent::{At, Consistent};
+use super::consistent::Consistent;
 use super::control::LENIENT;
 use super::levels::{Levels, interpolate};
 use super::options::AdaptiveOptions;
+use super::point::At;
 use super::sealed::Family;
 use super::stages::{FAST, Failure, Stages, Start};
 use super::statistics::AdaptiveStatistics;

@@ -1,7 +1,7 @@
 //! The steps of one of several intervals that follow each other.
 
-use super::consistent::place_inputs;
 use super::integrator::{Integrator, inside};
+use super::point::place_inputs;
 use super::run::Span;
 use super::sealed::Engine;
 use super::sensitivities::{Frozen, Memory};

@@ -14,7 +14,8 @@ mod blocks;
 use blocks::{algebraic, finite, in_step};
 pub(super) use blocks::{fill, place};
 
-use super::consistent::{At, Consistent};
+use super::consistent::Consistent;
+use super::point::At;
 use super::replay::{Replay, Taken};
 use super::run::{Base, Span};
 use super::sealed::Engine;

@@ -1,7 +1,7 @@
 //! Where a run begins: consistent states, and the length of the first step.
 
-use super::consistent::{At, place_inputs};
 use super::norm::norm;
+use super::point::{At, place_inputs};
 use super::run::{Base, Run, Span};
 use crate::error::Error;
 use crate::model::{ArrayK, Dae, VectorX};

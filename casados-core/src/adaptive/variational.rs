@@ -15,10 +15,11 @@
 //! magnitude `s_c` of what is varied (A. C. Hindmarsh, R. Serban, User documentation for CVODES,
 //! "forward sensitivity analysis"); the worst column counts.
 
-use super::consistent::{At, Consistent};
+use super::consistent::Consistent;
 use super::defect_filter::RelativeErrors;
 use super::norm::mean;
 use super::pairs::Pair;
+use super::point::At;
 use super::replay::{Replay, Taken};
 use super::sealed::Engine;
 use super::stages::{Failure, FilteredDefect, MOST, Stages, Start};

@@ -13,7 +13,7 @@
 //! Here nothing depends on the time: neither models nor functions have second derivatives by it.
 
 use super::super::columns::Columns;
-use super::super::consistent::At;
+use super::super::point::At;
 use super::super::sealed::Engine;
 use super::super::sensitivities::{fill, place};
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};

@@ -1,6 +1,6 @@
 //! From event to event: the steps up to each, shortened to its time, and what happens there.
 
-use super::super::consistent::{At, place_inputs};
+use super::super::point::{At, place_inputs};
 use super::super::replay::{Replay, Taken};
 use super::super::run::Span;
 use super::super::sealed::Engine;

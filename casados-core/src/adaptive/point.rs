@@ -1,0 +1,21 @@
+//! A point in time, and where its numbers lie among the variables of a model.
+
+use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+
+/// A point in time at which the state is known.
+pub struct At<'a, M: Dae, T: Real> {
+    pub x: &'a VectorX<M, T>,
+    pub u: &'a VectorU<M, T>,
+    pub p: &'a VectorP<M, T>,
+    pub t: T,
+}
+
+/// Writes `u` and `p` to where they lie in the variables of a model: after `(ẋ, x, z)`.
+pub(super) fn place_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
+    let begin = 2 * M::Shape::NX + M::Shape::NZ;
+    for (to, from) in point.iter_mut().skip(begin).zip(u.as_slice().iter().chain(p.as_slice())) {
+        *to = *from;
+    }
+}
