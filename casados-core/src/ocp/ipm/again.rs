@@ -15,13 +15,7 @@ use crate::ocp::simulation::{BETTER, STRAYING};
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
     /// violations, for long: once, where a simulation with the controls of the guess violates
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads

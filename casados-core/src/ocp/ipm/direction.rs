@@ -20,13 +20,7 @@ const MOST_REGULARISATION: f64 = 10.0;
 /// Where violations and gaps are no more than this, in units, multipliers are those of a solution.
 const CLOSE: f64 = 1.0;
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// The search direction; without the curvature of dynamics and constraints where that needs too
     /// much regularisation, far from a feasible point.
     pub(super) fn search_direction<P: Formulation<T>>(

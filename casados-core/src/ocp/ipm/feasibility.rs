@@ -34,13 +34,7 @@ const FAR_OFF: f64 = 1e-2;
 /// A simulation is not far away if states move by no more than this times the gaps.
 const FAR: f64 = 100.0;
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Goes on where no step makes progress: violations alone, then with a monotone barrier
     /// parameter, then with penalties. The status if all of that has been tried.
     pub(super) fn recover<P: Formulation<T>>(

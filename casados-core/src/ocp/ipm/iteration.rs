@@ -43,13 +43,7 @@ struct Direction {
     is_corrected: bool,
 }
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// One iteration; a status if it is the last one.
     pub(super) fn iterate<P: Formulation<T>>(
         &mut self,

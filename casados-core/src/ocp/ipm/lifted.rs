@@ -38,13 +38,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// The step of stages that belongs to the search direction.
     ///
     /// # Errors

@@ -15,13 +15,7 @@ use crate::scalar::Real;
 /// First multipliers that are more units are discarded.
 const LARGEST: f64 = 1e3;
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Slacks and multipliers of the first iteration, or of new penalties.
     pub(super) fn begin<P: Formulation<T>>(
         &mut self,

@@ -18,13 +18,7 @@ use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
     ///
     /// # Errors

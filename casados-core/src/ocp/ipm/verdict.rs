@@ -23,13 +23,7 @@ pub(super) enum Next {
     End(Status),
 }
 
-impl<T, D, M, I> Ipm<T, D, M, I>
-where
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
-    I: Store<u32>,
-{
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// What follows the residuals of an iteration.
     pub(super) fn next<P: Formulation<T>>(
         &mut self,

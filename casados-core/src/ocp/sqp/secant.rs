@@ -88,7 +88,7 @@ impl<S, C, T: Real, D: AsRef<[StageDims]>, M> Sqp<S, C, T, D, M> {
     /// ```
     pub fn secant(mut self, update: Update) -> Result<Sqp<S, Secant, T, D, M>, OcpError>
     where
-        M: AsRef<[T]> + AsMut<[T]> + Store<T>,
+        M: Store<T>,
     {
         let length = length::<T>(self.solution.dims());
         self.history.at_least(length, QpField::Numbers)?;

@@ -4,7 +4,7 @@ use crate::qp::error::{QpError, QpField};
 
 /// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that
 /// grows when a larger problem comes and never shrinks.
-pub trait Store<T> {
+pub trait Store<T>: AsRef<[T]> + AsMut<[T]> {
     /// At least so many elements.
     ///
     /// # Errors
