@@ -29,6 +29,23 @@ fn solutions_are_found_on_the_side_of_the_start_values() {
     }
 }
 
+/// A rate needs a value, and no derivative.
+#[ode]
+fn widening(x: f64) -> f64 {
+    x.sqrt()
+}
+
+#[test]
+fn rates_without_a_value_are_refused() {
+    let mut pair = Adaptive::<Widening, DormandPrince5>::new(AdaptiveOptions::default()).unwrap();
+    // The other solution that begins at zero.
+    assert_eq!(pair.solve(&vector![0.0], &vector![], 1.0).unwrap().x[0], 0.0);
+    let error = pair.solve(&vector![-1.0], &vector![], 1.0).unwrap_err();
+    assert!(matches!(error, Error::NonFiniteModel { equation: 0, value, .. } if value.is_nan()), "{error}");
+    let mut radau = Adaptive::<Widening, Radau>::new(AdaptiveOptions::default()).unwrap();
+    assert_eq!(radau.solve(&vector![-1.0], &vector![], 1.0).unwrap_err().to_string(), error.to_string());
+}
+
 #[test]
 fn what_has_no_solution_is_named() {
     let mut radau = Adaptive::<Root, Radau>::new(AdaptiveOptions::default()).unwrap();

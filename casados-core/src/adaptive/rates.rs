@@ -1,5 +1,5 @@
-//! Rates of an explicit model: each equation has one derivative, `c ẋ_j + g(x, u, p, t) = 0`, and is
-//! solved for it by hand. No integrator is compiled for that.
+//! Rates of an explicit model: each equation has one derivative, `c ẋ_j + g(x, u, p, t) = 0`, and
+//! is solved for it by hand. No integrator is compiled for that.
 
 use super::point::{At, place_inputs};
 use crate::error::{Error, Place, Quantity};

@@ -1,9 +1,10 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
 use super::intervals::{Interval, vector};
-use super::lanes::{MOST_LANES, Verdict, unpack, yes};
+use super::lanes::{MOST_LANES, Unpack, Verdict, yes};
 use super::single::{Group, Single};
 use crate::error::Error;
+use crate::linalg::dispatch;
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
@@ -29,7 +30,7 @@ macro_rules! unpack_field {
                 *to = $get(result).$field.as_mut_slice();
             }
         }
-        unpack($self.$field.as_slice(), &mut to);
+        dispatch(Unpack { from: $self.$field.as_slice(), to: &mut to });
     }};
 }
 

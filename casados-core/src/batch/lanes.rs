@@ -18,34 +18,6 @@ pub fn yes<E: Lanes>() -> E::Mask {
     E::le(E::from_f64(0.0), E::from_f64(0.0))
 }
 
-/// The elements of each lane in a slice of their own, which may be empty.
-#[inline(always)]
-pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [T]; MOST_LANES]) {
-    let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
-    let Some(tile) = tile.get_mut(..E::LANES) else { return };
-    let mut begin = 0;
-    let mut whole = from.chunks_exact(E::LANES);
-    for from in &mut whole {
-        E::transpose(from, tile);
-        for (to, cell) in to.iter_mut().zip(&*tile) {
-            // As many as the optimiser knows.
-            if let Some(to) = to.get_mut(begin..begin + E::LANES) {
-                to.copy_from_slice(cell.as_ref());
-            }
-        }
-        begin += E::LANES;
-    }
-    let mut cell: E::Cell = Zeroable::zeroed();
-    for (index, from) in whole.remainder().iter().enumerate() {
-        from.store(&mut cell);
-        for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
-            if let Some(to) = to.get_mut(begin + index) {
-                *to = element;
-            }
-        }
-    }
-}
-
 kernels! {
     /// The elements of several slices, one of each in the lanes of a register.
     pub fn pack [T: Plain, E: Lanes<Cell: AsMut<[T]>>] [T, E] <A>(
@@ -64,17 +36,41 @@ kernels! {
     }
 }
 
-/// The elements of registers, those of each lane in a slice of their own.
-pub struct Unpack<'a, T, E> {
+/// The elements of registers, those of each lane in a slice of their own, which may be empty. One
+/// function for all fields of all models.
+pub struct Unpack<'a, 'b, T, E> {
     pub from: &'a [E],
-    pub to: [&'a mut [T]; MOST_LANES],
+    pub to: &'a mut [&'b mut [T]; MOST_LANES],
 }
 
-impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
+impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, '_, T, E> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        unpack(self.from, &mut self.to);
+    fn run<A: Arithmetic>(self) {
+        let Self { from, to } = self;
+        let mut begin = 0;
+        let mut whole = from.chunks_exact(E::LANES);
+        for from in &mut whole {
+            let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
+            let Some(tile) = tile.get_mut(..E::LANES) else { return };
+            E::transpose(from, tile);
+            for (to, cell) in to.iter_mut().zip(&*tile) {
+                // As many as the optimiser knows.
+                if let Some(to) = to.get_mut(begin..begin + E::LANES) {
+                    to.copy_from_slice(cell.as_ref());
+                }
+            }
+            begin += E::LANES;
+        }
+        for (index, from) in whole.remainder().iter().enumerate() {
+            let mut cell: E::Cell = Zeroable::zeroed();
+            from.store(&mut cell);
+            for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
+                if let Some(to) = to.get_mut(begin + index) {
+                    *to = element;
+                }
+            }
+        }
     }
 }

@@ -98,6 +98,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
+/// Whether loops over so many entries become straight lines: in registers, of which each entry has
+/// several, they are a small part of a step, unless there are few.
+const fn is_worth_lines<E>(entries: usize) -> bool {
+    size_of::<E>() <= 8 || entries <= 64
+}
+
 struct Satisfied<'a, M: Dae, E: Plain, const S: usize> {
     f: &'a [[E; S]],
     points: &'a ArrayV<M, [E; S]>,
@@ -126,6 +132,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
 impl<M: Dae, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
     const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
     const INSTRUCTIONS: usize = 4 * if size_of::<E>() > 8 { S } else { 1 };
+    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
@@ -258,6 +265,7 @@ struct Total<'a, M: Dae, E: Plain, const S: usize> {
 impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
     const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
     const INSTRUCTIONS: usize = 6 * if size_of::<E>() > 8 { S } else { 1 };
+    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
@@ -303,6 +311,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_
     /// The entries of `f_ẋ`, `f_x` and `f_z`.
     const ROWS: usize = M::STRUCTURE.blocks[3];
     const INSTRUCTIONS: usize = (6 + C) * if size_of::<E>() > 8 { S } else { 1 };
+    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };

@@ -63,6 +63,33 @@ fn second_derivatives_over_a_bouncing_ball() {
     second_over_bounces!(DormandPrince5);
 }
 
+/// The ball, with its equations in another order and multiplied by numbers.
+#[dae]
+fn rearranged(xdot: [f64; 2], x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
+    [-2.0 * (xdot[1] + p[0]), 3.0 * xdot[0] - 3.0 * x[1]]
+}
+
+/// Explicit models are solved for their rates equation by equation, whatever the order.
+#[test]
+fn equations_in_any_order() {
+    let (x0, p, lambda) = (vector![1.3, 0.4], vector![9.81, 0.8], vector![0.7, -1.2]);
+    macro_rules! hessian {
+        ($model:ty) => {{
+            let event = Event::jump::<Height, Bounce>(Crossing::Falling);
+            let adaptive = Adaptive::<$model, Radau>::new(options(1e-8)).unwrap();
+            let mut hybrid = Hybrid::new(adaptive, &[event]).unwrap();
+            hybrid.integrator().set_parameters(&p).unwrap();
+            let hessian = hybrid.hessian(&x0, &vector![], 1.8, &lambda).unwrap();
+            (hessian.forward.dx_dx0, hessian.h_xx, hessian.h_xp, hessian.h_pp)
+        }};
+    }
+    let (found, expected) = (hessian!(Rearranged), hessian!(Ball));
+    assert_close(found.0.as_slice(), expected.0.as_slice(), ROUNDING);
+    assert_close(found.1.as_slice(), expected.1.as_slice(), ROUNDING);
+    assert_close(found.2.as_slice(), expected.2.as_slice(), ROUNDING);
+    assert_close(found.3.as_slice(), expected.3.as_slice(), ROUNDING);
+}
+
 /// Where it lands: the velocity `−√(v² + 2gh)`.
 #[test]
 fn second_derivatives_up_to_an_event() {

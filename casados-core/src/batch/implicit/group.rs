@@ -173,7 +173,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             if let Some(to) = to.get_mut(lane) {
                 *to = y.as_mut().as_flattened_mut();
             }
-            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
+            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to: &mut to });
         }
         Ok(())
     }

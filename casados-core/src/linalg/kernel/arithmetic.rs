@@ -10,9 +10,11 @@ pub type Block<E, const S: usize> = [[E; S]; S];
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
-    /// Whether it rounds once: it is that of machines that matter, which loops become straight
-    /// lines for.
+    /// Whether it rounds once.
     const FUSED: bool = false;
+    /// Whether short loops over tables become straight lines. Registers take so long for a block
+    /// that it matters little how its place is found.
+    const UNROLLED: bool = false;
     /// Whether numbers side by side fill the registers of AVX-512.
     const WIDE: bool = false;
     /// `t − a b`
@@ -81,13 +83,14 @@ impl Arithmetic for Separate {
 
 /// Rounded once, in one instruction. Kernels are run with it by [`dispatch`] alone, where the
 /// machine has the instructions; so it says that these are [`Known`]. On numbers side by side in
-/// registers as `WIDE` as those of AVX-512 are, or half as wide.
+/// registers as `WIDE` as those of AVX-512 are, or half as wide; with loops `UNROLLED` or not.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-pub struct Fused<const WIDE: bool>;
+pub struct Fused<const WIDE: bool, const UNROLLED: bool>;
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
+impl<const WIDE: bool, const UNROLLED: bool> Arithmetic for Fused<WIDE, UNROLLED> {
     const FUSED: bool = true;
+    const UNROLLED: bool = UNROLLED;
     const WIDE: bool = WIDE;
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {

@@ -21,8 +21,9 @@ pub trait Kernel {
     /// Its result.
     type Output;
     /// Whether it is long, and its products of numbers fill registers of AVX-512. That takes fewer
-    /// instructions there, and one more copy of the kernel to compile.
-    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
+    /// instructions there, and one more copy of the kernel to compile. Loops over tables stay loops
+    /// in it: each step is so long that it matters little how its place is found.
+    #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
     const WIDE: bool = false;
     /// To be `#[inline(always)]`, with everything that it calls.
     fn run<A: Arithmetic>(self) -> Self::Output;
@@ -102,9 +103,9 @@ mod compiled {
         /// # Safety
         /// Nobody else may take the kernel.
         #[target_feature(enable = "avx2,fma")]
-        pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
+        pub unsafe fn run<K: Kernel, const UNROLLED: bool>(kernel: &mut ManuallyDrop<K>) -> K::Output {
             // SAFETY: the caller's promise; and nobody drops it.
-            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<false>>()
+            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<false, UNROLLED>>()
         }
     }
 
@@ -116,9 +117,9 @@ mod compiled {
         /// # Safety
         /// Nobody else may take the kernel.
         #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-        pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
+        pub unsafe fn run<K: Kernel, const UNROLLED: bool>(kernel: &mut ManuallyDrop<K>) -> K::Output {
             // SAFETY: the caller's promise; and nobody drops it.
-            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<true>>()
+            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<true, UNROLLED>>()
         }
     }
 }
@@ -138,15 +139,16 @@ impl<K: Kernel> Entries<K> {
     /// Whether its numbers are single, and fast. Unoptimised programs, where each copy of a kernel
     /// is much to compile and none is fast, have the one copy that runs everywhere.
     const SINGLE: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
+    const IN_AVX512: Entry<K> =
+        if K::WIDE { compiled::avx512::run::<K, false> } else { compiled::avx512::run::<K, true> };
+    const IN_AVX2: Entry<K> =
+        if K::WIDE { compiled::avx2::run::<K, false> } else { compiled::avx2::run::<K, true> };
     /// Short kernels are faster without AVX-512.
-    const AVX512: Option<Entry<K>> = if Self::SINGLE && K::WIDE && may_be(Level::Avx512) {
-        Some(compiled::avx512::run::<K>)
-    } else {
-        None
-    };
+    const AVX512: Option<Entry<K>> =
+        if Self::SINGLE && K::WIDE && may_be(Level::Avx512) { Some(Self::IN_AVX512) } else { None };
     const AVX2: Option<Entry<K>> =
         if Self::SINGLE && (may_be(Level::Avx2) || !K::WIDE && may_be(Level::Avx512)) {
-            Some(compiled::avx2::run::<K>)
+            Some(Self::IN_AVX2)
         } else {
             None
         };
@@ -156,8 +158,8 @@ impl<K: Kernel> Entries<K> {
     const OTHERWISE: Entry<K> = match (align_of::<K::Number>(), Self::AVX2, Self::AVX512) {
         (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be(Level::Base) => run,
         (0..32, ..) => compiled::base::run::<K>,
-        (32, ..) => compiled::avx2::run::<K>,
-        _ => compiled::avx512::run::<K>,
+        (32, ..) => Self::IN_AVX2,
+        _ => Self::IN_AVX512,
     };
 }
 
@@ -193,7 +195,7 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(target_arch = "aarch64")]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Fused<false>>()
+    if const { K::WIDE } { kernel.run::<Fused<false, false>>() } else { kernel.run::<Fused<false, true>>() }
 }
 
 /// Runs a kernel in the way that every machine has.

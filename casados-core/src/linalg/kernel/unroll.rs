@@ -36,6 +36,8 @@ pub trait AtRow {
     const ROWS: usize;
     /// About how many instructions each takes.
     const INSTRUCTIONS: usize;
+    /// Whether straight lines are worth their compilation.
+    const UNROLLED: bool = true;
     /// To be `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, row: usize);
     /// So many of the first rows need only what [`simple`](Self::simple) does.
@@ -48,7 +50,7 @@ pub trait AtRow {
 /// Whether the rows of a table are unrolled.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
     let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
-    WANTED && A::FUSED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
+    WANTED && A::UNROLLED && V::UNROLLED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
 }
 
 /// All rows of a table.
@@ -197,7 +199,7 @@ const fn has_supernode<M: Dae>(count: u32) -> bool {
 }
 
 /// Whether kernels that go through all blocks of a plan are long.
-#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
+#[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
 pub const fn is_long<M: Dae, const S: usize>() -> bool {
     M::STRUCTURE.elimination.slots.len() * S * S > 250
 }
@@ -209,7 +211,7 @@ const fn is_short_plan<A: Arithmetic, M: Dae>(updates: bool, instructions: usize
     let few = updates && instructions <= FEW;
     let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };
-    WANTED && A::FUSED && plan.pivots.len() <= MOST && count * instructions <= most
+    WANTED && A::UNROLLED && plan.pivots.len() <= MOST && count * instructions <= most
 }
 
 /// How many blocks a pivot updates.
