@@ -68,13 +68,23 @@ pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) start: T,
     /// The interval of the last successful call.
     last: Option<Span<T>>,
-    /// The interval of the steps that are kept for following calls.
-    frozen: Option<Span<T>>,
+    frozen: Option<Kept<M, B, T>>,
     pub(super) memory: Option<Box<Memory<M, T>>>,
     /// Derivatives at the start of each step.
     history: Vec<T>,
     method: PhantomData<fn() -> B>,
 }
+
+/// Steps that are kept for following calls.
+struct Kept<M: Dae, B: Kind<M, T>, T: Real> {
+    /// Their interval.
+    span: Span<T>,
+    /// Takes them without derivatives. Programs that keep no steps have no integrator for that.
+    solve: Solve<M, B, T>,
+}
+
+type Solve<M, B, T> =
+    fn(&mut Integrator<M, B, T>, &VectorX<M, T>, &VectorU<M, T>, T) -> Result<Span<T>, Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// An integrator with its memory on the heap.
@@ -144,12 +154,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// ```
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         self.last = None;
-        let span = if self.frozen.is_some() {
-            let span = self.begin_frozen(x0, u, h)?;
-            let Self { base, consistent, tape, state, .. } = self;
-            let given = base.given;
-            Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
-            span
+        let span = if let Some(Kept { solve, .. }) = self.frozen {
+            solve(self, x0, u, h)?
         } else {
             let (t_end, record) = (self.end(h)?, self.options.keep_steps);
             self.run(x0, u, t_end, record, |_, _| Ok(()))?
@@ -251,8 +257,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         if self.tape.entries().is_empty() && span.start != span.end {
             return Err(Error::NoResult);
         }
-        self.frozen = Some(span);
+        self.frozen = Some(Kept { span, solve: Self::solve_frozen });
         Ok(())
+    }
+
+    /// The steps that are kept, without derivatives.
+    fn solve_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        let span = self.begin_frozen(x0, u, h)?;
+        let Self { base, consistent, tape, state, .. } = self;
+        let given = base.given;
+        Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
+        Ok(span)
     }
 
     /// Following calls choose their steps again.
@@ -316,7 +331,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     fn begin_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
         let t_end = self.end(h)?;
         let span = self.begin(x0, u, t_end)?;
-        let Some(frozen) = self.frozen else { return Ok(span) };
+        let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
         let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
         for (t, expected) in [(span.start, frozen.start), (span.end, frozen.end)] {
             if t != expected {

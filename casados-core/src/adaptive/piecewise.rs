@@ -63,7 +63,8 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     /// How many of them there are, and whether the last call succeeded with them.
     count: usize,
     solved: bool,
-    frozen: bool,
+    /// Steps that are kept are taken by this. Programs that keep none have no integrator for that.
+    frozen: Option<Again<M, B, T>>,
     statistics: AdaptiveStatistics,
     nominal: Nominal<M, T>,
     /// `V_k` and `V_{k+1}`.
@@ -71,6 +72,8 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     /// Second derivatives of all columns, and a product on the way there.
     second: [Vec<T>; 2],
 }
+
+type Again<M, B, T> = fn(&mut Piecewise<M, B, T>, &VectorX<M, T>) -> Result<(), Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     /// Of an integrator, which keeps its options, tolerances, parameters and start time.
@@ -83,7 +86,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             segments: Vec::new(),
             count: 0,
             solved: false,
-            frozen: false,
+            frozen: None,
             statistics,
             nominal,
             v: Default::default(),
@@ -113,8 +116,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
     ) -> Result<&Nominal<M, T>, Error> {
         self.steps(x0, controls, ends)?;
-        if self.frozen {
-            self.replay(x0, None)?;
+        if let Some(again) = self.frozen {
+            again(self, x0)?;
         }
         self.solved = true;
         Ok(&self.nominal)
@@ -323,13 +326,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         for segment in &mut self.segments {
             segment.chosen = false;
         }
-        self.frozen = true;
+        self.frozen = Some(|piecewise, x0| piecewise.replay(x0, None));
         Ok(())
     }
 
     /// Following calls choose their steps again.
     pub fn thaw(&mut self) {
-        self.frozen = false;
+        self.frozen = None;
     }
 }
 

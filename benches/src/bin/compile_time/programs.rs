@@ -125,8 +125,10 @@ pub fn uses() -> Result<Vec<Program>, Failure> {
     let both = single + &open("Batch", "batch", "Awe", "RadauIIA<4>") + &batch_call("hessian");
     all.push(program("and `Batch`: `hessian`", &awe, "Awe", &both));
     let robertson = read("examples/models/ivp/chemistry.rs")?;
-    let calls = open("Adaptive", "irk", "Robertson", "Radau") + &call("solve") + &call("forward");
-    all.push(program("Robertson, `Adaptive<_, Radau>`: `solve`, `forward`", &robertson, "Robertson", &calls));
+    let solve = open("Adaptive", "irk", "Robertson", "Radau") + &call("solve");
+    all.push(program("Robertson, `Adaptive<_, Radau>`: `solve`", &robertson, "Robertson", &solve));
+    let both = solve + &call("forward");
+    all.push(program("and `forward`", &robertson, "Robertson", &both));
     all.push(quadrotor()?);
     Ok(all)
 }

@@ -31,7 +31,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             }
             before = *end;
         }
-        if self.frozen {
+        if self.frozen.is_some() {
             return self.check_frozen(start, controls, ends);
         }
         self.count = 0;
