@@ -1,8 +1,7 @@
 //! A model written by hand, with a fault on request.
 
-use casados_core::model::{
-    ArrayK, ArrayV, Dae, Elimination, GraphDae, Operations, Pattern, Structure, symmetric,
-};
+use crate::models::NONE;
+use casados_core::model::{ArrayK, ArrayV, Dae, Elimination, GraphDae, Pattern, Structure, symmetric};
 use casados_core::scalar::{Lanes, Scalar};
 use casados_core::shape::{Dims, Plain};
 
@@ -76,7 +75,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         curved: if FAULT == CURVED_LEFT_OUT { &[1, 3] } else { &[1, 2, 3] },
         symmetric: &const { symmetric::<3, 5>(&Pattern { rows: &[1, 2, 3], columns: &[1, 1, 1] }, &[1, 2, 3]) },
         lone: &[],
-        operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+        operations: NONE,
         elimination: Elimination::NONE,
         reduction: None,
     };

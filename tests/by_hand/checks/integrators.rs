@@ -193,9 +193,8 @@ fn convergence_order() {
 /// Real integrators with a model written by hand, against the closed form of its solution.
 mod logistic {
     use super::*;
-    use casados_core::model::{
-        ArrayK, ArrayV, Dae, Elimination, Ode, Operations, Pattern, Structure, symmetric,
-    };
+    use crate::models::{NONE, adjoint_of_jacobian};
+    use casados_core::model::{ArrayK, ArrayV, Dae, Elimination, Ode, Pattern, Structure, symmetric};
     use casados_core::options::Options;
     use casados_core::scalar::Lanes;
     use casados_core::shape::{Dims, Plain};
@@ -234,7 +233,7 @@ mod logistic {
                 symmetric::<3, 8>(&Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] }, &[1, 2, 3])
             },
             lone: &[],
-            operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+            operations: NONE,
             elimination: Elimination::NONE,
             reduction: None,
         };
@@ -274,11 +273,7 @@ mod logistic {
             mu: &ArrayK<Self, S::Cell>,
             g: &mut ArrayV<Self, S::Cell>,
         ) {
-            let (mut f, mut jacobian) = ([mu[0]; 1], [mu[0]; 4]);
-            Self::residual_jacobian::<S>(v, &mut f, &mut jacobian);
-            let (mu, jacobian) = (S::load(&mu[0]), jacobian.map(|cell| S::load(&cell)));
-            let values = [mu, mu * jacobian[1], mu * jacobian[2], mu * jacobian[3], S::from_f64(0.0)];
-            g.iter_mut().zip(values).for_each(|(cell, value)| value.store(cell));
+            adjoint_of_jacobian::<Self, S>(v, mu, g, [v[0]; 4], [v[0]; 1]);
         }
         fn hessian<S: Lanes>(
             v: &ArrayV<Self, S::Cell>,
