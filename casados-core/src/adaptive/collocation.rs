@@ -16,12 +16,13 @@ mod scheme;
 use super::control::LENIENT;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
+use super::levels::weighted;
 use super::norm::{mean, norm};
 use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
-use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, dispatch, slot};
-use crate::model::{ArrayK, ArrayV, Dae};
+use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
 use crate::tableau::Tableau;
@@ -31,6 +32,7 @@ use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
+use points::{combine, follow, last_stage};
 use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
@@ -112,8 +114,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
             let y = y.as_flattened();
             to[if index < nx { index } else { index + nx }] = y[stage];
             if index < nx {
-                let terms = self.scheme.tableau.a()[stage].iter().zip(y);
-                let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);
+                let sum = weighted(&self.scheme.tableau.a()[stage], y);
                 to[nx + index] = to[nx + index] + start.h * sum;
             }
         }
@@ -128,8 +129,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
             let weights = other.lagrange(*node);
             let unknowns = other.accepted().chunks_exact(count);
             for (to, from) in self.memory.accepted.as_mut().iter_mut().zip(unknowns) {
-                let terms = weights.iter().zip(from);
-                to[stage] = terms.fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y);
+                to[stage] = weighted(&weights, from);
             }
         }
     }
@@ -179,16 +179,14 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
         *point = *start.point;
-        if !self.scheme.tableau.is_stiffly_accurate() {
+        if !self.scheme.stiffly_accurate {
             self.extrapolate(start.h, point);
             if let Some(time) = point.as_mut().last_mut() {
                 *time = *time + start.h;
             }
             return true;
         }
-        for (xdot, k) in point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
-            *xdot = dot(&self.scheme.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
-        }
+        combine(&self.scheme.lagrange, &self.memory.y.as_ref()[..M::Shape::NX], point.as_mut());
         false
     }
 
@@ -268,15 +266,12 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
     }
 
     fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool {
-        if !self.scheme.tableau.is_stiffly_accurate() {
+        if !self.scheme.stiffly_accurate {
             self.extrapolate(h, point);
             return false;
         }
-        // The last lane repeats the last stage, which is the end of the step.
-        let Some(points) = self.memory.points.last() else { return true };
-        for (to, [.., last]) in point.as_mut().iter_mut().zip(points.as_ref()) {
-            *to = *last;
-        }
+        // It is the end of the step.
+        last_stage(&self.memory.points, point.as_mut());
         true
     }
 

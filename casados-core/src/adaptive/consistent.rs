@@ -8,6 +8,7 @@ use super::rates::Rates;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
+use crate::memory::fallback::OneStep;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};
 use crate::options::{Options, Start};
 use crate::result::Forward;
@@ -19,7 +20,7 @@ use bytemuck::Zeroable;
 
 /// Solves for `(ẋ, z)`.
 pub struct Consistent<M: Dae, T: Real> {
-    euler: Option<Integrator<M, Custom<1>, 1, T, Heap>>,
+    euler: Option<Integrator<M, Custom<1>, 1, T, Heap<OneStep>>>,
     rates: Option<Box<Rates<M, T>>>,
 }
 
@@ -44,7 +45,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         &mut self,
         at: &At<'_, M, T>,
         y: &ArrayK<M, T>,
-    ) -> Result<&mut Integrator<M, Custom<1>, 1, T, Heap>, Error> {
+    ) -> Result<&mut Integrator<M, Custom<1>, 1, T, Heap<OneStep>>, Error> {
         let euler = match &mut self.euler {
             Some(euler) => euler,
             none => {
@@ -126,7 +127,11 @@ impl<M: Dae, T: Real> Consistent<M, T> {
 }
 
 /// What is inconsistent where Newton's method ended.
-fn explain<M: Dae, T: Real>(euler: &mut Integrator<M, Custom<1>, 1, T, Heap>, error: Error, t: T) -> Error {
+fn explain<M: Dae, T: Real>(
+    euler: &mut Integrator<M, Custom<1>, 1, T, Heap<OneStep>>,
+    error: Error,
+    t: T,
+) -> Error {
     let (unknown, worst) = match error {
         Error::Singular { unknown, .. } => (unknown, None),
         Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),

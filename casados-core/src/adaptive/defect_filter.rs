@@ -27,7 +27,7 @@
 
 use super::control::{LENIENT, power};
 use crate::linalg::{Complex, PARTS};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Scalar;
 
 /// Errors of components that decay are damped by the steps that follow: no more than one of them is
 /// there at a time, and it may be some tolerances.
@@ -69,16 +69,16 @@ pub struct DefectFilter {
 }
 
 impl DefectFilter {
-    /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one,
-    /// and a real one is the first.
-    pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>) -> Self {
+    /// From the eigenvalues of a method with so many stages; of complex conjugate ones there is
+    /// one, and a real one is the first.
+    pub fn new(values: Complex<f64, PARTS>, stages: usize) -> Self {
         let value = |l: usize| {
             let (re, im) = values.get(l);
-            Number { parts: [re.to_f64(), im.to_f64()] }
+            Number { parts: [re, im] }
         };
         let conjugate = |z: Number| Number { parts: [z.parts[0], -z.parts[1]] };
         let one = Number::real(1.0);
-        let (count, real) = (S.div_ceil(2), S % 2);
+        let (count, real) = (stages.div_ceil(2), stages % 2);
         let mut weights = [[0.0; PARTS]; 2];
         for lane in 0..count {
             let own = value(lane);
@@ -93,17 +93,17 @@ impl DefectFilter {
             }
             // z = 1/μ_i
             let z = one / own;
-            let highest = (1..S).fold(coefficient, |product, _| product * z);
+            let highest = (1..stages).fold(coefficient, |product, _| product * z);
             let twice = if lane < real { 1.0 } else { 2.0 };
             // Of two stages there is no such: then everything is kept.
-            let divided = if S < 3 { highest.scaled(-1.0) } else { highest * own * own };
+            let divided = if stages < 3 { highest.scaled(-1.0) } else { highest * own * own };
             for (weights, number) in weights.iter_mut().zip([highest, divided]) {
                 // The real part of a product.
                 (weights[lane], weights[PARTS / 2 + lane]) =
                     (twice * number.parts[0], -twice * number.parts[1]);
             }
         }
-        let s = S as f64;
+        let s = stages as f64;
         Self { weights, exponent: (s + 1.0) / (2.0 * s) }
     }
 

@@ -1,7 +1,7 @@
 //! The methods of a family, opened when they are needed.
 
 use super::sealed::Family;
-use super::stages::{MOST, Stages};
+use super::stages::Stages;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::result::Dense;
@@ -52,6 +52,12 @@ impl<M: Dae, T: Real> Levels<M, T> {
     }
 }
 
+/// `Σ_i weight_i y_i`, a loop of its own, which is not unrolled.
+#[inline(never)]
+pub(super) fn weighted<T: Real>(weights: &[f64], y: &[T]) -> T {
+    weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
+}
+
 /// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`,
 /// `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
 pub(super) fn interpolate<M: Dae, T: Real>(
@@ -64,14 +70,11 @@ pub(super) fn interpolate<M: Dae, T: Real>(
 ) {
     let theta = (passed / h).to_f64();
     let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
-    let sum = |weights: &[f64; MOST], y: &[T]| {
-        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
-    };
     let mut unknowns = y.chunks_exact(stages.count());
     for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
-        *to = *x + h * sum(&weights, k);
+        *to = *x + h * weighted(&weights, k);
     }
     for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
-        *to = sum(&lagrange, z);
+        *to = weighted(&lagrange, z);
     }
 }

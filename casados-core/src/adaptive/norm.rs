@@ -3,6 +3,7 @@
 use crate::scalar::{Real, Scalar};
 
 /// `√(Σ (v/scale)² / n)`, with the reciprocals of the scales.
+#[inline(never)]
 pub(super) fn norm<T: Real>(values: &[T], scale: &[T]) -> f64 {
     let mut sum = T::ZERO;
     for (value, scale) in values.iter().zip(scale) {

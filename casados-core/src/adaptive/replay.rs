@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::integrator::Integrator as _;
 use crate::irk::Integrator;
 use crate::memory::Heap;
+use crate::memory::fallback::OneStep;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX};
 use crate::options::{Options, Start};
 use crate::quadrature::Along;
@@ -88,7 +89,7 @@ pub trait Replay<M: Dae, T: Real> {
 }
 
 /// The integrator of one step of the method `B` with `S` stages, from its first call on.
-pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Integrator<M, B, S, T, Heap>>>);
+pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Integrator<M, B, S, T, Heap<OneStep>>>>);
 
 impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
     fn default() -> Self {
@@ -98,7 +99,7 @@ impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
     /// At the start of a step.
-    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Integrator<M, B, S, T, Heap>, Error> {
+    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Integrator<M, B, S, T, Heap<OneStep>>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
             none => {

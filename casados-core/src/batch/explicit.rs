@@ -87,7 +87,7 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
         call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> Verdict<'e, E, R>,
     ) -> Verdict<'e, E, R> {
         let Self { engine, grid, lambda, .. } = self;
-        call(engine, grid, Heap::nominal(lambda)?.as_ref())
+        call(engine, grid, <Heap>::nominal(lambda)?.as_ref())
     }
 
     /// The same of one with derivatives in all directions.
@@ -101,7 +101,7 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
         ) -> Verdict<'e, E, R>,
     ) -> Verdict<'e, E, R> {
         let Self { engine, grid, lambda, panels } = self;
-        call(engine, grid, Heap::nominal(lambda)?.as_ref(), Heap::nominal(panels)?)
+        call(engine, grid, <Heap>::nominal(lambda)?.as_ref(), <Heap>::nominal(panels)?)
     }
 }
 
@@ -131,7 +131,7 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         gather(intervals, from_mut(&mut grid.start), |interval| from_ref(&interval.t0));
         gather(intervals, from_mut(&mut grid.h), |interval| from_ref(&interval.h));
         grid.h = grid.h / E::from_whole(grid.steps);
-        gather(intervals, Heap::nominal(lambda)?.as_mut(), |interval| interval.lambda);
+        gather(intervals, <Heap>::nominal(lambda)?.as_mut(), |interval| interval.lambda);
         Ok(())
     }
 

@@ -59,6 +59,8 @@ impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for Together<'
     /// For which intervals there is a result.
     type Output = Result<[bool; MOST_LANES], Error>;
 
+    // What callers have of it they do not have to optimise again.
+    #[inline(never)]
     fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> Self::Output {
         let Self { work, groups, statistics, intervals, share } = self;
         let mut done = [false; MOST_LANES];

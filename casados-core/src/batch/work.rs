@@ -121,6 +121,7 @@ impl<I: Single> Worker<I> {
     }
 
     /// The intervals of one group; those with a result are shown to `sink`.
+    #[inline(never)]
     fn group<R: Answer<I::Model, I::Number>>(
         &mut self,
         work: &Work<'_, I>,

@@ -106,7 +106,7 @@ impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> 
         let mut engine: Engine<M, T, S, Heap> = Engine::of(self.engine.scheme.clone());
         let set = self.engine.base.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
         let mut parameters_set = M::Shape::NP == 0;
-        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut engine.base)) {
+        if let (Some(from), Ok(to)) = (set, <Heap>::nominal(&mut engine.base)) {
             to.point.v = from.point.v;
             parameters_set = true;
         }

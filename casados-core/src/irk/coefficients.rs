@@ -23,27 +23,49 @@ pub(crate) struct Coefficients<E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Coefficients<E, S> {
-    /// With the eigenbasis, if `shared` Jacobians are to be used.
+    /// With the eigenbasis, if `shared` Jacobians are to be used. Not inlined: callers would have
+    /// each of its numbers by itself.
+    #[cfg_attr(feature = "std", inline(never))]
     pub fn new(tableau: Tableau<S>, shared: bool) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
             // The last stage is the end: not even a rounding error apart.
-            end = core::array::from_fn(|i| if i + 1 == S { 1.0 } else { 0.0 });
+            end = [0.0; S];
+            if let Some(last) = end.last_mut() {
+                *last = 1.0;
+            }
         }
         let next = tableau.c().map(|c| tableau.lagrange(1.0 + c));
         let finite = next.as_flattened().iter().all(|l| l.is_finite());
         Self {
-            a: tableau.a().map(|row| row.map(E::from_f64)),
-            b: tableau.b().map(E::from_f64),
-            c: tableau.c().map(E::from_f64),
-            start: tableau.lagrange(0.0).map(E::from_f64),
-            end: end.map(E::from_f64),
+            a: square(tableau.a()),
+            b: row(tableau.b()),
+            c: row(tableau.c()),
+            start: row(&tableau.lagrange(0.0)),
+            end: row(&end),
             // Polynomials of higher degree are not worth much outside of their interval.
-            next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
+            next: (finite && S <= 4).then(|| square(&next)),
             basis: if const { S < 3 } || !shared { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }
+}
+
+/// As numbers of the integrator. Loops are quicker to compile than what maps arrays.
+fn row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
+    let mut to = [E::from_f64(0.0); S];
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = E::from_f64(*from);
+    }
+    to
+}
+
+fn square<E: Lanes, const S: usize>(from: &[[f64; S]; S]) -> [[E; S]; S] {
+    let mut to = [[E::from_f64(0.0); S]; S];
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = row(from);
+    }
+    to
 }
 
 /// `x + h Σ_j a_ij k_j`

@@ -278,7 +278,7 @@ impl<M: Dae, T: Real, const S: usize> Run<M, T, S, Heap> {
             time: self.time,
         };
         let set = self.work.get().filter(|_| self.parameters || self.given);
-        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut run.work)) {
+        if let (Some(from), Ok(to)) = (set, <Heap>::nominal(&mut run.work)) {
             (to.parameters, to.given) = (from.parameters, from.given);
             (run.parameters, run.given) = (self.parameters, self.given);
         }

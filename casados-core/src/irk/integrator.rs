@@ -69,7 +69,7 @@ pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
 }
 
 #[cfg(feature = "alloc")]
-impl<M: Dae, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T, Heap> {
+impl<M: Dae, B: Method<S>, const S: usize, T: Real, F: Fallback> Integrator<M, B, S, T, Heap<F>> {
     /// An integrator with its memory on the heap.
     ///
     /// # Errors
@@ -80,7 +80,7 @@ impl<M: Dae, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T, Heap>
 }
 
 #[cfg(feature = "alloc")]
-impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
+impl<M: Dae, const S: usize, T: Real, F: Fallback> Integrator<M, Custom<S>, S, T, Heap<F>> {
     /// An integrator for a tableau of the user's own, with its memory on the heap.
     ///
     /// # Errors

@@ -44,7 +44,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     ) {
         let h = self.inputs.time.step;
         let b = &coefficients.b;
-        if compensate {
+        if const { F::INTERVALS } && compensate {
             let (x, compensation, y) = (self.x.as_mut(), self.compensation.as_mut(), step.y.as_ref());
             compensated::advance(x, compensation, y, b, h);
         } else {
@@ -75,7 +75,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
     ) -> Result<(), Error> {
         self.begin();
-        let count = steps.len();
+        let count = if const { F::INTERVALS } { steps.len() } else { 1 };
         for n in 0..count {
             let (done, rest) = steps.split_at_mut(n);
             let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };

@@ -1,4 +1,7 @@
 //! `P A = L U` of the whole matrix, with partial pivoting: the way that needs no plan.
+//!
+//! It is seldom taken. What it computes are loops over slices, which are compiled once for all
+//! models and numbers of stages of a program, and are not unrolled.
 
 use super::kernel::vector::{axpy, divide};
 use crate::model::{ArrayK, Dae};
@@ -58,145 +61,194 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
         self.rows.as_mut().get_mut(equation)?.get_mut(stage)?.as_mut().get_mut(unknown)
     }
 
-    /// Replaces the matrix by its factors.
-    ///
-    /// Pivots are compared relative to the largest element of their row, so that the choice does
-    /// not depend on the scaling of equations. A pivot is zero if it is not larger than the
-    /// rounding errors that it carries, `n ε Σ_j |l_ij u_jk|`, whatever the scaling of equations
-    /// and unknowns.
+    /// Replaces the matrix by its factors; see [`factor`].
     ///
     /// # Errors
     /// The column `(unknown, stage)` that has no pivot.
     pub fn factor(&mut self) -> Result<(), (usize, usize)> {
-        let rows = self.rows.as_mut().as_flattened_mut();
-        let pivots = self.pivots.as_mut().as_flattened_mut();
-        let scales = self.scales.as_mut().as_flattened_mut();
-        let n = rows.len();
-        for (scale, row) in scales.iter_mut().zip(rows.iter_mut()) {
-            let row = row.as_mut().as_flattened_mut();
-            let mut largest = T::ZERO;
-            for a in row.iter() {
-                largest = a.abs().max(largest);
-            }
-            *scale = if largest > T::ZERO { T::from_f64(1.0) / largest } else { T::from_f64(1.0) };
-            for a in row {
-                *a = *a * *scale;
-            }
-        }
-        for k in 0..n {
-            let (mut best, mut at) = (T::ZERO, k);
-            for (i, row) in rows.iter().enumerate().skip(k) {
-                let size = row.as_ref().as_flattened()[k].abs();
-                if size > best {
-                    (best, at) = (size, i);
-                }
-            }
-            exchange(rows, k, at);
-            exchange(scales, k, at);
-            pivots[k] = at as u32;
-            let (upper, lower) = rows.split_at_mut(k + 1);
-            let (above, row) = upper.split_at(k);
-            let Some(row) = row.first() else { return Err((k / S, k % S)) };
-            let row = row.as_ref().as_flattened();
-            let pivot = row[k];
-            let singular = !(best > T::ZERO && pivot.is_finite())
-                || best * best < T::from_f64(T::EPSILON) && {
-                    let mut sum = T::ZERO;
-                    for (above, l) in above.iter().zip(row) {
-                        sum = sum + (*l * above.as_ref().as_flattened()[k]).abs();
-                    }
-                    pivot.abs() <= T::from_whole(n) * T::from_f64(T::EPSILON) * sum
-                };
-            if singular {
-                return Err((k / S, k % S));
-            }
-            for lower in lower {
-                let lower = lower.as_mut().as_flattened_mut();
-                let l = lower[k] / pivot;
-                lower[k] = l;
-                if l != T::ZERO {
-                    axpy(-l, &row[k + 1..], &mut lower[k + 1..]);
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Two rows in each other's place. The compiler does not know that pivots are rows.
-fn exchange<R>(rows: &mut [R], i: usize, j: usize) {
-    if i.max(j) < rows.len() {
-        rows.swap(i, j);
+        let rows = Array::flat_mut(self.rows.as_mut().as_flattened_mut()).as_flattened_mut();
+        let (pivots, scales) = (self.pivots.as_mut(), self.scales.as_mut());
+        factor(rows, pivots.as_flattened_mut(), scales.as_flattened_mut()).map_err(|k| (k / S, k % S))
     }
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
     /// Solves `A X = B` in place, all columns of `B` at once.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        let (rows, zero) = (self.rows.as_ref().as_flattened(), E::from_f64(0.0));
-        let b = b.as_mut().as_flattened_mut();
-        for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate() {
-            exchange(b, k, *pivot as usize);
+        self.factors().solve(R::flat_mut(b.as_mut().as_flattened_mut()), R::LEN);
+    }
+
+    /// Solves `Aᵀ X = B` in place, all columns of `B` at once.
+    pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        self.factors().solve_transposed(R::flat_mut(b.as_mut().as_flattened_mut()), R::LEN);
+    }
+
+    fn factors(&self) -> Factors<'_, E> {
+        Factors {
+            rows: Array::flat(self.rows.as_ref().as_flattened()).as_flattened(),
+            pivots: self.pivots.as_ref().as_flattened(),
+            scales: self.scales.as_ref().as_flattened(),
         }
-        self.scale(b);
-        for (i, row) in rows.iter().enumerate() {
-            let (before, here) = b.split_at_mut(i);
-            let Some(here) = here.first_mut() else { return };
-            for (l, x) in row.as_ref().as_flattened().iter().zip(before.iter()) {
+    }
+}
+
+/// Replaces a matrix, its rows one after the other, by its factors.
+///
+/// Pivots are compared relative to the largest element of their row, so that the choice does not
+/// depend on the scaling of equations. A pivot is zero if it is not larger than the rounding errors
+/// that it carries, `n ε Σ_j |l_ij u_jk|`, whatever the scaling of equations and unknowns.
+///
+/// # Errors
+/// The column that has no pivot.
+#[cfg_attr(feature = "std", inline(never))]
+fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Result<(), usize> {
+    let n = scales.len();
+    if n == 0 {
+        return Ok(());
+    }
+    for (scale, row) in scales.iter_mut().zip(rows.chunks_exact_mut(n)) {
+        let largest = row.iter().fold(T::ZERO, |largest, a| a.abs().max(largest));
+        *scale = if largest > T::ZERO { T::from_f64(1.0) / largest } else { T::from_f64(1.0) };
+        for a in row {
+            *a = *a * *scale;
+        }
+    }
+    for (k, pivot_row) in pivots.iter_mut().enumerate() {
+        let (mut best, mut at) = (T::ZERO, k);
+        for (i, row) in rows.chunks_exact(n).enumerate().skip(k) {
+            let size = row.get(k).map_or(T::ZERO, |element| element.abs());
+            if size > best {
+                (best, at) = (size, i);
+            }
+        }
+        exchange(rows, n, k, at);
+        exchange(scales, 1, k, at);
+        *pivot_row = at as u32;
+        let Some((upper, lower)) = rows.split_at_mut_checked((k + 1) * n) else { return Err(k) };
+        let Some((above, row)) = upper.split_at_checked(k * n) else { return Err(k) };
+        let Some((&pivot, row_after)) = row.get(k..).and_then(|row| row.split_first()) else { return Err(k) };
+        let singular = !(best > T::ZERO && pivot.is_finite())
+            || best * best < T::from_f64(T::EPSILON) && {
+                let mut sum = T::ZERO;
+                for (above, l) in above.chunks_exact(n).zip(row) {
+                    sum = sum + (*l * above.get(k).copied().unwrap_or(T::ZERO)).abs();
+                }
+                pivot.abs() <= T::from_whole(n) * T::from_f64(T::EPSILON) * sum
+            };
+        if singular {
+            return Err(k);
+        }
+        for lower in lower.chunks_exact_mut(n) {
+            let Some((l, after)) = lower.get_mut(k..).and_then(|row| row.split_first_mut()) else { continue };
+            *l = *l / pivot;
+            if *l != T::ZERO {
+                axpy(-*l, row_after, after);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Two rows of so many elements in each other's place. The compiler does not know that pivots are
+/// rows.
+fn exchange<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
+    let (first, second) = (i.min(j), i.max(j));
+    if first == second {
+        return;
+    }
+    if let Some((upper, lower)) = rows.split_at_mut_checked(second * width) {
+        for (a, b) in upper.iter_mut().skip(first * width).take(width).zip(lower) {
+            core::mem::swap(a, b);
+        }
+    }
+}
+
+/// Factors, and the order and the scale of the rows that they are of.
+struct Factors<'a, E> {
+    rows: &'a [E],
+    pivots: &'a [u32],
+    scales: &'a [E],
+}
+
+impl<E: Lanes> Factors<'_, E> {
+    /// `A X = B` with `width` columns.
+    #[cfg_attr(feature = "std", inline(never))]
+    fn solve(&self, b: &mut [E], width: usize) {
+        let (n, zero) = (self.scales.len(), E::from_f64(0.0));
+        if n == 0 || width == 0 {
+            return;
+        }
+        for (k, pivot) in self.pivots.iter().enumerate() {
+            exchange(b, width, k, *pivot as usize);
+        }
+        self.scale(b, width);
+        for (i, row) in self.rows.chunks_exact(n).enumerate() {
+            let Some((before, here)) = b.split_at_mut_checked(i * width) else { return };
+            let Some(here) = here.get_mut(..width) else { return };
+            for (l, x) in row.iter().zip(before.chunks_exact(width)) {
                 if *l != zero {
-                    axpy(-*l, x.as_ref(), here.as_mut());
+                    axpy(-*l, x, here);
                 }
             }
         }
-        for (i, row) in rows.iter().enumerate().rev() {
-            let (here, after) = b.split_at_mut(i + 1);
-            let Some(here) = here.last_mut() else { return };
-            let row = row.as_ref().as_flattened();
-            for (u, x) in row[i + 1..].iter().zip(after.iter()) {
+        for (i, row) in self.rows.chunks_exact(n).enumerate().rev() {
+            let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
+            let (Some(here), Some((pivot, row))) =
+                (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
+            else {
+                return;
+            };
+            for (u, x) in row.iter().zip(after.chunks_exact(width)) {
                 if *u != zero {
-                    axpy(-*u, x.as_ref(), here.as_mut());
+                    axpy(-*u, x, here);
                 }
             }
-            divide(here.as_mut(), row[i]);
+            divide(here, *pivot);
         }
     }
 
     /// Multiplies the rows as those of the matrix were.
-    fn scale<R: Array<E>>(&self, b: &mut [R]) {
-        for (row, scale) in b.iter_mut().zip(self.scales.as_ref().as_flattened()) {
-            for b in row.as_mut() {
+    fn scale(&self, b: &mut [E], width: usize) {
+        for (row, scale) in b.chunks_exact_mut(width).zip(self.scales) {
+            for b in row {
                 *b = *b * *scale;
             }
         }
     }
 
-    /// Solves `Aᵀ X = B` in place, all columns of `B` at once.
-    pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        let (rows, zero) = (self.rows.as_ref().as_flattened(), E::from_f64(0.0));
-        let b = b.as_mut().as_flattened_mut();
-        for (i, row) in rows.iter().enumerate() {
-            let (here, after) = b.split_at_mut(i + 1);
-            let Some(here) = here.last_mut() else { return };
-            let row = row.as_ref().as_flattened();
-            divide(here.as_mut(), row[i]);
-            for (u, x) in row[i + 1..].iter().zip(after) {
+    /// `Aᵀ X = B` with `width` columns.
+    #[cfg_attr(feature = "std", inline(never))]
+    fn solve_transposed(&self, b: &mut [E], width: usize) {
+        let (n, zero) = (self.scales.len(), E::from_f64(0.0));
+        if n == 0 || width == 0 {
+            return;
+        }
+        for (i, row) in self.rows.chunks_exact(n).enumerate() {
+            let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
+            let (Some(here), Some((pivot, row))) =
+                (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
+            else {
+                return;
+            };
+            divide(here, *pivot);
+            for (u, x) in row.iter().zip(after.chunks_exact_mut(width)) {
                 if *u != zero {
-                    axpy(-*u, here.as_ref(), x.as_mut());
+                    axpy(-*u, here, x);
                 }
             }
         }
-        for (i, row) in rows.iter().enumerate().rev() {
-            let (before, here) = b.split_at_mut(i);
-            let Some(here) = here.first() else { return };
-            for (l, x) in row.as_ref().as_flattened().iter().zip(before) {
+        for (i, row) in self.rows.chunks_exact(n).enumerate().rev() {
+            let Some((before, here)) = b.split_at_mut_checked(i * width) else { return };
+            let Some(here) = here.get(..width) else { return };
+            for (l, x) in row.iter().zip(before.chunks_exact_mut(width)) {
                 if *l != zero {
-                    axpy(-*l, here.as_ref(), x.as_mut());
+                    axpy(-*l, here, x);
                 }
             }
         }
-        self.scale(b);
-        for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate().rev() {
-            exchange(b, k, *pivot as usize);
+        self.scale(b, width);
+        for (k, pivot) in self.pivots.iter().enumerate().rev() {
+            exchange(b, width, k, *pivot as usize);
         }
     }
 }

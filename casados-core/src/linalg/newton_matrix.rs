@@ -54,6 +54,10 @@ impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F
 impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
+    /// Whether the whole matrix may be pivoted: not in registers, of which a lane that needs it is
+    /// computed alone.
+    pub const MAY_BE_DENSE: bool = E::LANES == 1;
+
     /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all
     /// stages. A pivot that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
@@ -67,8 +71,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// kinematic states stay.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
-            Some(dense) => dense.solve(b),
-            None => solve::solve(self.planned(), b.as_mut()),
+            Some(dense) if const { Self::MAY_BE_DENSE } => dense.solve(b),
+            _ => solve::solve(self.planned(), b.as_mut()),
         }
     }
 
@@ -76,8 +80,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// slots. Rows of kinematic states stay.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
-            Some(dense) => dense.solve_transposed(b),
-            None => solve::solve_transposed(self.planned(), b.as_mut()),
+            Some(dense) if const { Self::MAY_BE_DENSE } => dense.solve_transposed(b),
+            _ => solve::solve_transposed(self.planned(), b.as_mut()),
         }
     }
 
@@ -88,7 +92,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 
     /// Whether the factors that are there are those of the plan.
     pub fn is_planned(&self) -> bool {
-        self.dense().is_none()
+        !Self::MAY_BE_DENSE || self.dense().is_none()
     }
 
     /// The factors of the whole matrix, if they are the ones that hold.

@@ -22,12 +22,21 @@ pub struct Pivoting;
 #[derive(Clone, Copy, Debug)]
 pub struct Refusing;
 
+/// [`Pivoting`], in an integrator of one step with the options that are those by default: it has no
+/// code for other steps and options.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OneStep;
+
 /// [`Pivoting`] or [`Refusing`].
 pub trait Fallback: sealed::Sealed + 'static {
     /// A place for what only the fallback needs.
     type Place<V: Stored + Copy>: Kept<V>;
     /// Whether there is one.
     const KEPT: bool;
+    /// Whether intervals may have several steps, and any options.
+    #[doc(hidden)]
+    const INTERVALS: bool = true;
 }
 
 /// A place that has a value, or has none.
@@ -47,6 +56,15 @@ impl sealed::Sealed for Refusing {}
 impl Fallback for Refusing {
     type Place<V: Stored + Copy> = Absent;
     const KEPT: bool = false;
+}
+
+#[cfg(feature = "alloc")]
+impl sealed::Sealed for OneStep {}
+#[cfg(feature = "alloc")]
+impl Fallback for OneStep {
+    type Place<V: Stored + Copy> = Inside<V>;
+    const KEPT: bool = true;
+    const INTERVALS: bool = false;
 }
 
 impl<V: Stored + Copy> Kept<V> for Inside<V> {

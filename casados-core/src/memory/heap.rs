@@ -1,15 +1,18 @@
 //! Memory on the heap: each place is allocated, zeroed, when it is needed first.
 
 use super::{
-    Family, Memory, Stored, WithAdjoint, WithDirectional, WithForward, WithHessian, fallback, sealed,
+    Fallback, Family, Memory, Stored, WithAdjoint, WithDirectional, WithForward, WithHessian, fallback,
+    sealed,
 };
 use crate::error::Error;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
 use core::any::Any;
+use core::marker::PhantomData;
 
-/// Memory on the heap: allocated when it is needed first.
+/// Memory on the heap: allocated when it is needed first; with what an implicit integrator is to
+/// fall back on ([`fallback`]).
 ///
 /// ```
 /// # use casados::prelude::*;
@@ -25,7 +28,7 @@ use core::any::Any;
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Heap;
+pub struct Heap<F = fallback::Pivoting>(PhantomData<fn() -> F>);
 
 /// A value on the heap.
 #[derive(Debug)]
@@ -97,9 +100,9 @@ impl AllocatedByType {
     }
 }
 
-impl sealed::Sealed for Heap {}
+impl<F> sealed::Sealed for Heap<F> {}
 
-impl Memory for Heap {
+impl<F: Fallback> Memory for Heap<F> {
     type Nominal<V: Stored> = Allocated<V>;
     type Tape<V: Stored> = AllocatedTape<V>;
     type Forward<V: Stored> = Allocated<V>;
@@ -107,7 +110,7 @@ impl Memory for Heap {
     type Adjoint<V: Family> = AllocatedByType;
     type Hessian<V: Stored> = Allocated<V>;
     type HessianTape<V: Stored> = AllocatedTape<V>;
-    type Fallback = fallback::Pivoting;
+    type Fallback = F;
     const STEPS: usize = usize::MAX;
     fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
         place.open()
@@ -116,22 +119,22 @@ impl Memory for Heap {
         place.open(steps)
     }
 }
-impl WithForward for Heap {
+impl<F: Fallback> WithForward for Heap<F> {
     fn forward<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
         place.open()
     }
 }
-impl<const C: usize> WithDirectional<C> for Heap {
+impl<F: Fallback, const C: usize> WithDirectional<C> for Heap<F> {
     fn directional<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
         place.open()
     }
 }
-impl<const C: usize> WithAdjoint<C> for Heap {
+impl<F: Fallback, const C: usize> WithAdjoint<C> for Heap<F> {
     fn adjoint<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
         place.open()
     }
 }
-impl WithHessian for Heap {
+impl<F: Fallback> WithHessian for Heap<F> {
     fn hessian<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
         place.open()
     }

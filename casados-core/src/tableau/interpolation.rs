@@ -2,6 +2,42 @@
 
 use super::{Gauss, Method, Tableau};
 
+/// `ℓ_i(θ)`
+fn polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
+    let mut product = 1.0;
+    for (j, other) in nodes.iter().enumerate() {
+        if j != i {
+            product *= (theta - other) / (own - other);
+        }
+    }
+    product
+}
+
+// On slices, so that they are compiled once for all numbers of stages.
+
+/// See [`Tableau::lagrange`].
+#[cfg_attr(feature = "std", inline(never))]
+fn lagrange(nodes: &[f64], theta: f64, values: &mut [f64]) {
+    for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
+        *value = polynomial(nodes, i, *own, theta);
+    }
+}
+
+/// See [`Tableau::weights`].
+#[cfg_attr(feature = "std", inline(never))]
+fn integrals(nodes: &[f64], theta: f64, values: &mut [f64]) {
+    const FEW: Tableau<5> = Gauss::<5>::TABLEAU;
+    const MANY: Tableau<9> = Gauss::<9>::TABLEAU;
+    let (b, c): (&[f64], &[f64]) = if nodes.len() <= 10 { (&FEW.b, &FEW.c) } else { (&MANY.b, &MANY.c) };
+    for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
+        let mut sum = 0.0;
+        for (weight, node) in b.iter().zip(c) {
+            sum += weight * polynomial(nodes, i, *own, theta * node);
+        }
+        *value = theta * sum;
+    }
+}
+
 impl<const S: usize> Tableau<S> {
     /// The Lagrange polynomials of the nodes at `theta`:
     /// `ℓ_i(θ) = Π_{j≠i} (θ − c_j) / (c_i − c_j)`.
@@ -12,15 +48,9 @@ impl<const S: usize> Tableau<S> {
     /// [`Tableau::is_collocation`]).
     #[must_use]
     pub fn lagrange(&self, theta: f64) -> [f64; S] {
-        core::array::from_fn(|i| {
-            let mut product = 1.0;
-            for j in 0..S {
-                if j != i {
-                    product *= (theta - self.c[j]) / (self.c[i] - self.c[j]);
-                }
-            }
-            product
-        })
+        let mut values = [0.0; S];
+        lagrange(&self.c, theta, &mut values);
+        values
     }
 
     /// `b_i(θ) = ∫₀^θ ℓ_i`: the collocation polynomial is `x(θ) = x_n + h Σ_i b_i(θ) k_i`.
@@ -29,19 +59,8 @@ impl<const S: usize> Tableau<S> {
     /// quadrature, exact up to rounding for `S ≤ 18`.
     #[must_use]
     pub fn weights(&self, theta: f64) -> [f64; S] {
-        const FEW: Tableau<5> = Gauss::<5>::TABLEAU;
-        const MANY: Tableau<9> = Gauss::<9>::TABLEAU;
-        if S <= 10 { self.integrate(theta, &FEW) } else { self.integrate(theta, &MANY) }
-    }
-
-    fn integrate<const Q: usize>(&self, theta: f64, quadrature: &Tableau<Q>) -> [f64; S] {
-        let mut sum = [0.0; S];
-        for (weight, node) in quadrature.b.iter().zip(&quadrature.c) {
-            let lagrange = self.lagrange(theta * node);
-            for (sum, l) in sum.iter_mut().zip(&lagrange) {
-                *sum += weight * l;
-            }
-        }
-        sum.map(|s| theta * s)
+        let mut values = [0.0; S];
+        integrals(&self.c, theta, &mut values);
+        values
     }
 }

@@ -63,9 +63,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let (nx, mut changes) = (M::Shape::NX, ArrayK::<M, T>::zeroed());
         self.memory.point = *start.point;
         let Memory { point, y, .. } = &mut *self.memory;
-        for (index, (y, change)) in y.as_ref().iter().zip(changes.as_mut()).enumerate() {
-            let slope = dot(&self.scheme.lagrange, y.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+        combine(&self.scheme.lagrange, y.as_ref(), changes.as_mut());
+        for (index, change) in changes.as_mut().iter_mut().enumerate() {
             let old = &mut point[if index < nx { index } else { index + nx }];
+            let slope = *change;
             *change = slope - *old;
             *old = slope;
         }

@@ -10,9 +10,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
             if let Err(call) = T::side_by_side(Residual::<M, T> { points, f }) {
                 let Residual { points, f } = call;
                 for lane in 0..GROUP.min(S - GROUP * group) {
-                    for (to, from) in point.as_mut().iter_mut().zip(points.as_ref()) {
-                        *to = from[lane];
-                    }
+                    take(points.as_ref(), lane, point.as_mut());
                     M::residual::<T>(point, f_point);
                     for (to, from) in f.as_mut().iter_mut().zip(f_point.as_ref()) {
                         to[lane..].fill(*from);
@@ -49,16 +47,55 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
 
     /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
     pub(super) fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
-        let (nx, point) = (M::Shape::NX, point.as_mut());
-        let (b, end) = (self.scheme.weights(), self.scheme.values(1.0));
-        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
-            let Some(y) = y.as_flattened().first_chunk() else { continue };
-            if index < nx {
-                point[index] = dot(&end, y);
-                point[nx + index] = point[nx + index] + h * dot(&b, y);
-            } else {
-                point[nx + index] = dot(&end, y);
-            }
+        let (end, b) = (self.scheme.values(1.0), self.scheme.weights());
+        follow::<M, T, S, G>(&self.memory.y, [&end, &b], h, point);
+    }
+}
+
+/// From `x_n` to a point of the step: `x_n + h Σ_i b_i k_i` with the `integrals` of the Lagrange
+/// polynomials there, and `ẋ` and `z` with their `values`.
+pub(super) fn follow<M: Dae, T: Real, const S: usize, const G: usize>(
+    y: &ArrayK<M, Groups<T, G>>,
+    [values, integrals]: [&[T; S]; 2],
+    h: T,
+    point: &mut ArrayV<M, T>,
+) {
+    let nx = M::Shape::NX;
+    let (k, z) = y.as_ref().split_at(nx);
+    let (xdot, others) = point.as_mut().split_at_mut(nx);
+    let (x, others) = others.split_at_mut(nx);
+    combine(values, k, xdot);
+    combine(values, z, others);
+    let mut change = ArrayX::<M, T>::zeroed();
+    combine(integrals, k, change.as_mut());
+    axpy(h, change.as_ref(), x);
+}
+
+// Loops over unknowns in functions of their own are not unrolled, and compiled once for all models.
+
+/// `Σ_i weight_i y_i` of some unknowns.
+#[inline(never)]
+pub(super) fn combine<T: Real, const S: usize, const G: usize>(
+    weights: &[T; S],
+    y: &[Groups<T, G>],
+    to: &mut [T],
+) {
+    for (to, y) in to.iter_mut().zip(y) {
+        if let Some(y) = y.as_flattened().first_chunk() {
+            *to = dot(weights, y);
         }
     }
+}
+
+/// Values in one lane of a group.
+#[inline(never)]
+pub(super) fn take<T: Real>(group: &[[T; GROUP]], lane: usize, to: &mut [T]) {
+    for (to, from) in to.iter_mut().zip(group) {
+        *to = from[lane];
+    }
+}
+
+/// Variables at the last stage, which the last lane of the last group repeats.
+pub(super) fn last_stage<V: AsRef<[[T; GROUP]]>, T: Real>(groups: &[V], to: &mut [T]) {
+    take(groups.last().map_or(&[], AsRef::as_ref), GROUP - 1, to);
 }

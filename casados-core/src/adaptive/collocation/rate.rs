@@ -26,10 +26,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// [`Failure::NotFinite`]
     fn measured_rate(&mut self, residuals: &mut usize) -> Result<f64, Failure> {
         let Memory { points, point, .. } = &mut *self.memory;
-        // The last lane repeats the last stage.
-        for (to, [.., last]) in point.as_mut().iter_mut().zip(points.last().map_or(&[][..], AsRef::as_ref)) {
-            *to = *last;
-        }
+        last_stage(points, point.as_mut());
         self.evaluate_point(residuals)?;
         let Memory { f, f_point, .. } = &*self.memory;
         Ok(largest_ratio(f_point.as_ref(), f.each_ref().map(AsRef::as_ref).as_slice()))

@@ -33,10 +33,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         watched: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        if S < 3 || !watched && !self.scheme.tableau.is_stiffly_accurate() && growth <= 1.0 {
+        if S < 3 || !watched && !self.scheme.stiffly_accurate && growth <= 1.0 {
             return Ok(0.0);
         }
-        let (scheme, radau) = (&self.scheme, self.scheme.tableau.is_stiffly_accurate());
+        let (scheme, radau) = (&self.scheme, self.scheme.stiffly_accurate);
         let (seen, near, far) = (if radau { 0.0 } else { 1.0 }, scheme.middle(S - 1), scheme.middle(S / 2));
         let [at_seen, at_near, at_far] = [scheme.nodes(seen), scheme.nodes(near), scheme.nodes(far)];
         let known = self.memory.error;
@@ -66,18 +66,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         start: &Start<'_, M, T>,
         residuals: &mut usize,
     ) -> Result<ArrayK<M, T>, Failure> {
-        let nx = M::Shape::NX;
-        let values = self.scheme.values(tau);
-        let integrals = self.scheme.integrals(tau);
         self.memory.point = *start.point;
         let Memory { point, y, .. } = &mut *self.memory;
-        for (index, y) in y.as_ref().iter().enumerate() {
-            let Some(y) = y.as_flattened().first_chunk::<S>() else { continue };
-            point[if index < nx { index } else { index + nx }] = dot(&values, y);
-            if index < nx {
-                point[nx + index] = point[nx + index] + start.h * dot(&integrals, y);
-            }
-        }
+        let (values, integrals) = (self.scheme.values(tau), self.scheme.integrals(tau));
+        follow::<M, T, S, G>(y, [&values, &integrals], start.h, point);
         if let Some(time) = point.as_mut().last_mut() {
             *time = *time + start.h * T::from_f64(tau);
         }

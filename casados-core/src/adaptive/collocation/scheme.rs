@@ -5,6 +5,7 @@ use super::*;
 /// The coefficients of a method with `S` stages in `G` groups: compiled once for all models.
 pub(super) struct Scheme<T: Real, const S: usize, const G: usize> {
     pub(super) tableau: Tableau<S>,
+    pub(super) stiffly_accurate: bool,
     /// Columns of `A`, and of `−h A` of this step.
     a: [Groups<T, G>; S],
     pub(super) minus_ha: [Groups<T, G>; S],
@@ -21,23 +22,36 @@ pub(super) struct Scheme<T: Real, const S: usize, const G: usize> {
 
 impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
     /// Nothing for a method whose stages cannot be told apart: Gauss and Radau IIA methods are
-    /// none.
+    /// none. Not inlined: callers would have each of its numbers by itself.
+    #[inline(never)]
     pub(super) fn new(tableau: Tableau<S>) -> Option<Self> {
         const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
         let basis: Eigenbasis<T, S, PARTS> = Eigenbasis::new(&tableau)?;
-        let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
-        let a = from_fn(|j| Self::groups(|i| T::from_f64(a[i][j])));
-        Some(Self {
-            a,
-            minus_ha: a,
-            c: Self::groups(|i| T::from_f64(c[i])),
-            right: from_fn(|part| Self::groups(|i| right[part][i])),
-            lagrange: tableau.lagrange(0.0).map(T::from_f64),
-            factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
-            defect_filter: DefectFilter::new::<T, S>(basis.values()),
+        let nothing = [[T::ZERO; GROUP]; G];
+        let mut scheme = Self {
+            a: [nothing; S],
+            minus_ha: [nothing; S],
+            c: nothing,
+            right: [nothing; PARTS],
+            lagrange: [T::ZERO; S],
+            factors: [1.0; S],
+            defect_filter: DefectFilter::new(Complex { parts: basis.values().parts.map(T::to_f64) }, S),
             basis,
+            stiffly_accurate: tableau.is_stiffly_accurate(),
             tableau,
-        })
+        };
+        for (j, to) in scheme.a.iter_mut().enumerate() {
+            spread(&tableau.a().map(|row| T::from_f64(row[j])), to);
+        }
+        spread(&tableau.c().map(T::from_f64), &mut scheme.c);
+        for (from, to) in scheme.basis.right().iter().zip(&mut scheme.right) {
+            spread(from, to);
+        }
+        for (to, from) in scheme.lagrange.iter_mut().zip(tableau.lagrange(0.0)) {
+            *to = T::from_f64(from);
+        }
+        denominators(tableau.c(), &mut scheme.factors);
+        Some(scheme)
     }
 
     /// The Lagrange polynomials of the nodes, without a division.
@@ -90,10 +104,8 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
 
     /// `−h A` of a step of length `h`.
     pub(super) fn set_step(&mut self, h: T) {
-        let to = self.minus_ha.as_flattened_mut().as_flattened_mut();
-        for (to, from) in to.iter_mut().zip(self.a.as_flattened().as_flattened()) {
-            *to = -(h * *from);
-        }
+        let a = self.a.as_flattened().as_flattened();
+        multiply(h, a, self.minus_ha.as_flattened_mut().as_flattened_mut());
     }
 
     /// Times of the stages.
@@ -113,5 +125,34 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
     /// The sum over the stages, each once.
     pub(super) fn total(sum: &Groups<T, G>) -> f64 {
         sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
+    }
+}
+
+/// A value of each stage, of which the last is repeated.
+#[inline(never)]
+fn spread<T: Real>(from: &[T], to: &mut [[T; GROUP]]) {
+    for (lane, to) in to.as_flattened_mut().iter_mut().enumerate() {
+        *to = from.get(lane).or(from.last()).copied().unwrap_or(T::ZERO);
+    }
+}
+
+/// `−h A`
+#[inline(never)]
+fn multiply<T: Real>(h: T, a: &[T], to: &mut [T]) {
+    for (to, a) in to.iter_mut().zip(a) {
+        *to = -(h * *a);
+    }
+}
+
+/// `1 / Π_{j≠i} (c_i − c_j)`
+#[inline(never)]
+fn denominators(nodes: &[f64], to: &mut [f64]) {
+    for (i, (own, to)) in nodes.iter().zip(to).enumerate() {
+        *to = 1.0;
+        for (j, other) in nodes.iter().enumerate() {
+            if j != i {
+                *to /= own - other;
+            }
+        }
     }
 }

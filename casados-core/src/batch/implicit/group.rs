@@ -65,8 +65,8 @@ macro_rules! pass {
         $group.statistics = Statistics::default();
         let count = $group.options.steps;
         let from = match $group.options.start {
-            _ if $group.solved => InitialGuess::Solution(Heap::tape(&mut $group.record, count)?),
-            Start::Warm if $group.warm => InitialGuess::Previous(Heap::tape(&mut $group.record, count)?),
+            _ if $group.solved => InitialGuess::Solution(<Heap>::tape(&mut $group.record, count)?),
+            Start::Warm if $group.warm => InitialGuess::Previous(<Heap>::tape(&mut $group.record, count)?),
             Start::Zero => InitialGuess::Zero,
             _ if $group.given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
@@ -75,8 +75,8 @@ macro_rules! pass {
             options: &$group.options,
             coefficients: &$group.coefficients,
             statistics: &mut $group.statistics,
-            work: Heap::nominal(&mut $group.work)?,
-            steps: Heap::tape(&mut $group.steps, count)?,
+            work: <Heap>::nominal(&mut $group.work)?,
+            steps: <Heap>::tape(&mut $group.steps, count)?,
             from,
         }
     }};
@@ -84,7 +84,7 @@ macro_rules! pass {
 impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
     fn differentiate(&mut self, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
         let mut pass = pass!(self);
-        let ForwardMemory { result, pass: forward, .. } = Heap::forward(&mut self.forward)?;
+        let ForwardMemory { result, pass: forward, .. } = <Heap>::forward(&mut self.forward)?;
         let count = pass.steps.len();
         let good = pass.run(&mut [], |pass, n, step, exact, _| {
             pass.linearize(None, n, step, exact);
@@ -99,7 +99,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         });
         let good = E::and(good, forward.end(&pass.work.result, &mut result.forward).is_finite());
         if adjoint {
-            multiply(result, Heap::nominal(&mut self.lambda)?.as_ref());
+            multiply(result, <Heap>::nominal(&mut self.lambda)?.as_ref());
         }
         Ok((good, result))
     }
@@ -137,7 +137,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         solved: bool,
     ) -> Result<(), Error> {
         let count = self.options.steps;
-        let work = Heap::nominal(&mut self.work)?;
+        let work = <Heap>::nominal(&mut self.work)?;
         work.prepare();
         let time = &mut work.inputs.time;
         gather(intervals, work.x.as_mut(), |interval| interval.x0.as_slice());
@@ -151,16 +151,16 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         for (given, to) in given.iter().flatten().zip([xdot, z]) {
             pack(&[*given; MOST_LANES], to);
         }
-        gather(intervals, Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
+        gather(intervals, <Heap>::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
         // All of them have some, or none.
         self.weighted = intervals.iter().all(|interval| !interval.nu.is_empty());
         if self.weighted {
-            gather(intervals, Heap::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
+            gather(intervals, <Heap>::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
         }
-        Heap::tape(&mut self.steps, count)?;
+        <Heap>::tape(&mut self.steps, count)?;
         (self.warm, self.solved) = (stages.is_some(), stages.is_some() && solved);
         let Some(stages) = stages else { return Ok(()) };
-        for (n, step) in Heap::tape(&mut self.record, count)?.iter_mut().enumerate() {
+        for (n, step) in <Heap>::tape(&mut self.record, count)?.iter_mut().enumerate() {
             let from = stages.map(|stages| stages.get(n).map_or(&[][..], |y| y.as_ref().as_flattened()));
             pack(&from, step.y.as_mut().as_flattened_mut());
         }
@@ -168,7 +168,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     }
 
     fn stages(&mut self, lane: usize, stages: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        for (y, step) in stages.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
+        for (y, step) in stages.iter_mut().zip(<Heap>::tape(&mut self.steps, self.options.steps)?) {
             let mut to: [&mut [T]; MOST_LANES] = Default::default();
             if let Some(to) = to.get_mut(lane) {
                 *to = y.as_mut().as_flattened_mut();
@@ -199,8 +199,8 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
 
     fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
         let mut pass = pass!(self);
-        let adjoint = Heap::nominal(&mut self.adjoint)?;
-        let lambda = Heap::nominal(&mut self.lambda)?;
+        let adjoint = <Heap>::nominal(&mut self.adjoint)?;
+        let lambda = <Heap>::nominal(&mut self.lambda)?;
         let count = pass.steps.len();
         // On the way forth only the last step is linearised: it is where the way back begins.
         let mut good = pass.run(&mut [], |pass, n, step, exact, _| {
@@ -224,12 +224,12 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
 
     fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
         let mut pass = pass!(self);
-        let forward = &mut Heap::forward(&mut self.forward)?.pass;
-        let HessianMemory { result, pass: hessian } = Heap::hessian(&mut self.hessian)?;
-        let lambda = Heap::nominal(&mut self.lambda)?;
-        let nu = if self.weighted { Heap::nominal(&mut self.nu)?.as_slice() } else { &[] };
+        let forward = &mut <Heap>::forward(&mut self.forward)?.pass;
+        let HessianMemory { result, pass: hessian } = <Heap>::hessian(&mut self.hessian)?;
+        let lambda = <Heap>::nominal(&mut self.lambda)?;
+        let nu = if self.weighted { <Heap>::nominal(&mut self.nu)?.as_slice() } else { &[] };
         let count = pass.steps.len();
-        let records = Heap::hessian_tape(&mut self.tape, count)?;
+        let records = <Heap>::hessian_tape(&mut self.tape, count)?;
         let mut good = pass.run(records, |pass, n, step, exact, record| {
             let Some(record) = record else { return yes::<E>() };
             let at = StepOf { n, count, distant: false };

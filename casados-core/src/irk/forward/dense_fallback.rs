@@ -12,23 +12,36 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// Solves by the factors of the whole matrix, column by column.
     pub(super) fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
         let Work { increment, linear, .. } = work;
-        let rows = M::Shape::NK;
         let dy = R::flat_mut(self.dy_mut());
         panels!(D::COLUMNS, E, S, column, W => {
-            let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
+            let rows = panel_mut::<E, W>(dy, column, M::Shape::NK * S);
             for c in 0..W {
-                for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
-                    for (to, row) in to.iter_mut().zip(from) {
-                        *to = [row[c]];
-                    }
-                }
+                take(rows, c, increment.as_mut().as_flattened_mut().as_flattened_mut());
                 linear.factors.solve(increment);
-                for (to, from) in packets.iter_mut().zip(increment.as_ref()) {
-                    for (to, [from]) in to.iter_mut().zip(from) {
-                        to[c] = *from;
-                    }
-                }
+                put(increment.as_ref().as_flattened().as_flattened(), rows, c);
             }
         });
+    }
+}
+
+// Seldom needed: loops of their own are not unrolled.
+
+/// A column of a panel.
+#[cfg_attr(feature = "std", inline(never))]
+fn take<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
+    for (to, row) in to.iter_mut().zip(rows) {
+        if let Some(element) = row.get(column) {
+            *to = *element;
+        }
+    }
+}
+
+/// The same back into the panel.
+#[cfg_attr(feature = "std", inline(never))]
+pub(super) fn put<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
+    for (from, row) in from.iter().zip(rows) {
+        if let Some(element) = row.get_mut(column) {
+            *element = *from;
+        }
     }
 }

@@ -10,6 +10,7 @@ use crate::shape::Matrix;
 
 /// # Errors
 /// [`Error::Overflow`] of the first derivative that is not finite.
+#[cfg_attr(feature = "std", inline(never))]
 pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
     for values in [
         result.dx_dx0.as_slice(),

@@ -14,6 +14,7 @@
 //! B. Moler, J. ACM 14, 1967). One sum of all directions tells whether that is worth it.
 
 use super::checksum::total;
+use super::dense_fallback::put;
 use super::output::Target;
 use super::sweep::{Linearized, Outputs, Sweep};
 use crate::irk::coefficients::Coefficients;
@@ -119,21 +120,22 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                 work.probe_tangent();
                 for (equation, tangent) in work.probe[1].as_ref().iter().enumerate().take(nk) {
                     if let Some(rows) = right.as_mut().get_mut(slot::<M>(equation)) {
-                        for (row, tangent) in rows.iter_mut().zip(tangent) {
-                            row[c] = *tangent;
-                        }
+                        put(tangent, rows, c);
                     }
                 }
             }
             work.linear.solve::<W>((coefficients, work.inputs.time.step), &mut right);
-            let dy = R::flat_mut(self.dy_mut());
-            let (dy, _) = panel_mut::<T, W>(dy, column, nk * S).as_chunks_mut::<S>();
-            for (rows, corrections) in dy.iter_mut().zip(right.as_ref()) {
-                for (row, correction) in rows.as_flattened_mut().iter_mut().zip(corrections.as_flattened()) {
-                    *row = *row - *correction;
-                }
-            }
+            let dy = panel_mut::<T, W>(R::flat_mut(self.dy_mut()), column, nk * S);
+            correct(dy.as_flattened_mut(), right.as_ref().as_flattened().as_flattened());
         });
+    }
+}
+
+/// `x ← x − Δ`. Seldom needed: a loop of its own is not unrolled.
+#[cfg_attr(feature = "std", inline(never))]
+fn correct<T: Real>(x: &mut [T], corrections: &[T]) {
+    for (x, correction) in x.iter_mut().zip(corrections) {
+        *x = *x - *correction;
     }
 }
 

@@ -11,8 +11,8 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, coupling, dispatch, is_long, is_short, kernels,
-    sweeps,
+    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, coupling, dispatch, is_long, is_short,
+    kernels, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -104,7 +104,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         of: Linearized<'_, M, E, D, S, F>,
         outputs: &mut Outputs<'_, E, G>,
     ) -> E::Mask {
-        if work.linear(of.kept).factors.is_planned() {
+        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE } || work.linear(of.kept).factors.is_planned() {
             self.run(work, of, outputs, Phase::Whole, false);
         } else {
             self.run(work, of, outputs, Phase::Before, false);
@@ -132,7 +132,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         let Self { v, end, dy, sums, start_sums, finite, .. } = self;
         let [start, other] = v;
         let (v, next) = if *end { (start, other) } else { (other, start) };
-        *finite = [dispatch(Step::<M, E, D, G, S> {
+        *finite = [dispatch(Step::<M, E, D, G, F, S> {
             phase,
             jacobian: &work.linear.jacobian,
             factors: work.linear(kept).factors.planned(),
@@ -151,7 +151,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             sum: E::from_f64(0.0),
             second,
             placed: Placed::default(),
-            model: PhantomData,
+            of: PhantomData,
         })];
     }
 
@@ -199,7 +199,7 @@ kernels! {
 }
 
 /// See [`Sweep::step`].
-struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
+struct Step<'a, M: Dae, E: Plain, D, G, F, const S: usize> {
     phase: Phase,
     jacobian: &'a M::Jacobian<[E; S]>,
     factors: Planned<'a, M, E, S>,
@@ -219,7 +219,7 @@ struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
     sum: E,
     second: bool,
     placed: Placed,
-    model: PhantomData<M>,
+    of: PhantomData<(M, F)>,
 }
 
 /// What all panels share.
@@ -232,7 +232,9 @@ struct Shared<E, const S: usize> {
     minus_weights: [E; S],
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Step<'_, M, E, D, G, S> {
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize> Kernel
+    for Step<'_, M, E, D, G, F, S>
+{
     type Number = E;
     type Output = E;
     const WIDE: bool = is_long::<M, S>() && D::COLUMNS >= 8;
@@ -266,7 +268,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
     }
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize>
+    Step<'_, M, E, D, G, F, S>
+{
+    /// Whether `V_n` is always the unit matrix.
+    const UNIT: bool = D::SPARSE && !F::INTERVALS;
+
     /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
@@ -312,7 +319,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             return;
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
-        if !(self.first && D::SPARSE) {
+        if const { !Self::UNIT } && !(self.first && D::SPARSE) {
             let kinematic = Forward { jacobian, v, directions, column };
             Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
@@ -343,8 +350,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
             sums.all::<A>(dy);
         }
-        let unit = self.first && D::SPARSE;
-        if !unit {
+        let unit = Self::UNIT || self.first && D::SPARSE;
+        if const { !Self::UNIT } && !unit {
             for (strands, row) in self.start_sums.iter_mut().zip(v) {
                 accumulate::<A, E, W>(strands, minus_weights, row);
             }
@@ -356,7 +363,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             let end =
                 Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
             self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
-        } else {
+        } else if const { !Self::UNIT } {
             let next = panel_mut::<E, W>(self.next, column, nx);
             for (n, (to, dk)) in next.iter_mut().zip(dy.iter()).enumerate() {
                 let mut row = from.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);

@@ -22,8 +22,8 @@ use crate::irk::forward::sweep::Phase;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling, dispatch,
-    is_long, sweeps,
+    Ahead, Arithmetic, Block, Factors, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling,
+    dispatch, is_long, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -73,7 +73,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> MatrixAdjoint<'_, M, E, R, S
     /// Over a step that is linearised, with its factors, which were `kept` or are there.
     pub fn run<F: Fallback>(mut self, work: &mut Work<M, E, S, F>, kept: Option<&Linearization<M, E, S, F>>) {
         let h = work.inputs.time.step;
-        if work.linear(kept).factors.is_planned() {
+        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE } || work.linear(kept).factors.is_planned() {
             self.phase(work.linear(kept), h, Phase::Whole, 0);
             return;
         }

@@ -94,11 +94,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let StageEquations { coefficients, x, .. } = equations;
         let Newton { fixed_iterations, jacobian, .. } = options.newton;
         let solved = match fixed_iterations {
-            Some(count) => self.iterate(equations, jacobian, count, y, statistics),
-            None => self.converge(equations, options, y, statistics),
+            Some(count) if const { F::INTERVALS } => self.iterate(equations, jacobian, count, y, statistics),
+            _ => self.converge(equations, options, y, statistics),
         };
         self.reconstruct(coefficients, x, y);
-        if options.compensated {
+        if const { F::INTERVALS } && options.compensated {
             self.place_compensated(coefficients, x, y);
             self.reconstruct_compensated(y);
         }
@@ -119,7 +119,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let exact = M::STRUCTURE.linear_in_state;
         let rounding = if options.compensated { LITTLE } else { ROUNDING } * E::EPSILON;
         let tolerances = Tolerances { tolerance: newton.tolerance.max(rounding), rounding };
-        let may_share = F::KEPT && newton.jacobian.is_adaptive() && !exact;
+        let may_share = const { Self::SHARES } && newton.jacobian.is_adaptive() && !exact;
         let basis = coefficients.basis.as_ref().filter(|_| may_share);
         let mut policy = Policy::<M, E, S>::start(newton.jacobian, basis.is_some(), self.validity, self.near);
         let mut test = ConvergenceTest::<E>::start(tolerances.tolerance, self.validity.rate, exact);
@@ -199,7 +199,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         } else {
             self.place_unknowns(coefficients, n, x, y);
         }
-        if compensate {
+        if const { F::INTERVALS } && compensate {
             self.reconstruct(coefficients, x, y);
             self.place_compensated(coefficients, x, y);
             self.reconstruct_compensated(y);
@@ -229,7 +229,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if missing {
             self.eliminate_missing(coefficients);
         }
-        if compensate {
+        if const { F::INTERVALS } && compensate {
             self.correct_residual();
             self.eliminate_rounded(coefficients);
         }
@@ -351,11 +351,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         Solved { converged: E::le(zero, zero), exact: false, undetermined: None }
     }
 
-    /// Factors of the shared Jacobian, if there is memory for them. Of one stage or two there is no
-    /// eigenbasis, and nothing is compiled.
+    /// Whether stages may share a Jacobian: of one stage or two there is no eigenbasis. A single
+    /// step starts near its solution, where that saves little in small models.
+    const SHARES: bool = S > 2 && F::KEPT && (F::INTERVALS || !Policy::<M, E, S>::EXACT);
+
+    /// Factors of the shared Jacobian, if there is memory for them.
     #[inline(always)]
     fn factor_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
-        if const { S > 2 }
+        if const { Self::SHARES }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
             factors.factor(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
@@ -367,7 +370,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Solves with them.
     #[inline(always)]
     fn solve_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
-        if const { S > 2 }
+        if const { Self::SHARES }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
             factors.solve(basis, &self.f, &mut self.increment);

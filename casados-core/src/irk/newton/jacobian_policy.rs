@@ -75,7 +75,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
 
     /// Whether factors by blocks cost no more than the iterations that they save where start values
     /// are near, with shared Jacobians that are renewed up to three times.
-    const EXACT: bool = Self::RENEWAL[0] <= 10.0;
+    pub const EXACT: bool = Self::RENEWAL[0] <= 10.0;
 
     /// Before the first iteration, with factors that are valid for something or nothing.
     #[inline(always)]

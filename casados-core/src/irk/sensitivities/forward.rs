@@ -110,7 +110,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.keep_forward().map(|_| ())
     }
 
-    /// Derivatives, written to the memory of `forward` or elsewhere.
+    /// Derivatives, written to the memory of `forward` or elsewhere. Not optimised once more with
+    /// each of those that call it.
+    #[cfg_attr(feature = "std", inline(never))]
     pub(in crate::irk) fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,

@@ -37,7 +37,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     assign(y, &record.y);
                 }
             }
-            (_, Some(before), Some(next)) => {
+            (_, Some(before), Some(next)) if const { F::INTERVALS } => {
                 extrapolate(before.y.as_ref(), next, y.as_mut());
             }
             (InitialGuess::Nominal | InitialGuess::Zero, ..) => {

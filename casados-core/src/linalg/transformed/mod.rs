@@ -1,5 +1,5 @@
-//! Stages that share one Jacobian: smaller systems in the [eigenbasis](basis) of the tableau, of
-//! [complex](complex) numbers. [Shared factors](shared_factor) of iterations that need not be exact
+//! Stages that share one Jacobian: smaller systems in the [eigenbasis](basis) of the tableau, which
+//! is its [decomposition], of [complex](complex) numbers. [Shared factors](shared_factor) of iterations that need not be exact
 //! are [solved](shared_solve) supernode by supernode; steps of variable size have
 //! [factors that are checked](checked_factor).
 
@@ -7,6 +7,7 @@ pub mod basis;
 #[cfg(feature = "alloc")]
 pub mod checked_factor;
 pub mod complex;
+mod decomposition;
 mod number;
 pub mod shared_factor;
 mod shared_solve;
