@@ -17,7 +17,7 @@ use super::control::LENIENT;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
-use super::norm::{mean, norm};
+use super::norm::{FEW, mean, norm};
 use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
@@ -114,7 +114,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
             let y = y.as_flattened();
             to[if index < nx { index } else { index + nx }] = y[stage];
             if index < nx {
-                let sum = weighted(&self.scheme.tableau.a()[stage], y);
+                let terms = self.scheme.tableau.a()[stage].iter().zip(y);
+                let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);
                 to[nx + index] = to[nx + index] + start.h * sum;
             }
         }

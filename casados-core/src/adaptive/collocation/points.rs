@@ -71,15 +71,18 @@ pub(super) fn follow<M: Dae, T: Real, const S: usize, const G: usize>(
     axpy(h, change.as_ref(), x);
 }
 
-// Loops over unknowns in functions of their own are not unrolled, and compiled once for all models.
-
 /// `Σ_i weight_i y_i` of some unknowns.
-#[inline(never)]
+#[inline(always)]
 pub(super) fn combine<T: Real, const S: usize, const G: usize>(
     weights: &[T; S],
     y: &[Groups<T, G>],
     to: &mut [T],
 ) {
+    if to.len() <= FEW { combine_each(weights, y, to) } else { combine_many(weights, y, to) }
+}
+
+#[inline(always)]
+fn combine_each<T: Real, const S: usize, const G: usize>(weights: &[T; S], y: &[Groups<T, G>], to: &mut [T]) {
     for (to, y) in to.iter_mut().zip(y) {
         if let Some(y) = y.as_flattened().first_chunk() {
             *to = dot(weights, y);
@@ -87,9 +90,14 @@ pub(super) fn combine<T: Real, const S: usize, const G: usize>(
     }
 }
 
-/// Values in one lane of a group.
 #[inline(never)]
-pub(super) fn take<T: Real>(group: &[[T; GROUP]], lane: usize, to: &mut [T]) {
+fn combine_many<T: Real, const S: usize, const G: usize>(weights: &[T; S], y: &[Groups<T, G>], to: &mut [T]) {
+    combine_each(weights, y, to);
+}
+
+/// Values in one lane of a group: a loop of its own, which is not unrolled.
+#[inline(never)]
+fn take<T: Real>(group: &[[T; GROUP]], lane: usize, to: &mut [T]) {
     for (to, from) in to.iter_mut().zip(group) {
         *to = from[lane];
     }

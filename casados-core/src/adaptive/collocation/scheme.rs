@@ -137,7 +137,7 @@ fn spread<T: Real>(from: &[T], to: &mut [[T; GROUP]]) {
 }
 
 /// `−h A`
-#[inline(never)]
+#[inline(always)]
 fn multiply<T: Real>(h: T, a: &[T], to: &mut [T]) {
     for (to, a) in to.iter_mut().zip(a) {
         *to = -(h * *a);
