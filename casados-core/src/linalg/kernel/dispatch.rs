@@ -161,6 +161,9 @@ impl<K: Kernel> Entries<K> {
         (32, ..) => Self::IN_AVX2,
         _ => Self::IN_AVX512,
     };
+    /// Whether that is always so, and nothing is to be asked: also of unoptimised programs, where
+    /// nobody else would find out.
+    const ALWAYS: bool = Self::AVX2.is_none() && Self::AVX512.is_none();
 }
 
 /// Runs a kernel as this machine does it best.
@@ -170,6 +173,10 @@ impl<K: Kernel> Entries<K> {
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
+    if const { Entries::<K>::ALWAYS } {
+        // SAFETY: as at the end.
+        return unsafe { Entries::<K>::OTHERWISE(&mut kernel) };
+    }
     if let Some(run) = Entries::<K>::AVX512
         && level() == Level::Avx512
     {
