@@ -13,3 +13,4 @@ mod agreement;
 mod explicit;
 mod failures;
 mod horizon;
+mod tube;

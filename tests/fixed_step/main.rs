@@ -23,4 +23,3 @@ mod examples;
 mod heat;
 mod kinematic;
 mod panels;
-mod tube;

@@ -8,7 +8,7 @@ mod models {
     pub mod chain;
     pub mod pendulum;
 }
-#[path = "../stress/orbit.rs"]
+#[path = "../methods/orbit.rs"]
 mod orbit;
 
 mod long_runs;

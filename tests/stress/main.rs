@@ -3,13 +3,13 @@
 //!
 //! | number | what | where |
 //! | --- | --- | --- |
-//! | 1, 2 | constants of tableaux, order conditions | `tableaux` |
-//! | 3 | stability functions to `\|z\| = 1e12` | `stability` |
-//! | 4 | order of convergence, and the floor | `order` |
-//! | 5, 6 | order reduction, stiffness of 1e12 | `stiffness` |
-//! | 7, 8, 9 | energy, angular momentum, compensated sums | `invariants`; a million steps in `tests/optimised/long_runs.rs` |
-//! | 10, 11 | the way back, linear invariants | `invariants` |
-//! | 12 | relative accuracy over decades | `stiffness` |
+//! | 1, 2 | constants of tableaux, order conditions | `tests/methods/tableaux` |
+//! | 3 | stability functions to `\|z\| = 1e12` | `tests/methods/stability` |
+//! | 4 | order of convergence, and the floor | `tests/methods/order` |
+//! | 5, 6 | order reduction, stiffness of 1e12 | `tests/methods/stiffness` |
+//! | 7, 8, 9 | energy, angular momentum, compensated sums | `tests/methods/invariants`; a million steps in `tests/optimised/long_runs.rs` |
+//! | 10, 11 | the way back, linear invariants | `tests/methods/invariants` |
+//! | 12 | relative accuracy over decades | `tests/methods/stiffness` |
 //! | 13, 15, 16, 18, 19 | derivatives: adjoint and forward, the complex step, symmetry, cancellation, iterations that stop early | `sensitivities` |
 //! | 14, 17 | derivatives against references | `tests/ivp/sensitivities`; exact zeros in `sensitivities` |
 //! | 20, 21, 23, 35 | singular and nearly singular matrices, rank-deficient mass matrices | `elimination`, `failures` |
@@ -18,11 +18,11 @@
 //! | 26, 29, 30, 31, 32 | models without a value, jumps, blow-up, divergence, quality of Newton's method | `failures`, `adaptive` |
 //! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive` |
 //! | 34 | threads | `tests/batch` |
-//! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
-//! | 39 | rounding of the data | `stiffness` |
+//! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `tests/methods/endpoints` |
+//! | 39 | rounding of the data | `tests/methods/stiffness` |
 //!
-//! Besides: random equations with known solutions (`properties`), anything into every entry
-//! (`tests/fuzz/`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
+//! Besides: random equations with known solutions (`tests/methods/properties`), anything into every
+//! entry (`tests/fuzz/`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
 //! single precision (`precision`).
 
 #[path = "../interval/mod.rs"]
@@ -37,24 +37,14 @@ mod models {
 
 mod adaptive;
 mod elimination;
-mod endpoints;
 mod everything;
 mod failures;
 mod identities;
-mod invariants;
 mod jumps;
-mod orbit;
-mod order;
-mod pollution;
 mod precision;
-mod properties;
 mod scaling;
 mod sensitivities;
-mod stability;
 mod starts;
-mod stiffness;
-mod systems;
-mod tableaux;
 
 #[test]
 fn every_number_has_a_test() {

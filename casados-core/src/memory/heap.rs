@@ -25,6 +25,10 @@ use core::marker::PhantomData;
 /// let mut irk = Irk::<Cart, Gauss<2>, f64, Heap>::new(Options::default())?;
 /// irk.reserve_forward()?; // now, and not in the first call
 /// assert!((irk.forward(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0] - 1.0).abs() < 1e-14);
+/// // Without a fallback.
+/// use casados::memory::fallback::Refusing;
+/// let mut lean = Irk::<Cart, Gauss<2>, f64, Heap<Refusing>>::new(Options::default())?;
+/// assert!((lean.solve(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0] - 1.0).abs() < 1e-14);
 /// # Ok::<(), casados::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

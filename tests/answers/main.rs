@@ -1,0 +1,17 @@
+//! Answers of solvers of optimal control: derivatives of solutions, verdicts on problems that have
+//! none or several, errors and what they say.
+
+mod coupled_derivatives;
+mod degenerate;
+mod errors;
+mod failing_intervals;
+mod infeasible;
+mod messages;
+mod print;
+mod return_map;
+mod sensitivities;
+mod smoothing;
+mod solution_derivatives;
+mod weights;
+
+type Test = Result<(), Box<dyn std::error::Error>>;
