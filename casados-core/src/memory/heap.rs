@@ -26,7 +26,7 @@ use core::marker::PhantomData;
 /// irk.reserve_forward()?; // now, and not in the first call
 /// assert!((irk.forward(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0] - 1.0).abs() < 1e-14);
 /// // Without a fallback.
-/// use casados::memory::fallback::Refusing;
+/// use casados::memory::Refusing;
 /// let mut lean = Irk::<Cart, Gauss<2>, f64, Heap<Refusing>>::new(Options::default())?;
 /// assert!((lean.solve(&vector![0.0, 0.0], &vector![2.0], 1.0)?.x[0] - 1.0).abs() < 1e-14);
 /// # Ok::<(), casados::Error>(())
