@@ -18,9 +18,12 @@ use crate::tableau::{Custom, Euler, Method};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 
+/// One stage at the start of a step.
+type EulerStep<M, T> = Integrator<M, Custom<1>, 1, T, Heap<OneStep>>;
+
 /// Solves for `(ẋ, z)`.
 pub struct Consistent<M: Dae, T: Real> {
-    euler: Option<Integrator<M, Custom<1>, 1, T, Heap<OneStep>>>,
+    euler: Option<EulerStep<M, T>>,
     rates: Option<Box<Rates<M, T>>>,
 }
 
@@ -41,11 +44,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         })
     }
 
-    fn euler(
-        &mut self,
-        at: &At<'_, M, T>,
-        y: &ArrayK<M, T>,
-    ) -> Result<&mut Integrator<M, Custom<1>, 1, T, Heap<OneStep>>, Error> {
+    fn euler(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&mut EulerStep<M, T>, Error> {
         let euler = match &mut self.euler {
             Some(euler) => euler,
             none => {
@@ -127,11 +126,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
 }
 
 /// What is inconsistent where Newton's method ended.
-fn explain<M: Dae, T: Real>(
-    euler: &mut Integrator<M, Custom<1>, 1, T, Heap<OneStep>>,
-    error: Error,
-    t: T,
-) -> Error {
+fn explain<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> Error {
     let (unknown, worst) = match error {
         Error::Singular { unknown, .. } => (unknown, None),
         Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),

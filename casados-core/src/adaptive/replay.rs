@@ -88,8 +88,11 @@ pub trait Replay<M: Dae, T: Real> {
     fn stages(&mut self, level: usize) -> Result<&[T], Error>;
 }
 
-/// The integrator of one step of the method `B` with `S` stages, from its first call on.
-pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Integrator<M, B, S, T, Heap<OneStep>>>>);
+/// The integrator of one step.
+type Step<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
+
+/// That of the method `B` with `S` stages, from its first call on.
+pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Step<M, B, T, S>>>);
 
 impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
     fn default() -> Self {
@@ -99,7 +102,7 @@ impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
     /// At the start of a step.
-    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Integrator<M, B, S, T, Heap<OneStep>>, Error> {
+    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Step<M, B, T, S>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
             none => {
