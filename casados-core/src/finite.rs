@@ -62,12 +62,12 @@ pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     first_of(values)
 }
 
-/// The first of elements that are not all finite.
-#[cold]
-#[cfg_attr(feature = "std", inline(never))]
+/// The first of elements that are not all finite. Without an operating system callers see where it
+/// may be.
+#[cfg_attr(feature = "std", cold, inline(never))]
+#[cfg_attr(not(feature = "std"), inline(always))]
 fn first_of<T: Real>(values: &[T]) -> Option<(usize, f64)> {
-    let at = |(index, value): (usize, &T)| (!value.is_finite()).then(|| (index, value.to_f64()));
-    values.iter().enumerate().find_map(at)
+    values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
 }
 
 kernels! {

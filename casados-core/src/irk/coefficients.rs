@@ -52,6 +52,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
 }
 
 /// As numbers of the integrator. Loops are quicker to compile than what maps arrays.
+#[inline(always)]
 fn row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
     let mut to = [E::from_f64(0.0); S];
     for (to, from) in to.iter_mut().zip(from) {
@@ -60,6 +61,7 @@ fn row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
     to
 }
 
+#[inline(always)]
 fn square<E: Lanes, const S: usize>(from: &[[f64; S]; S]) -> [[E; S]; S] {
     let mut to = [[E::from_f64(0.0); S]; S];
     for (to, from) in to.iter_mut().zip(from) {

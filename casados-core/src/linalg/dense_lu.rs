@@ -100,7 +100,7 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
 ///
 /// # Errors
 /// The column that has no pivot.
-#[cfg_attr(feature = "std", inline(never))]
+#[inline(never)]
 fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Result<(), usize> {
     let n = scales.len();
     if n == 0 {
@@ -172,7 +172,7 @@ struct Factors<'a, E> {
 
 impl<E: Lanes> Factors<'_, E> {
     /// `A X = B` with `width` columns.
-    #[cfg_attr(feature = "std", inline(never))]
+    #[inline(never)]
     fn solve(&self, b: &mut [E], width: usize) {
         let (n, zero) = (self.scales.len(), E::from_f64(0.0));
         if n == 0 || width == 0 {
@@ -207,7 +207,8 @@ impl<E: Lanes> Factors<'_, E> {
         }
     }
 
-    /// Multiplies the rows as those of the matrix were.
+    /// Multiplies the rows, which are not empty, as those of the matrix were.
+    #[inline(always)]
     fn scale(&self, b: &mut [E], width: usize) {
         for (row, scale) in b.chunks_exact_mut(width).zip(self.scales) {
             for b in row {
@@ -217,7 +218,7 @@ impl<E: Lanes> Factors<'_, E> {
     }
 
     /// `Aᵀ X = B` with `width` columns.
-    #[cfg_attr(feature = "std", inline(never))]
+    #[inline(never)]
     fn solve_transposed(&self, b: &mut [E], width: usize) {
         let (n, zero) = (self.scales.len(), E::from_f64(0.0));
         if n == 0 || width == 0 {

@@ -17,6 +17,7 @@ fn polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
 
 /// See [`Tableau::lagrange`].
 #[cfg_attr(feature = "std", inline(never))]
+#[cfg_attr(not(feature = "std"), inline(always))]
 fn lagrange(nodes: &[f64], theta: f64, values: &mut [f64]) {
     for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
         *value = polynomial(nodes, i, *own, theta);
@@ -25,6 +26,7 @@ fn lagrange(nodes: &[f64], theta: f64, values: &mut [f64]) {
 
 /// See [`Tableau::weights`].
 #[cfg_attr(feature = "std", inline(never))]
+#[cfg_attr(not(feature = "std"), inline(always))]
 fn integrals(nodes: &[f64], theta: f64, values: &mut [f64]) {
     const FEW: Tableau<5> = Gauss::<5>::TABLEAU;
     const MANY: Tableau<9> = Gauss::<9>::TABLEAU;

@@ -27,7 +27,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
 // Seldom needed: loops of their own are not unrolled.
 
 /// A column of a panel.
-#[cfg_attr(feature = "std", inline(never))]
+#[inline(never)]
 fn take<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
     for (to, row) in to.iter_mut().zip(rows) {
         if let Some(element) = row.get(column) {
@@ -37,7 +37,7 @@ fn take<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
 }
 
 /// The same back into the panel.
-#[cfg_attr(feature = "std", inline(never))]
+#[inline(never)]
 pub(super) fn put<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
     for (from, row) in from.iter().zip(rows) {
         if let Some(element) = row.get_mut(column) {

@@ -2,6 +2,7 @@
 //! once for all numbers of stages. Matrices have their rows one after the other.
 
 use super::complex::Complex;
+use bytemuck::Zeroable;
 
 /// One complex number.
 type Number = Complex<f64, 2>;
@@ -28,8 +29,28 @@ pub(super) struct Memory<'a> {
     pub powers: [&'a mut [f64]; 2],
 }
 
+/// An element, or zero outside: nothing in here can panic, and the optimiser does not see that all
+/// places are inside.
+fn at<T: Copy + Zeroable>(elements: &[T], index: usize) -> T {
+    elements.get(index).copied().unwrap_or(T::zeroed())
+}
+
+/// Overwrites an element.
+fn put<T>(elements: &mut [T], index: usize, value: T) {
+    if let Some(element) = elements.get_mut(index) {
+        *element = value;
+    }
+}
+
+/// Two elements in each other's place.
+fn exchange<T>(elements: &mut [T], i: usize, j: usize) {
+    if i.max(j) < elements.len() {
+        elements.swap(i, j);
+    }
+}
+
 /// Whether there is such a basis, and it reproduces `A` to `1e-10`.
-#[cfg_attr(feature = "std", inline(never))]
+#[inline(never)]
 pub(super) fn decompose(a: &[f64], parts: Parts<'_>, memory: &mut Memory<'_>) -> bool {
     let (s, n) = (memory.roots.len(), parts.values.len());
     let half = n / 2;
@@ -38,7 +59,7 @@ pub(super) fn decompose(a: &[f64], parts: Parts<'_>, memory: &mut Memory<'_>) ->
     let (mut reals, mut pairs) = (0, first);
     eigenvalues(a, memory);
     for index in 0..s {
-        let root = memory.roots[index];
+        let root = at(memory.roots, index);
         let is_real = root.parts[1].abs() <= 1e-8 * root.parts[0].abs();
         if !is_real && root.parts[1] < 0.0 {
             continue;
@@ -51,51 +72,54 @@ pub(super) fn decompose(a: &[f64], parts: Parts<'_>, memory: &mut Memory<'_>) ->
         let [left, right] = &memory.vectors;
         if is_real && first == 0 {
             reals += 1;
-            parts.values[n - 1] = value.parts[0];
+            put(parts.values, n - 1, value.parts[0]);
             for stage in 0..s {
-                parts.left[stage * n + n - 1] = left[stage].parts[0];
-                parts.right[(n - 1) * s + stage] = right[stage].parts[0];
+                put(parts.left, stage * n + n - 1, at(left, stage).parts[0]);
+                put(parts.right, (n - 1) * s + stage, at(right, stage).parts[0]);
             }
             continue;
         }
         let lane = if is_real { 0 } else { pairs };
         let (counter, weight) = if is_real { (&mut reals, 1.0) } else { (&mut pairs, 2.0) };
         *counter += 1;
-        let [re, im] = value.parts;
-        (parts.values[lane], parts.values[half + lane]) = (re, im);
-        for stage in 0..s {
-            let [re, im] = left[stage].parts;
-            (parts.left[stage * n + lane], parts.left[stage * n + half + lane]) = (re, im);
-            let [re, im] = right[stage].scaled(weight).parts;
-            // The real part of a product.
-            (parts.right[lane * s + stage], parts.right[(half + lane) * s + stage]) = (re, -im);
+        for (part, sign, place) in [(0, 1.0, lane), (1, -1.0, half + lane)] {
+            put(parts.values, place, value.parts[part]);
+            for stage in 0..s {
+                put(parts.left, stage * n + place, at(left, stage).parts[part]);
+                // The real part of a product.
+                let own = at(right, stage).scaled(weight).parts[part];
+                put(parts.right, place * s + stage, sign * own);
+            }
         }
     }
     // What is left of a register repeats the last.
     let last = pairs.saturating_sub(1);
     for lane in pairs..half {
-        (parts.values[lane], parts.values[half + lane]) = (parts.values[last], parts.values[half + last]);
+        for begin in [0, half] {
+            put(parts.values, begin + lane, at(parts.values, begin + last));
+        }
     }
-    reals == s % 2 && pairs == first + s / 2 && reproduces(a, &parts)
+    reals == s % 2 && pairs == first + s / 2 && reproduces(a, &parts, s)
 }
 
 /// Whether `V diag(μ) V⁻¹` is `A`.
-fn reproduces(a: &[f64], parts: &Parts<'_>) -> bool {
+fn reproduces(a: &[f64], parts: &Parts<'_>, s: usize) -> bool {
     let n = parts.values.len();
-    let (s, half) = (parts.left.len() / n.max(1), n / 2);
+    let half = n / 2;
     let largest = a.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
-    (0..s * s).all(|at| {
-        let (i, j) = (at / s, at % s);
-        let (values, left) = (&*parts.values, &parts.left[j * n..]);
-        let right = |part: usize| parts.right[part * s + i];
-        let mut sum = if n % 2 == 1 { right(n - 1) * values[n - 1] * left[n - 1] } else { 0.0 };
+    let is_same = |i: usize, j: usize| {
+        let value = |part: usize| at(parts.values, part);
+        let left = |part: usize| at(parts.left, j * n + part);
+        let right = |part: usize| at(parts.right, part * s + i);
+        let mut sum = if n % 2 == 1 { right(n - 1) * value(n - 1) * left(n - 1) } else { 0.0 };
         for l in 0..half {
-            let ([re, im], [other_re, other_im]) = ([values[l], values[half + l]], [left[l], left[half + l]]);
+            let ([re, im], [other_re, other_im]) = ([value(l), value(half + l)], [left(l), left(half + l)]);
             sum += right(l) * (re * other_re - im * other_im);
             sum += right(half + l) * (re * other_im + im * other_re);
         }
-        (sum - a[at]).abs() <= 1e-10 * largest
-    })
+        (sum - at(a, i * s + j)).abs() <= 1e-10 * largest
+    };
+    (0..s).all(|i| (0..s).all(|j| is_same(i, j)))
 }
 
 /// All eigenvalues, to half the digits at least: the zeros of the characteristic polynomial (D. K.
@@ -105,16 +129,18 @@ fn eigenvalues(a: &[f64], memory: &mut Memory<'_>) {
     let s = roots.len();
     // p(μ) = μˢ + c_{s−1} μ^{s−1} + … + c_0
     for k in 1..=s {
-        let shift = if k == 1 { 1.0 } else { coefficients[s + 1 - k] };
+        let shift = if k == 1 { 1.0 } else { at(coefficients, s + 1 - k) };
         for i in 0..s {
             for j in 0..s {
-                let sum: f64 = (0..s).map(|l| a[i * s + l] * product[l * s + j]).sum();
-                next[i * s + j] = a[i * s + j] * shift + sum;
+                let sum: f64 = (0..s).map(|l| at(a, i * s + l) * at(product, l * s + j)).sum();
+                put(next, i * s + j, at(a, i * s + j) * shift + sum);
             }
         }
-        product.copy_from_slice(next);
-        let trace: f64 = (0..s).map(|i| product[i * s + i]).sum();
-        coefficients[s - k] = -trace / k as f64;
+        for (product, next) in product.iter_mut().zip(next.iter()) {
+            *product = *next;
+        }
+        let trace: f64 = (0..s).map(|i| at(product, i * s + i)).sum();
+        put(coefficients, s - k, -trace / k as f64);
     }
     // All zeros are of the size of the geometric mean of them; the start values lie around it, not
     // symmetric.
@@ -125,7 +151,7 @@ fn eigenvalues(a: &[f64], memory: &mut Memory<'_>) {
     }
     for _ in 0..200 {
         for i in 0..s {
-            let root = roots[i];
+            let root = at(roots, i);
             let mut value = Complex::real(1.0);
             for c in coefficients.iter().rev() {
                 value = value * root + Complex::real(*c);
@@ -136,7 +162,7 @@ fn eigenvalues(a: &[f64], memory: &mut Memory<'_>) {
                     others = others * (root - *other);
                 }
             }
-            roots[i] = root - value / others;
+            put(roots, i, root - value / others);
         }
     }
 }
@@ -166,8 +192,9 @@ fn eigenvectors(a: &[f64], start: Number, memory: &mut Memory<'_>) -> Option<Num
         for (vector, transposed) in [(&mut *right, false), (&mut *left, true)] {
             for i in 0..s {
                 for j in 0..s {
-                    let element = Complex::real(a[if transposed { j * s + i } else { i * s + j }]);
-                    matrix[i * s + j] = if i == j { element - shift } else { element };
+                    let from = if transposed { j * s + i } else { i * s + j };
+                    let element = Complex::real(at(a, from));
+                    put(matrix, i * s + j, if i == j { element - shift } else { element });
                 }
             }
             if !direction(matrix, vector) {
@@ -178,10 +205,10 @@ fn eigenvectors(a: &[f64], start: Number, memory: &mut Memory<'_>) -> Option<Num
         for i in 0..s {
             let mut product = Complex::zero();
             for j in 0..s {
-                product = product + right[j].scaled(a[i * s + j]);
+                product = product + at(right, j).scaled(at(a, i * s + j));
             }
-            overlap = overlap + left[i] * right[i];
-            quotient = quotient + left[i] * product;
+            overlap = overlap + at(left, i) * at(right, i);
+            quotient = quotient + at(left, i) * product;
         }
         for element in left.iter_mut() {
             *element = over(*element, overlap);
@@ -209,25 +236,28 @@ fn direction(matrix: &mut [Number], b: &mut [Number]) -> bool {
     let s = b.len();
     let size = |z: Number| z.parts[0].abs() + z.parts[1].abs();
     for k in 0..s {
-        let larger = |best, i| if size(matrix[i * s + k]) > size(matrix[best * s + k]) { i } else { best };
+        let larger = |best: usize, i: usize| {
+            if size(at(matrix, i * s + k)) > size(at(matrix, best * s + k)) { i } else { best }
+        };
         let best = (k..s).fold(k, larger);
-        b.swap(k, best);
+        exchange(b, k, best);
         for j in 0..s {
-            matrix.swap(k * s + j, best * s + j);
+            exchange(matrix, k * s + j, best * s + j);
         }
         for i in k + 1..s {
-            let factor = over(matrix[i * s + k], matrix[k * s + k]);
+            let factor = over(at(matrix, i * s + k), at(matrix, k * s + k));
             for j in 0..s {
-                matrix[i * s + j] = matrix[i * s + j] - factor * matrix[k * s + j];
+                put(matrix, i * s + j, at(matrix, i * s + j) - factor * at(matrix, k * s + j));
             }
-            b[i] = b[i] - factor * b[k];
+            put(b, i, at(b, i) - factor * at(b, k));
         }
     }
     for k in (0..s).rev() {
+        let mut rest = at(b, k);
         for j in k + 1..s {
-            b[k] = b[k] - matrix[k * s + j] * b[j];
+            rest = rest - at(matrix, k * s + j) * at(b, j);
         }
-        b[k] = over(b[k], matrix[k * s + k]);
+        put(b, k, over(rest, at(matrix, k * s + k)));
     }
     let largest = b.iter().fold(0.0, |m: f64, z| m.max(size(*z)));
     for z in b.iter_mut() {
