@@ -6,6 +6,7 @@ mod degenerate;
 mod errors;
 mod failing_intervals;
 mod infeasible;
+mod mass;
 mod messages;
 mod print;
 mod return_map;

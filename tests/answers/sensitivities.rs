@@ -2,6 +2,7 @@
 //! regulator.
 
 use crate::Test;
+use crate::mass::{Both, Push};
 use casados::LeastSquares;
 use casados::ocp::{
     Along, Constraint, Convexification, Exact, GaussNewton, GeneralCost, HeapSqp, Horizon, LeastSquaresCost,
@@ -87,16 +88,6 @@ fn differences_of_solutions() -> Test {
     // Feedback at the first stage is the derivative of the first control.
     assert_eq!(result.gain(0), result.du(0));
     Ok(())
-}
-
-#[function]
-fn push(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
-    [x[0] + 0.1 * x[1] + 0.005 * u[0], x[1] + 0.1 * u[0]]
-}
-
-#[function]
-fn both(x: [f64; 2], u: [f64; 1]) -> [f64; 3] {
-    [x[0], x[1], u[0]]
 }
 
 /// A long horizon without bounds: gains of the regulator, and `x_k = dx_k/dx₀ x₀`, since everything

@@ -1,6 +1,7 @@
 //! Where active sets change: smoothed solutions, weakly active bounds; and what is refused.
 
 use crate::Test;
+use crate::mass::{Both, Push};
 use crate::solution_derivatives::{
     AT, By, EXACT, Energy, N, Pendulum, Speed, TOLERANCE, Tracking, Work, bounded, check_by_differences,
     solved,
@@ -11,15 +12,6 @@ use casados::ocp::{
 };
 use casados::prelude::*;
 use casados::qp::HeapSolution;
-
-#[function]
-fn push(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
-    [x[0] + 0.1 * x[1] + 0.005 * u[0], x[1] + 0.1 * u[0]]
-}
-#[function]
-fn both(x: [f64; 2], u: [f64; 1]) -> [f64; 3] {
-    [x[0], x[1], u[0]]
-}
 
 /// Solutions of the barrier problem are smooth, with bounds of all kinds: hard, soft, of the path.
 #[test]

@@ -2,6 +2,7 @@
 //! central differences of problems that are solved again.
 
 use crate::Test;
+use crate::mass::{Both, Push};
 use casados::ocp::{
     Along, Constraint, Convexification, Exact, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp,
     HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SecondOrder, Shooting, SolutionFactors,
@@ -146,15 +147,6 @@ pub fn check_by_differences(
         }
     }
     Ok(())
-}
-
-#[function]
-fn push(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
-    [x[0] + 0.1 * x[1] + 0.005 * u[0], x[1] + 0.1 * u[0]]
-}
-#[function]
-fn both(x: [f64; 2], u: [f64; 1]) -> [f64; 3] {
-    [x[0], x[1], u[0]]
 }
 
 /// The linear-quadratic regulator: `V = ½ x₀ᵀ P x₀` by Riccati's recursion, and the closed loop.

@@ -32,7 +32,7 @@ use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
-use points::{combine, follow, last_stage};
+use points::{combine, evaluate_polynomial, last_stage};
 use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.

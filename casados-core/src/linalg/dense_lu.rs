@@ -83,8 +83,8 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
         self.factors().solve_transposed(R::flat_mut(b.as_mut().as_flattened_mut()), R::LEN);
     }
 
-    fn factors(&self) -> Factors<'_, E> {
-        Factors {
+    fn factors(&self) -> Lu<'_, E> {
+        Lu {
             rows: Array::flat(self.rows.as_ref().as_flattened()).as_flattened(),
             pivots: self.pivots.as_ref().as_flattened(),
             scales: self.scales.as_ref().as_flattened(),
@@ -164,13 +164,13 @@ fn exchange<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
 }
 
 /// Factors, and the order and the scale of the rows that they are of.
-struct Factors<'a, E> {
+struct Lu<'a, E> {
     rows: &'a [E],
     pivots: &'a [u32],
     scales: &'a [E],
 }
 
-impl<E: Lanes> Factors<'_, E> {
+impl<E: Lanes> Lu<'_, E> {
     /// `A X = B` with `width` columns.
     #[inline(never)]
     fn solve(&self, b: &mut [E], width: usize) {

@@ -48,13 +48,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
     pub(super) fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
         let (end, b) = (self.scheme.values(1.0), self.scheme.weights());
-        follow::<M, T, S, G>(&self.memory.y, [&end, &b], h, point);
+        evaluate_polynomial::<M, T, S, G>(&self.memory.y, [&end, &b], h, point);
     }
 }
 
 /// From `x_n` to a point of the step: `x_n + h Σ_i b_i k_i` with the `integrals` of the Lagrange
 /// polynomials there, and `ẋ` and `z` with their `values`.
-pub(super) fn follow<M: Dae, T: Real, const S: usize, const G: usize>(
+pub(super) fn evaluate_polynomial<M: Dae, T: Real, const S: usize, const G: usize>(
     y: &ArrayK<M, Groups<T, G>>,
     [values, integrals]: [&[T; S]; 2],
     h: T,

@@ -69,7 +69,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         self.memory.point = *start.point;
         let Memory { point, y, .. } = &mut *self.memory;
         let (values, integrals) = (self.scheme.values(tau), self.scheme.integrals(tau));
-        follow::<M, T, S, G>(y, [&values, &integrals], start.h, point);
+        evaluate_polynomial::<M, T, S, G>(y, [&values, &integrals], start.h, point);
         if let Some(time) = point.as_mut().last_mut() {
             *time = *time + start.h * T::from_f64(tau);
         }

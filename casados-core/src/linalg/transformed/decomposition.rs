@@ -197,7 +197,7 @@ fn eigenvectors(a: &[f64], start: Number, memory: &mut Memory<'_>) -> Option<Num
                     put(matrix, i * s + j, if i == j { element - shift } else { element });
                 }
             }
-            if !direction(matrix, vector) {
+            if !solve_scaled(matrix, vector) {
                 return None;
             }
         }
@@ -211,9 +211,9 @@ fn eigenvectors(a: &[f64], start: Number, memory: &mut Memory<'_>) -> Option<Num
             quotient = quotient + at(left, i) * product;
         }
         for element in left.iter_mut() {
-            *element = over(*element, overlap);
+            *element = divide(*element, overlap);
         }
-        value = over(quotient, overlap);
+        value = divide(quotient, overlap);
         if start.parts[1] == 0.0 {
             value.parts[1] = 0.0;
         }
@@ -222,7 +222,7 @@ fn eigenvectors(a: &[f64], start: Number, memory: &mut Memory<'_>) -> Option<Num
 }
 
 /// `a / b` with divisions where `Div`, which has to be fast, multiplies by reciprocals.
-fn over(a: Number, b: Number) -> Number {
+fn divide(a: Number, b: Number) -> Number {
     let ([a_re, a_im], [b_re, b_im]) = (a.parts, b.parts);
     let size = b_re.abs().max(b_im.abs());
     let (re, im) = (b_re / size, b_im / size);
@@ -232,7 +232,7 @@ fn over(a: Number, b: Number) -> Number {
 
 /// `b` becomes `M⁻¹ b`, divided by its largest element; whether that is finite. Gauss elimination
 /// with partial pivoting.
-fn direction(matrix: &mut [Number], b: &mut [Number]) -> bool {
+fn solve_scaled(matrix: &mut [Number], b: &mut [Number]) -> bool {
     let s = b.len();
     let size = |z: Number| z.parts[0].abs() + z.parts[1].abs();
     for k in 0..s {
@@ -245,7 +245,7 @@ fn direction(matrix: &mut [Number], b: &mut [Number]) -> bool {
             exchange(matrix, k * s + j, best * s + j);
         }
         for i in k + 1..s {
-            let factor = over(at(matrix, i * s + k), at(matrix, k * s + k));
+            let factor = divide(at(matrix, i * s + k), at(matrix, k * s + k));
             for j in 0..s {
                 put(matrix, i * s + j, at(matrix, i * s + j) - factor * at(matrix, k * s + j));
             }
@@ -257,7 +257,7 @@ fn direction(matrix: &mut [Number], b: &mut [Number]) -> bool {
         for j in k + 1..s {
             rest = rest - at(matrix, k * s + j) * at(b, j);
         }
-        put(b, k, over(rest, at(matrix, k * s + k)));
+        put(b, k, divide(rest, at(matrix, k * s + k)));
     }
     let largest = b.iter().fold(0.0, |m: f64, z| m.max(size(*z)));
     for z in b.iter_mut() {
