@@ -7,6 +7,7 @@
 //! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of
 //! the last repeats the last stage.
 
+mod branches;
 mod estimate;
 mod points;
 mod rate;
@@ -18,7 +19,7 @@ use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
-use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
+use super::stages::{Convergence, Failure, FilteredDefect, Look, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
@@ -32,7 +33,7 @@ use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
-use points::{combine, evaluate_polynomial, last_stage};
+use points::{combine, evaluate_polynomial, last_stage, take};
 use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
@@ -253,10 +254,14 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
-        watched: bool,
+        look: Look,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, watched, residuals)
+        self.roughness(start, growth, look, residuals)
+    }
+
+    fn change(&mut self, start: &Start<'_, M, T>) -> Option<Look> {
+        self.change(start)
     }
 
     fn accept(&mut self) {

@@ -117,8 +117,12 @@ impl Roughness {
         error > self.noise
     }
 
-    /// A rough step with this error: whether it is to be refused.
-    pub fn refuses(&mut self, h: f64, error: f64) -> bool {
+    /// A step of length `h` with this roughness and this error: whether it is to be refused.
+    pub fn refuses(&mut self, h: f64, rough: f64, error: f64) -> bool {
+        if !self.may_be(rough) {
+            return false;
+        }
+        let error = rough.max(error);
         if let Some((step, before)) = self.last
             && error >= before * Scalar::sqrt(h / step)
         {

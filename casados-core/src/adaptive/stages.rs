@@ -128,6 +128,19 @@ impl Convergence {
 /// An error of the states, and `(hJ)⁻²` times it.
 pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
 
+/// Why the shape of a defect is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// Its size is unusual.
+    Unusual,
+    /// The step is watched, whatever its size is.
+    Watched,
+    /// The model changes its branch: the step is rough, whatever its shape is.
+    Branch,
+    /// A spline changes its piece: no lower derivative jumps than its highest.
+    Knot,
+}
+
 /// A step with any number of stages.
 pub trait Stages<M: Dae, T: Real> {
     /// How many.
@@ -168,7 +181,7 @@ pub trait Stages<M: Dae, T: Real> {
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
     /// The estimated error where the defect of a step is not that of a smooth solution, relative to
     /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
-    /// error is as foreseen; a step that is watched is looked at whatever that is.
+    /// error is as foreseen.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
@@ -176,9 +189,12 @@ pub trait Stages<M: Dae, T: Real> {
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
-        watched: bool,
+        look: Look,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
+    /// How its defect is to be looked at where the model is not that of its start inside of the
+    /// step.
+    fn change(&mut self, start: &Start<'_, M, T>) -> Option<Look>;
     /// The variables where the estimate compares the derivative of the polynomial with the
     /// solution; whether that is the end of the step, and not its start.
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;

@@ -1,7 +1,7 @@
 //! Linear tables.
 
-use super::Table;
 use super::points::{check, check_values, interval, pair};
+use super::{KINKS, Table, cell};
 use crate::scalar::{Real, Rows, Scalar};
 
 /// A function that is linear between points, and beyond them.
@@ -59,6 +59,9 @@ impl<const N: usize> Table<1> for Linear<N> {
     #[inline(always)]
     fn partial<S: Scalar>(&self, [x]: [S; 1], [order]: [u32; 1]) -> S {
         let [x0, x1, f0, f1] = S::look_up([x], self);
+        if order == KINKS {
+            return x0;
+        }
         let [a, b] = weights(x, [x0, x1], order);
         a * f0 + b * f1
     }
@@ -127,6 +130,9 @@ impl<const N: usize, const M: usize> Table<2> for Linear2<N, M> {
     #[inline(always)]
     fn partial<S: Scalar>(&self, [x, y]: [S; 2], orders: [u32; 2]) -> S {
         let [x0, x1, y0, y1, f00, f01, f10, f11] = S::look_up([x, y], self);
+        if orders[0] == KINKS {
+            return cell(x0, y0);
+        }
         let [a0, a1] = weights(x, [x0, x1], orders[0]);
         let [b0, b1] = weights(y, [y0, y1], orders[1]);
         a0 * (b0 * f00 + b1 * f01) + a1 * (b0 * f10 + b1 * f11)

@@ -64,8 +64,21 @@ use crate::scalar::Scalar;
     note = "`value` of a `Linear` or `Spline` takes one argument, that of a `Linear2` or `Spline2` two"
 )]
 pub trait Table<const K: usize> {
-    /// The derivative of these orders in each variable: of zeros the value.
+    /// The derivative of these orders in each variable: of zeros the value; of [`KINKS`] or
+    /// [`KNOTS`] what tells its pieces apart.
     fn partial<S: Scalar>(&self, at: [S; K], orders: [u32; K]) -> S;
+}
+
+/// An order that stands for a number of each piece, where the first derivative jumps between them;
+/// else zero.
+pub(crate) const KINKS: u32 = 254;
+/// The same where a higher derivative jumps.
+pub(crate) const KNOTS: u32 = 255;
+
+/// A number of a cell, by its lower left corner.
+#[inline(always)]
+fn cell<S: Scalar>(x0: S, y0: S) -> S {
+    x0 + S::from_f64(core::f64::consts::SQRT_2) * y0
 }
 
 impl<const K: usize, T: Table<K>> Table<K> for &T {

@@ -1,8 +1,8 @@
 //! Cubic splines.
 
-use super::Table;
 use super::cubic::{Ends, slopes, weights};
 use super::points::{check, check_values, interval, pair};
+use super::{KNOTS, Table, cell};
 use crate::scalar::{Real, Rows, Scalar};
 
 /// A cubic spline: twice continuously differentiable, through all points, linear beyond them.
@@ -118,6 +118,9 @@ impl<const N: usize> Table<1> for Spline<N> {
     #[inline(always)]
     fn partial<S: Scalar>(&self, [x]: [S; 1], [order]: [u32; 1]) -> S {
         let [x0, x1, f0, f1, m0, m1] = S::look_up([x], self);
+        if order == KNOTS {
+            return x0;
+        }
         let [a0, a1, b0, b1] = weights(x, [x0, x1], order);
         (a0 * f0 + a1 * f1) + (b0 * m0 + b1 * m1)
     }
@@ -238,6 +241,9 @@ impl<const N: usize, const M: usize> Table<2> for Spline2<N, M> {
     fn partial<S: Scalar>(&self, [x, y]: [S; 2], orders: [u32; 2]) -> S {
         let row = S::look_up([x, y], self);
         let [x0, x1, y0, y1] = [row[0], row[1], row[2], row[3]];
+        if orders[0] == KNOTS {
+            return cell(x0, y0);
+        }
         let [a0, a1, b0, b1] = weights(x, [x0, x1], orders[0]);
         let [c0, c1, d0, d1] = weights(y, [y0, y1], orders[1]);
         // Of the node `k` of the cell, by its value and its slope in x.

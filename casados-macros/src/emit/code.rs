@@ -35,25 +35,16 @@ pub fn ty(model: &Model) -> TokenStream {
     if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) }
 }
 
-/// The module `code`, with the derivatives by the time if they are wanted.
+/// The module `code`, with one more function if there is one.
 pub fn module(
     model: &Model,
     derivatives: &Derivatives,
     names: &Names,
-    time: Option<&[(u32, Node)]>,
+    more: Option<Routine>,
 ) -> syn::Result<TokenStream> {
-    let krate = &model.krate;
+    let Model { krate, variables, graph, .. } = model;
     let mut text = text(model, derivatives, names);
-    if let Some(time) = time {
-        let Model { variables, graph, residual, .. } = model;
-        let (rate, [_, nv, ..]) = ("rate", dimensions(variables));
-        let routine = Routine {
-            name: "time_derivative",
-            documentation: "`∂y/∂t`, of the outputs that depend on it:",
-            inputs: &[("v", nv)],
-            outputs: &[(rate, residual.len())],
-            stores: time.iter().map(|&(row, node)| (rate, row as usize, node)).collect(),
-        };
+    if let Some(routine) = more {
         text += &routine.write(graph, variables, of(model));
     }
     let code: TokenStream = text.parse()?;

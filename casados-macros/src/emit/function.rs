@@ -1,6 +1,7 @@
 //! The implementations of `Function` and `GraphFunction` for one function.
 
 use super::code::{self, FUNCTION, dimensions, ty};
+use super::routine::Routine;
 use super::structure;
 use crate::language::{Model, Variables};
 use crate::structure::{Derivatives, FunctionAnalysis};
@@ -10,7 +11,15 @@ use quote::quote;
 /// Writes the implementations for one function.
 pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
     let FunctionAnalysis { model, derivatives, time, .. } = analysis;
-    let code = code::module(model, derivatives, &FUNCTION, Some(time))?;
+    let (rate, [_, nv, ..]) = ("rate", dimensions(&model.variables));
+    let routine = Routine {
+        name: "time_derivative",
+        documentation: "`∂y/∂t`, of the outputs that depend on it:",
+        inputs: &[("v", nv)],
+        outputs: &[(rate, model.residual.len())],
+        stores: time.iter().map(|&(row, node)| (rate, row as usize, node)).collect(),
+    };
+    let code = code::module(model, derivatives, &FUNCTION, Some(routine))?;
     let c = code::given(model);
     let (function, graph_function) = (self::function(analysis, &c), graph_function(model, &c));
     Ok(code::enclose(model, &quote!(#code #function #graph_function)))

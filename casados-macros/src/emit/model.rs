@@ -1,6 +1,7 @@
 //! The implementations of `Dae`, `GraphDae` and `Ode` for one model.
 
 use super::code::{self, MODEL, dimensions, ty};
+use super::routine::Routine;
 use super::{domain, structure};
 use crate::language::{Model, Variables};
 use crate::structure::{Analysis, Derivatives, FunctionAnalysis};
@@ -9,8 +10,17 @@ use quote::quote;
 
 /// Writes the implementations for one model.
 pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
-    let Analysis { model, derivatives, .. } = analysis;
-    let code = code::module(model, derivatives, &MODEL, None)?;
+    let Analysis { model, derivatives, branches, .. } = analysis;
+    let (which, [_, nv, ..]) = ("branches", dimensions(&model.variables));
+    let (inputs, outputs) = ([("v", nv)], [(which, 2)]);
+    let routine = branches.as_ref().map(|branches| Routine {
+        name: which,
+        documentation: "Which branches `f` takes:",
+        inputs: &inputs,
+        outputs: &outputs,
+        stores: vec![(which, 0, branches.kinks), (which, 1, branches.knots)],
+    });
+    let code = code::module(model, derivatives, &MODEL, routine)?;
     let c = code::given(model);
     let (dae, graph_dae, ode) = (dae(analysis, &c), graph_dae(model, &c), ode(analysis));
     Ok(code::enclose(model, &quote!(#code #dae #graph_dae #ode)))
@@ -27,6 +37,16 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     let [lx, lz, lu, lp, lk, lv, lw, lc, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nc, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::write(analysis));
+    let branches = analysis.branches.as_ref().map(|branches| {
+        let count = Literal::usize_unsuffixed(branches.count);
+        quote! {
+            const BRANCHES: usize = #count;
+            #[inline]
+            fn branches<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_branches: &mut [S::Cell; 2]) {
+                code::branches::<S>(#c casados_v, casados_branches);
+            }
+        }
+    });
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
     quote! {
         #[automatically_derived]
@@ -37,6 +57,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             type Factors<B: #krate::__private::Plain> = [B; #lb];
             const STRUCTURE: #krate::__private::Structure = #structure;
             #domain
+            #branches
 
             #[inline]
             fn residual<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {

@@ -15,7 +15,19 @@ pub struct Table<const K: usize> {
     pub degree: u8,
 }
 
+/// An order that stands for a number of each piece, where the first derivative jumps between them,
+/// and is zero where it does not.
+const KINKS: u8 = 254;
+/// The same where a higher derivative jumps.
+const KNOTS: u8 = 255;
+
 impl<const K: usize> Table<K> {
+    /// What changes between the pieces of a table with kinks, and of one that is smoother. Which it
+    /// is the compiler knows.
+    pub fn pieces(self) -> [Self; 2] {
+        [KINKS, KNOTS].map(|order| Self { orders: [order; K], ..self })
+    }
+
     /// Its derivative by a variable, unless that is zero.
     fn derivative(mut self, variable: usize) -> Option<Self> {
         self.orders[variable] += 1;

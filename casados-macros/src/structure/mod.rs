@@ -1,6 +1,7 @@
 //! What can be known about a model before it runs: structural index, explicit form, linear rows,
 //! and the derivatives that the engine will ask for, as graphs.
 
+mod branches;
 mod elimination;
 mod facts;
 mod index;
@@ -14,6 +15,7 @@ mod tests;
 
 use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Sampling, Variables};
+use branches::Branches;
 pub use elimination::Plan;
 pub use facts::Facts;
 use kinematic::Kinematic;
@@ -69,6 +71,8 @@ pub struct Analysis {
     pub explicit: Option<Vec<(u32, f64)>>,
     /// How the Newton matrix is eliminated.
     pub elimination: Elimination,
+    /// The conditions that may change within an interval, if there are any.
+    pub branches: Option<Branches>,
     /// What was differentiated, if the index was reduced.
     pub reduction: Option<Reduction>,
 }
@@ -136,7 +140,19 @@ fn analyse_index_one(mut model: Model) -> syn::Result<Analysis> {
     let curved = hessian.iter().filter(|entry| facts.curved.contains(&entry.0));
     let symmetric = curved.map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum();
     let elimination = elimination(&model, jacobian, *blocks, &facts.trivial);
-    Ok(Analysis { model, derivatives, facts, nonlinear, symmetric, explicit, elimination, reduction: None })
+    let is_constant = |variable: u32| (ends[2]..ends[4]).contains(&variable);
+    let branches = branches::find(&mut model.graph, &model.residual, is_constant);
+    Ok(Analysis {
+        model,
+        derivatives,
+        facts,
+        nonlinear,
+        symmetric,
+        explicit,
+        elimination,
+        branches,
+        reduction: None,
+    })
 }
 
 /// Derives everything about a function.

@@ -97,7 +97,7 @@ fn combine_many<T: Real, const S: usize, const G: usize>(weights: &[T; S], y: &[
 
 /// Values in one lane of a group: a loop of its own, which is not unrolled.
 #[inline(never)]
-fn take<T: Real>(group: &[[T; GROUP]], lane: usize, to: &mut [T]) {
+pub(super) fn take<T: Real>(group: &[[T; GROUP]], lane: usize, to: &mut [T]) {
     for (to, from) in to.iter_mut().zip(group) {
         *to = from[lane];
     }

@@ -30,9 +30,10 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         &mut self,
         start: &Start<'_, M, T>,
         growth: f64,
-        watched: bool,
+        look: Look,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
+        let watched = look != Look::Unusual;
         if S < 3 || !watched && !self.scheme.stiffly_accurate && growth <= 1.0 {
             return Ok(0.0);
         }
@@ -55,7 +56,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let (a, b) = ((1.0 - share) / at_seen * at_far, share / at_near * at_far);
         let difference = unlike::<M, T>(&second, &scaled_sum::<M, T>(a, &known, b, &first), start);
         let decades = Scalar::ln(growth) / core::f64::consts::LN_10;
-        let rough = difference * (1.0 + decades) > ROUGH;
+        let rough = matches!(look, Look::Branch | Look::Knot) || difference * (1.0 + decades) > ROUGH;
         Ok(if rough { largest.max(size::<M, T>(&second, start)) } else { 0.0 })
     }
 

@@ -1,11 +1,14 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
-use crate::adaptive::stages::Convergence;
+use crate::adaptive::stages::{Convergence, Look};
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
 const ROUGH_OVER_ERROR: f64 = 3.0;
+/// Where the model changes its branch the error is held below the tolerance that was asked for by
+/// this: there may be many such steps, and what follows makes more of them.
+const OVER_BRANCHES: f64 = 3.0;
 /// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
@@ -158,19 +161,24 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *finer / ROUGH_OVER_ERROR;
         let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
-        let watched = walk.refusals.is_watched();
-        if is_above_rounding && (watched || error * counted >= 1.0 && walk.roughness.may_be(error)) {
+        let otherwise = if walk.refusals.is_watched() { Look::Watched } else { Look::Unusual };
+        let look = stages.change(&start).unwrap_or(otherwise);
+        let unusual = error * counted >= 1.0 && walk.roughness.may_be(error);
+        if is_above_rounding && (look != Look::Unusual || unusual) {
             let growth = walk.trend.growth(size, error, order);
-            let seen = stages.roughness(&start, growth, watched, &mut self.statistics.residuals)?;
-            let rough = seen * counted;
+            let seen = stages.roughness(&start, growth, look, &mut self.statistics.residuals)?;
+            let rough = match look {
+                Look::Branch => OVER_BRANCHES * *finer * seen.max(error),
+                Look::Knot => counted * seen.max(error),
+                Look::Watched | Look::Unusual => counted * seen,
+            };
             // A derivative that jumps leaves an error like the fourth power of the step size, or a
             // lower one. Where times are no finer than that, the step is as good as can be.
             let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
             let shorter = walk.h * T::from_f64(SHORTEST * factor);
             if rough >= 1.0
-                && walk.roughness.may_be(seen)
                 && self.check_step(walk.t, shorter, Refusal::Error).is_ok()
-                && walk.roughness.refuses(size, seen.max(error))
+                && (matches!(look, Look::Branch | Look::Knot) || walk.roughness.refuses(size, seen, error))
             {
                 return Err(Failure::Rough(factor));
             }

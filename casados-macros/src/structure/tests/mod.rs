@@ -1,5 +1,6 @@
 //! Models whose graphs are built by hand, and what is found out about them.
 
+mod branches;
 mod index;
 mod kinematic;
 mod reduction;

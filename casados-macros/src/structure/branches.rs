@@ -1,0 +1,60 @@
+//! Where a model is not smooth: numbers that change where a condition does, or the piece of a table.
+
+use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
+
+/// Conditions count as powers of two; so many have one of their own. Sums of them are exact in
+/// single precision up to sixteen times as many.
+const WEIGHTS: usize = 20;
+
+/// What a model's equations depend on that changes where they are not smooth.
+pub struct Branches {
+    /// How many conditions and tables there are.
+    pub count: usize,
+    /// `Σ 2ⁱ` over the conditions that hold, and the pieces of linear tables.
+    pub kinks: Node,
+    /// The pieces of splines.
+    pub knots: Node,
+}
+
+/// The conditions of comparisons, of the signs in `abs` and `signum`, and tables, as far as they
+/// may change within an interval: `is_constant` says which variables do not.
+pub fn find(graph: &mut Graph, residual: &[Node], is_constant: impl Fn(u32) -> bool) -> Option<Branches> {
+    let (mut conditions, mut kinks, mut knots) = (Vec::new(), Vec::new(), Vec::new());
+    let zero = graph.constant(0.0);
+    for node in graph.reachable(residual) {
+        match graph.op(node) {
+            Op::Compare(..) => conditions.push(node),
+            Op::Unary(Unary::Abs | Unary::Signum, a) => conditions.push(graph.compare(Compare::Lt, a, zero)),
+            Op::Unary(Unary::Table(table), a) => {
+                let [kink, knot] = table.pieces().map(|piece| graph.unary(Unary::Table(piece), a));
+                kinks.push(kink);
+                knots.push(knot);
+            }
+            Op::Binary(Binary::Table(table), a, b) => {
+                let [kink, knot] = table.pieces().map(|piece| graph.binary(Binary::Table(piece), a, b));
+                kinks.push(kink);
+                knots.push(knot);
+            }
+            _ => {}
+        }
+    }
+    let [conditions, kinks, knots] =
+        [conditions, kinks, knots].map(|nodes| changing(graph, nodes, &is_constant));
+    let count = conditions.len() + kinks.len();
+    let mut weigh = |(index, condition): (usize, Node)| {
+        let weight = graph.constant(f64::from(1u32 << (index % WEIGHTS)));
+        graph.select(condition, weight, zero)
+    };
+    let weighted: Vec<Node> = conditions.into_iter().enumerate().map(&mut weigh).collect();
+    let mut sum = |nodes: &[Node]| nodes.iter().fold(zero, |sum, &node| graph.binary(Binary::Add, sum, node));
+    (count > 0).then(|| Branches { count, kinks: sum(&[weighted, kinks].concat()), knots: sum(&knots) })
+}
+
+/// Those that depend on what changes, each once.
+fn changing(graph: &Graph, mut nodes: Vec<Node>, is_constant: impl Fn(u32) -> bool) -> Vec<Node> {
+    nodes.sort_unstable();
+    nodes.dedup();
+    let depend = graph.dependencies(&nodes);
+    let changes = |on: &Vec<u32>| on.iter().any(|&variable| !is_constant(variable));
+    nodes.into_iter().zip(depend).filter(|(_, on)| changes(on)).map(|(node, _)| node).collect()
+}
