@@ -297,8 +297,8 @@ pub trait Shape: 'static {
     type MatrixCP<T: Plain, const C: usize>: Matrix<T>;
 }
 
-/// The dimensions of a model. The last four follow from the first four (see [`Shape`]); they are
-/// written out because stable Rust cannot add in a type.
+/// The dimensions of a model. `NK`, `NV` and `NW` follow from the first four (see [`Shape`]); they
+/// are written out because stable Rust cannot add in a type.
 #[derive(Clone, Copy, Debug)]
 pub struct Dims<
     const NX: usize,

@@ -46,10 +46,11 @@ pub(crate) struct Arguments<'a, M: Dae, T: Real> {
     pub h: T,
 }
 
-/// What a call has to work with after its steps were taken.
+/// What a call has to work with after a step, and after all of them.
 pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
     pub work: &'a mut Work<M, T, S, F>,
     pub coefficients: &'a Coefficients<T, S>,
+    /// All steps; none as long as they are being taken.
     pub steps: &'a [Step<M, T, S>],
     pub statistics: &'a mut Statistics,
 }

@@ -1,10 +1,4 @@
-//! Forward sensitivities: implicit function theorem at the converged stages.
-//!
-//! ```text
-//! J dK = −(f_x,i V_n + f_w,i)        V_{n+1} = V_n + h Σ_i b_i dk_i
-//! ```
-//!
-//! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
+//! The forward pass in all directions `w = (x₀, u, p)` side by side, and its memory.
 
 use super::gradient::check_result;
 use super::matrices::Split;

@@ -1,7 +1,7 @@
 //! Newton's method on the stages of one step.
 //!
 //! ```text
-//! J Δ = −f(y),   y ← y + Δ
+//! J Δ = f(y),   y ← y − Δ
 //! ```
 //!
 //! Increments are measured relative to the size of each unknown,
