@@ -94,9 +94,6 @@ pub mod neon_f64 {
         add_bits(a: Register, b: Register) -> Register {
             vreinterpretq_f64_u64(vaddq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
         }
-        sub_bits(a: Register, b: Register) -> Register {
-            vreinterpretq_f64_u64(vsubq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
-        }
         shift_left<BITS>(a: Register) -> Register {
             vreinterpretq_f64_u64(vshlq_n_u64::<BITS>(vreinterpretq_u64_f64(a)))
         }

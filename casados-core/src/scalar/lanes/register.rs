@@ -325,6 +325,10 @@ complex!(F32x8, f32, avx2_f32);
 #[cfg(target_arch = "x86_64")]
 complex!(F32x16, f32, avx512_f32);
 #[cfg(target_arch = "x86_64")]
+slices!(F64x4, f64, avx2_f64);
+#[cfg(target_arch = "x86_64")]
+slices!(F32x8, f32, avx2_f32);
+#[cfg(target_arch = "x86_64")]
 fours!(F64x8, f64, avx512_f64);
 #[cfg(target_arch = "x86_64")]
 fours!(F32x16, f32, avx512_f32);

@@ -83,7 +83,6 @@ pub mod wasm_f64 {
         eq(a: Register, b: Register) -> Mask { f64x2_eq(a, b) }
         bits(m: Mask) -> u32 { u32::from(i64x2_bitmask(m)) }
         add_bits(a: Register, b: Register) -> Register { i64x2_add(a, b) }
-        sub_bits(a: Register, b: Register) -> Register { i64x2_sub(a, b) }
         shift_left<BITS>(a: Register) -> Register { i64x2_shl(a, BITS as u32) }
         shift_right<BITS>(a: Register) -> Register { u64x2_shr(a, BITS as u32) }
     }

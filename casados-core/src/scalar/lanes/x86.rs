@@ -177,9 +177,6 @@ pub mod sse2_f64 {
         add_bits(a: Register, b: Register) -> Register {
             _mm_castsi128_pd(_mm_add_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
         }
-        sub_bits(a: Register, b: Register) -> Register {
-            _mm_castsi128_pd(_mm_sub_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
-        }
         shift_left<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_slli_epi64::<BITS>(_mm_castpd_si128(a))) }
         shift_right<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_srli_epi64::<BITS>(_mm_castpd_si128(a))) }
     }
@@ -283,9 +280,6 @@ pub mod avx2_f64 {
         bits(m: Mask) -> u32 { _mm256_movemask_pd(m) as u32 }
         add_bits(a: Register, b: Register) -> Register {
             _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
-        }
-        sub_bits(a: Register, b: Register) -> Register {
-            _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
         }
         shift_left<BITS>(a: Register) -> Register {
             _mm256_castsi256_pd(_mm256_slli_epi64::<BITS>(_mm256_castpd_si256(a)))

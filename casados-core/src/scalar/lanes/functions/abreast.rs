@@ -240,8 +240,6 @@ operations! {
     xor_bits = Doubles;
     /// The sum of both as 64-bit integers.
     add_bits = Doubles;
-    /// The difference of both as 64-bit integers.
-    sub_bits = Doubles;
     }
     ternary {
     /// `self a + b`, in one instruction if there is one, else rounded twice.

@@ -62,8 +62,6 @@ pub trait Doubles: Lanes {
     fn xor_bits(self, other: Self) -> Self;
     /// The sum of both as 64-bit integers.
     fn add_bits(self, other: Self) -> Self;
-    /// The difference of both as 64-bit integers.
-    fn sub_bits(self, other: Self) -> Self;
     /// The bits moved up, zeros below.
     fn shift_left<const BITS: i32>(self) -> Self;
     /// The bits moved down, zeros above.

@@ -26,10 +26,6 @@ impl Doubles for f64 {
         Self::from_bits(self.to_bits().wrapping_add(other.to_bits()))
     }
     #[inline(always)]
-    fn sub_bits(self, other: Self) -> Self {
-        Self::from_bits(self.to_bits().wrapping_sub(other.to_bits()))
-    }
-    #[inline(always)]
     fn shift_left<const BITS: i32>(self) -> Self {
         Self::from_bits(self.to_bits() << BITS)
     }
