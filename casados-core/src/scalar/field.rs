@@ -144,11 +144,18 @@ pub trait Field:
 
 /// `a + b`, rounded, and what rounding left of it: their sum is exact (D. Knuth).
 #[inline(always)]
-pub(crate) fn two_sum<E: Field>(a: E, b: E) -> [E; 2] {
+pub(crate) fn two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
     let sum = a + b;
     let second = sum - a;
     let first = sum - second;
     [sum, (a - first) + (b - second)]
+}
+
+/// The same where `a = 0` or `|a| ≥ |b|`, with half of the operations (T. J. Dekker).
+#[inline(always)]
+pub(crate) fn fast_two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
+    let sum = a + b;
+    [sum, b - (sum - a)]
 }
 
 /// Rows as columns.

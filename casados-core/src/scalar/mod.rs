@@ -24,7 +24,7 @@ mod tangent;
 
 pub(crate) use each::each;
 pub use field::Field;
-pub(crate) use field::{transposed, two_sum};
+pub(crate) use field::{fast_two_sum, transposed, two_sum};
 #[doc(hidden)]
 pub use float::Float;
 #[doc(hidden)]
