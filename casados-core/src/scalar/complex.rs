@@ -7,7 +7,7 @@
 //! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
 //! complex elementary functions" (1987).
 
-use super::{Field, Rows, Scalar, own_cell};
+use super::{Field, Rows, Scalar, mask_logic, one_mask, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
 use num_complex::Complex64;
 
@@ -23,19 +23,13 @@ fn polar(r: f64, angle: f64) -> Complex64 {
 }
 
 impl Field for Complex64 {
-    type Mask = bool;
+    one_mask!();
 
     fn from_f64(value: f64) -> Self {
         c(value, 0.0)
     }
     fn is_smaller(self, other: Self) -> bool {
         self.norm_sqr() < other.norm_sqr()
-    }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        if mask { a } else { b }
-    }
-    fn any(mask: bool) -> bool {
-        mask
     }
 }
 
@@ -209,13 +203,5 @@ impl Scalar for Complex64 {
     fn eq(self, other: Self) -> bool {
         self.re == other.re
     }
-    fn and(a: bool, b: bool) -> bool {
-        a & b
-    }
-    fn or(a: bool, b: bool) -> bool {
-        a | b
-    }
-    fn not(a: bool) -> bool {
-        !a
-    }
+    mask_logic!();
 }

@@ -10,25 +10,19 @@
 //!   `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
-use super::{Field, Rows, Scalar, own_cell};
+use super::{Field, Rows, Scalar, mask_logic, one_mask, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 
 macro_rules! dual {
     ($t:ty, $constant:expr; $($name:ident)*) => {
         impl Field for $t {
-            type Mask = bool;
+            one_mask!();
 
             fn from_f64(value: f64) -> Self {
                 Self::from(value)
             }
             fn is_smaller(self, other: Self) -> bool {
                 self.re.abs() < other.re.abs()
-            }
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
-            }
-            fn any(mask: bool) -> bool {
-                mask
             }
         }
 
@@ -107,15 +101,7 @@ macro_rules! dual {
             fn eq(self, other: Self) -> bool {
                 self.re == other.re
             }
-            fn and(a: bool, b: bool) -> bool {
-                a & b
-            }
-            fn or(a: bool, b: bool) -> bool {
-                a | b
-            }
-            fn not(a: bool) -> bool {
-                !a
-            }
+            mask_logic!();
         }
     };
     ($t:ty, $constant:expr) => {

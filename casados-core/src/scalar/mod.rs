@@ -53,6 +53,41 @@ macro_rules! own_cell {
 }
 pub(crate) use own_cell;
 
+/// Comparisons of one number have one result: what a [`Field`] does with it.
+macro_rules! one_mask {
+    () => {
+        type Mask = bool;
+        #[inline(always)]
+        fn select(mask: bool, a: Self, b: Self) -> Self {
+            if mask { a } else { b }
+        }
+        #[inline(always)]
+        fn any(mask: bool) -> bool {
+            mask
+        }
+    };
+}
+pub(crate) use one_mask;
+
+/// What a [`Scalar`] does with it.
+macro_rules! mask_logic {
+    () => {
+        #[inline(always)]
+        fn and(a: bool, b: bool) -> bool {
+            a & b
+        }
+        #[inline(always)]
+        fn or(a: bool, b: bool) -> bool {
+            a | b
+        }
+        #[inline(always)]
+        fn not(a: bool) -> bool {
+            !a
+        }
+    };
+}
+pub(crate) use mask_logic;
+
 /// Who has one runs where the instructions of fused kernels are: AVX2, FMA, if `WIDE` AVX-512.
 ///
 /// Numbers are computed with in these registers without asking. The crate alone can make one, and

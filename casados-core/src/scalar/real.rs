@@ -1,7 +1,7 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, own_cell};
+use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, mask_logic, one_mask, own_cell};
 #[cfg(not(feature = "std"))]
 use super::{double, single};
 
@@ -10,7 +10,7 @@ use super::{double, single};
 macro_rules! real {
     ($t:ident, $compiled:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {
-            type Mask = bool;
+            one_mask!();
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
@@ -29,14 +29,6 @@ macro_rules! real {
             #[inline(always)]
             fn is_smaller(self, other: Self) -> bool {
                 <$t>::abs(self) < <$t>::abs(other)
-            }
-            #[inline(always)]
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
-            }
-            #[inline(always)]
-            fn any(mask: bool) -> bool {
-                mask
             }
         }
 
@@ -122,18 +114,7 @@ macro_rules! real {
             fn eq(self, other: Self) -> bool {
                 self == other
             }
-            #[inline(always)]
-            fn and(a: bool, b: bool) -> bool {
-                a & b
-            }
-            #[inline(always)]
-            fn or(a: bool, b: bool) -> bool {
-                a | b
-            }
-            #[inline(always)]
-            fn not(a: bool) -> bool {
-                !a
-            }
+            mask_logic!();
         }
 
         impl Sealed for $t {}
