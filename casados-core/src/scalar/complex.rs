@@ -7,7 +7,7 @@
 //! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
 //! complex elementary functions" (1987).
 
-use super::{Field, Rows, Scalar, mask_logic, one_mask, own_cell};
+use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
 use num_complex::Complex64;
 
@@ -159,15 +159,7 @@ impl Scalar for Complex64 {
         Scalar::sqrt(self * self + other * other)
     }
     fn powi(self, n: i32) -> Self {
-        let (mut power, mut base, mut left) = (c(1.0, 0.0), self, n.unsigned_abs());
-        while left > 0 {
-            if left & 1 == 1 {
-                power *= base;
-            }
-            base *= base;
-            left >>= 1;
-        }
-        if n < 0 { 1.0 / power } else { power }
+        power(self, n)
     }
     fn powf(self, other: Self) -> Self {
         if self.re < 0.0 && other.im == 0.0 {

@@ -10,7 +10,7 @@
 //!   `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
-use super::{Field, Rows, Scalar, mask_logic, one_mask, own_cell};
+use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 
 macro_rules! dual {
@@ -57,15 +57,7 @@ macro_rules! dual {
             }
             fn powi(self, n: i32) -> Self {
                 if self.re == 0.0 && n >= 0 {
-                    let (mut power, mut base, mut left) = (Self::from(1.0), self, n);
-                    while left > 0 {
-                        if left & 1 == 1 {
-                            power *= base;
-                        }
-                        base *= base;
-                        left >>= 1;
-                    }
-                    return power;
+                    return power(self, n);
                 }
                 DualNum::powi(&self, n)
             }

@@ -3,7 +3,7 @@
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
 use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, mask_logic, one_mask, own_cell};
 #[cfg(not(feature = "std"))]
-use super::{double, single};
+use super::{double, field::power, single};
 
 /// The methods of one real type, from `std` where it is there, else from `libm`, `single` and
 /// `double`.
@@ -72,23 +72,12 @@ macro_rules! real {
                 #[cfg(not(feature = "std"))]
                 return $powf(self, other);
             }
-            // Square and multiply; of a negative exponent, the reciprocal of the positive power.
             #[inline(always)]
             fn powi(self, n: i32) -> Self {
                 #[cfg(feature = "std")]
                 return <$t>::powi(self, n);
                 #[cfg(not(feature = "std"))]
-                {
-                    let (mut power, mut base, mut left) = (1.0, self, n.unsigned_abs());
-                    while left > 0 {
-                        if left & 1 == 1 {
-                            power *= base;
-                        }
-                        base *= base;
-                        left >>= 1;
-                    }
-                    if n < 0 { 1.0 / power } else { power }
-                }
+                return power(self, n);
             }
             #[inline(always)]
             fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
