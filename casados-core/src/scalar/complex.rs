@@ -156,7 +156,12 @@ impl Scalar for Complex64 {
         )
     }
     fn hypot(self, other: Self) -> Self {
-        Scalar::sqrt(self * self + other * other)
+        let scale = [self, other].iter().fold(0.0, |scale, z| z.re.abs().max(z.im.abs()).max(scale));
+        if scale == 0.0 || !scale.is_finite() {
+            return Scalar::sqrt(self * self + other * other);
+        }
+        let (a, b) = (self / scale, other / scale);
+        Scalar::sqrt(a * a + b * b) * scale
     }
     fn powi(self, n: i32) -> Self {
         power(self, n)
@@ -196,4 +201,22 @@ impl Scalar for Complex64 {
         self.re == other.re
     }
     mask_logic!();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares of `1e200` and `1e-200` are not numbers that there are.
+    #[test]
+    fn hypotenuses_neither_overflow_nor_underflow() {
+        for scale in [1e-200, 1.0, 1e200] {
+            let (a, b) = (c(3.0 * scale, 1e-8 * scale), c(-4.0 * scale, 0.0));
+            let root = Scalar::hypot(a, b);
+            assert!((root.re / scale - 5.0).abs() <= 8.0 * f64::EPSILON, "{root}");
+            assert!((root.im / scale - 0.6e-8).abs() <= 8e-8 * f64::EPSILON, "{root}");
+        }
+        assert_eq!(Scalar::hypot(c(0.0, 0.0), c(0.0, 0.0)).re, 0.0);
+        assert_eq!(Scalar::hypot(c(3.0, 0.0), c(f64::INFINITY, 0.0)).re, f64::INFINITY);
+    }
 }
