@@ -4,6 +4,7 @@
 #![allow(unsafe_code)]
 
 use super::functions::{Call, CallWithEight, CallWithFour};
+use super::shared::define;
 use core::arch::x86_64::*;
 
 // SAFETY of every `unsafe` of this file and its modules: the one condition of calling these
@@ -20,19 +21,6 @@ macro_rules! wrap {
         pub fn $name($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $intrinsic $(::<$constant>)? ($($argument),*) }
-        }
-    )* };
-}
-
-/// Functions of an expression of intrinsics each.
-macro_rules! define {
-    ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
-        $(#[$attribute])*
-        #[inline(always)]
-        #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
-        pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
-            // SAFETY: see the head of the file.
-            unsafe { $body }
         }
     )* };
 }
