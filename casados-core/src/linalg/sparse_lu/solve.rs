@@ -17,34 +17,6 @@ use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
-/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
-/// registers themselves two at a time, or the packet of all stages would not fit them.
-macro_rules! packets {
-    ($first:ty, $second:ty: $solve:expr) => {{
-        let Solve { factors, rows } = $solve;
-        let mut column = 0;
-        if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
-            while column + 8 <= R::LEN {
-                sweeps::<A, M, E, R, S, 8, $first, $second>(factors, rows, column, &mut ());
-                column += 8;
-            }
-        }
-        if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
-            sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
-            column += 4;
-        }
-        if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
-            while column + 2 <= R::LEN {
-                sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
-                column += 2;
-            }
-        }
-        if const { R::LEN % 2 == 1 } {
-            sweeps::<A, M, E, R, S, 1, $first, $second>(factors, rows, column, &mut ());
-        }
-    }};
-}
-
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
 /// columns.
 ///
@@ -54,22 +26,7 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve::<M, E, R, S> { factors, rows });
-}
-
-struct Solve<'a, M, E, R, const S: usize> {
-    factors: Planned<'a, M, E, S>,
-    rows: &'a mut [[R; S]],
-}
-
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
-    type Number = E;
-    type Output = ();
-    const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        packets!(Down, Up: self);
-    }
+    dispatch(Solve::<M, E, R, Down, Up, S> { factors, rows, systems: PhantomData });
 }
 
 /// Solves `Mᵀ X = R` in place.
@@ -77,18 +34,46 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(SolveTransposed(Solve { factors, rows }));
+    dispatch(Solve::<M, E, R, TransposedDown, TransposedUp, S> { factors, rows, systems: PhantomData });
 }
 
-struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
+/// registers themselves two at a time, or the packet of all stages would not fit them.
+struct Solve<'a, M, E, R, First, Second, const S: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+    systems: PhantomData<(First, Second)>,
+}
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, First: System, Second: System, const S: usize> Kernel
+    for Solve<'_, M, E, R, First, Second, S>
+{
     type Number = E;
     type Output = ();
     const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        packets!(TransposedDown, TransposedUp: self.0);
+        let Self { factors, rows, .. } = self;
+        let mut column = 0;
+        if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
+            while column + 8 <= R::LEN {
+                sweeps::<A, M, E, R, S, 8, First, Second>(factors, rows, column, &mut ());
+                column += 8;
+            }
+        }
+        if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
+            sweeps::<A, M, E, R, S, 4, First, Second>(factors, rows, column, &mut ());
+            column += 4;
+        }
+        if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
+            while column + 2 <= R::LEN {
+                sweeps::<A, M, E, R, S, 2, First, Second>(factors, rows, column, &mut ());
+                column += 2;
+            }
+        }
+        if const { R::LEN % 2 == 1 } {
+            sweeps::<A, M, E, R, S, 1, First, Second>(factors, rows, column, &mut ());
+        }
     }
 }
 
