@@ -5,7 +5,7 @@ use super::scheme::{Grid, Scheme, is_zero};
 use super::step::{Base, Own, Point, Record, add};
 use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place};
-use crate::linalg::{Arithmetic, beside, kernels};
+use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
 use crate::scalar::{Lanes, Real};
@@ -173,7 +173,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// The directions, of each state a row.
     pub fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
         one: E,

@@ -180,7 +180,7 @@ fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
 
 /// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
 #[inline(always)]
-fn moved<A: Arithmetic, E: Lanes, const S: usize>(
+fn displaced<A: Arithmetic, E: Lanes, const S: usize>(
     start: E,
     minus_ha: &Block<E, S>,
     (dk, dk_sizes): (&[E; S], &[E; S]),
@@ -232,7 +232,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             }
             let size = sizes_of(&sum);
             if unknown < nx {
-                let xi = moved::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
+                let xi = displaced::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
                 (probe[unknown], sizes[unknown]) = (sum, size);
                 (probe[nx + unknown], sizes[nx + unknown]) = xi;
             } else {

@@ -8,7 +8,7 @@ use super::stage_rows::CurvedRows;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
-use crate::irk::kinematic::Forward;
+use crate::irk::kinematic::KinematicPanel;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, coupling, dispatch, is_long, is_short,
@@ -320,7 +320,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
         if const { !Self::UNIT } && !(self.first && D::SPARSE) {
-            let kinematic = Forward { jacobian, v, directions, column };
+            let kinematic = KinematicPanel { jacobian, v, directions, column };
             Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
             place::<M, E, D, S, W>(jacobian, nodes, &mut self.placed, dy, column);
@@ -342,7 +342,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
             return;
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
-        let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
+        let kinematic = KinematicPanel::<M, E, D, S, W> { jacobian, v, directions, column };
         let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
         if const { !Self::sums_late::<A>() } && self.phase != Phase::After {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);

@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, kernels, moved, two_product};
+use crate::linalg::{Arithmetic, Kernel, dispatch, displaced, dot_compensated, kernels, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
@@ -88,7 +88,7 @@ impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
         for ((xi, beyond), ((&x, &compensation), k)) in points.iter_mut().zip(beyond).zip(states) {
             for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&more)) {
                 let [sum, lost] = dot_compensated::<A, E>(a.iter().zip(k));
-                [*xi, *beyond] = moved::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
+                [*xi, *beyond] = displaced::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
             }
         }
     }
@@ -123,7 +123,7 @@ kernels! {
         h: E,
     ) {
         for ((x, compensation), k) in x.iter_mut().zip(compensation).zip(y) {
-            [*x, *compensation] = moved::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
+            [*x, *compensation] = displaced::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
         }
     }
 }

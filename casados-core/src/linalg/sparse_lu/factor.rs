@@ -137,7 +137,7 @@ pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
-pub fn beside<'a, M: Dae, E, const S: usize>(
+pub fn blocks_with_slots<'a, M: Dae, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {

@@ -5,7 +5,7 @@
 //! other. Where one column fills registers, what is added to a row is added in them instead, and
 //! stored once.
 
-use super::factor::{Planned, beside, has_all};
+use super::factor::{Planned, blocks_with_slots, has_all};
 use super::micro_panel::{is_zero, load, store, subtract_of};
 use crate::linalg::block::{Packet, negate, subtract};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
@@ -120,19 +120,21 @@ pub fn sweeps<
         return;
     }
     let viewer_of_first = &mut ();
-    let mut first = Along::<First, Sweep<'_, M, E, R, (), S, W>>(
-        Sweep { factors, rows, column, visitor: viewer_of_first },
+    let mut first = Along::<First, Substitution<'_, M, E, R, (), S, W>>(
+        Substitution { factors, rows, column, visitor: viewer_of_first },
         PhantomData,
     );
     from_first::<A, M, _>(&mut first);
     let rows = first.0.rows;
-    let mut second =
-        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, visitor }, PhantomData);
+    let mut second = Along::<Second, Substitution<'_, M, E, R, _, S, W>>(
+        Substitution { factors, rows, column, visitor },
+        PhantomData,
+    );
     from_last::<A, M, _>(&mut second);
 }
 
 /// `W` columns of right-hand sides on their way.
-pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
+pub struct Substitution<'a, M, E, R, V, const S: usize, const W: usize> {
     pub factors: Planned<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
@@ -152,7 +154,7 @@ pub trait System {
         const S: usize,
         const W: usize,
     >(
-        sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+        substitution: &mut Substitution<'_, M, E, R, V, S, W>,
         pivot: &'static Pivot,
     );
 }
@@ -161,7 +163,7 @@ pub trait System {
 struct Along<Y, T>(T, PhantomData<Y>);
 
 impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    AtPivot for Along<Y, Sweep<'_, M, E, R, V, S, W>>
+    AtPivot for Along<Y, Substitution<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
@@ -183,10 +185,10 @@ macro_rules! system {
         impl System for $name {
             #[inline(always)]
             fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
-                sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+                substitution: &mut Substitution<'_, M, E, R, V, S, W>,
                 pivot: &'static Pivot,
             ) {
-                sweep.$what::<A>(pivot);
+                substitution.$what::<A>(pivot);
             }
         }
     };
@@ -210,7 +212,7 @@ system!(
 );
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    Sweep<'_, M, E, R, V, S, W>
+    Substitution<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
@@ -241,7 +243,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         {
             return;
         }
-        for (block, other) in beside(*factors, pivot.lower()) {
+        for (block, other) in blocks_with_slots(*factors, pivot.lower()) {
             if other >= rows.len() {
                 continue;
             }
@@ -275,7 +277,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        for (block, other) in beside(*factors, pivot.upper()) {
+        for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             let Some(other) = rows.get(other) else { continue };
             subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
         }
