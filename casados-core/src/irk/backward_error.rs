@@ -16,7 +16,7 @@ use super::forward::sweep::Sweep;
 use super::workspace::{Linearization, Work};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
@@ -221,7 +221,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
             return E::lt(zero, zero);
         }
-        let minus_ha = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
             *sizes = sizes_of(values);
         }

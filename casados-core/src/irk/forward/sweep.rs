@@ -11,8 +11,8 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::KinematicPanel;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, coupling, dispatch, is_long, is_short,
-    kernels, sweeps,
+    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, dispatch, is_long, is_short, kernels,
+    minus_ha, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -261,7 +261,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         for weight in &mut minus_weights {
             *weight = -(h * *weight);
         }
-        let shared = &Shared { nodes, minus_ha: coupling(&coefficients.a, h), minus_weights };
+        let shared = &Shared { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
         panels!(D::COLUMNS, E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum

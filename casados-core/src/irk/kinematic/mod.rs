@@ -20,7 +20,7 @@ use crate::irk::directions::Directions;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, coupling, dispatch, each_row, kinematic, slot,
+    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, dispatch, each_row, kinematic, minus_ha, slot,
     subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
@@ -148,7 +148,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, a, h, rows } = self;
-        around::<A, M, E, S, W, WHAT>(jacobian, &coupling(a, h), rows);
+        around::<A, M, E, S, W, WHAT>(jacobian, &minus_ha(a, h), rows);
     }
 }
 
