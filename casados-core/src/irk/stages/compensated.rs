@@ -52,7 +52,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn correct_residual(&mut self) {
         let (begin, end) = (M::Shape::NX, 2 * M::Shape::NX);
         let (jacobian, [beyond, _]) = (self.linear.jacobian.as_ref(), &self.probe);
-        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, M::STRUCTURE.jacobian.len()) {
+        for (r, c, values) in entries::<M, _>(jacobian) {
             if !(begin..end).contains(&c) {
                 continue;
             }
