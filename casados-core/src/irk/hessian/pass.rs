@@ -85,7 +85,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     }
 
     /// Remembers the linearisation on the way forth.
-    pub(crate) fn record(&mut self, work: &Work<M, E, S, F>) {
+    pub(crate) fn remember(&mut self, work: &Work<M, E, S, F>) {
         self.linear.copy_from(&work.linear);
     }
 
@@ -104,15 +104,15 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     pub(crate) fn run<F: Fallback>(
         &mut self,
         mut parts: Parts<'_, M, T, S, F>,
-        records: &[HessianStep<M, T, S, F>],
+        kept: &[HessianStep<M, T, S, F>],
         [lambda, nu]: [&[T]; 2],
         ahead: &[T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
         let steps = parts.steps;
-        for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            let kept = &mut record.kept(n + 1 == steps.len());
+        for (n, (step, remembered)) in steps.iter().zip(kept).enumerate().rev() {
+            let kept = &mut remembered.kept(n + 1 == steps.len());
             self.backward.step(&mut parts, kept, n, step, &mut along)?;
             let Parts { work, coefficients, .. } = &mut parts;
             self.curvature(work, coefficients, n, step);
@@ -124,7 +124,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(work, *kept, coefficients, record, [n, steps.len()], ahead);
+            self.subtract(work, *kept, coefficients, remembered, [n, steps.len()], ahead);
         }
         Ok(())
     }

@@ -32,9 +32,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     ) {
         self.alike = false;
         match (from, before, &coefficients.next) {
-            (InitialGuess::Previous(record) | InitialGuess::Solution(record), ..) => {
-                if let Some(record) = record.get(n) {
-                    assign(y, &record.y);
+            (InitialGuess::Previous(steps) | InitialGuess::Solution(steps), ..) => {
+                if let Some(step) = steps.get(n) {
+                    assign(y, &step.y);
                 }
             }
             (_, Some(before), Some(next)) if const { F::INTERVALS } => {
