@@ -182,13 +182,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, E>() } {
-            return;
-        }
-        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
-            *block = [[E::from_f64(0.0); S]; S];
-        }
+        factor::clear_fill::<M, E, _>(self.blocks.as_mut(), row, [[E::from_f64(0.0); S]; S]);
     }
 }
 

@@ -128,6 +128,18 @@ pub const fn begins_with_update<M: Dae, E>() -> bool {
     align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
 }
 
+/// Fill of the matrix, a row of its assembly.
+#[inline(always)]
+pub fn clear_fill<M: Dae, E, B: Copy>(blocks: &mut [B], row: usize, zero: B) {
+    let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+    if const { begins_with_update::<M, E>() } {
+        return;
+    }
+    if let Some(block) = blocks.get_mut(of.block as usize) {
+        *block = zero;
+    }
+}
+
 /// Always; but the optimiser then knows their number, and with it how often loops over constant
 /// tables go round.
 #[inline(always)]

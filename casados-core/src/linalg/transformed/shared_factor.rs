@@ -128,13 +128,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, Number<E, S>>() } {
-            return;
-        }
-        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
-            *block = [[Complex::zero()]];
-        }
+        factor::clear_fill::<M, Number<E, S>, _>(self.blocks.as_mut(), row, [[Complex::zero()]]);
     }
 }
 
