@@ -65,7 +65,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
                 reason: "the memory of the integrator has fewer",
             });
         }
-        if !W::Fallback::KEPT && M::STRUCTURE.elimination.pivots.is_empty() {
+        if !W::Fallback::KEPT && !M::STRUCTURE.elimination.has_plan() {
             return Err(Error::NotPivoted { step: 0 });
         }
         let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::KEPT);

@@ -22,7 +22,7 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
 
     const ITERATES: bool = true;
     // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-    const TOGETHER: bool = !M::STRUCTURE.elimination.pivots.is_empty();
+    const TOGETHER: bool = M::STRUCTURE.elimination.has_plan();
 
     fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         Self::build(*options, *tableau)

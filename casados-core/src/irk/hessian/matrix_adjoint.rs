@@ -36,7 +36,7 @@ use core::marker::PhantomData;
 /// panels do not. Only of single numbers: registers of them leave no room for packets.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
-    if COLUMNS < 16 || size_of::<E>() > 8 || structure.elimination.pivots.is_empty() {
+    if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
         return false;
     }
     // Each of its products is an operation for the sum, too.

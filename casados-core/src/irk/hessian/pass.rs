@@ -71,7 +71,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     #[cfg(feature = "alloc")]
     pub(crate) const DIRECT: bool = {
         let structure = &M::STRUCTURE;
-        !(structure.linear_in_state || structure.constant_matrix || structure.elimination.pivots.is_empty())
+        !(structure.linear_in_state || structure.constant_matrix || !structure.elimination.has_plan())
     };
 
     /// Where the way forth writes `D`.

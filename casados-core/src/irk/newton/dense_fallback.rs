@@ -121,7 +121,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ) -> Result<(), Error> {
         let h = self.inputs.time.step;
         statistics.factorizations += 1;
-        statistics.dense += usize::from(!M::STRUCTURE.elimination.pivots.is_empty());
+        statistics.dense += usize::from(M::STRUCTURE.elimination.has_plan());
         self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(|missing| {
             match missing {
                 Some((unknown, stage)) => Error::Singular {
