@@ -16,10 +16,9 @@ use nalgebra::{SMatrix, SVector};
 pub trait Plain: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static {}
 impl<T: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static> Plain for T {}
 
-/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
-/// on the parameters of the struct.
-macro_rules! plain {
-    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+/// `Copy` without the bounds of a derive.
+macro_rules! copy {
+    ([$($generics:tt)*] $type:ty) => {
         impl<$($generics)*> Clone for $type {
             #[inline(always)]
             fn clone(&self) -> Self {
@@ -27,6 +26,15 @@ macro_rules! plain {
             }
         }
         impl<$($generics)*> Copy for $type {}
+    };
+}
+pub(crate) use copy;
+
+/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
+/// on the parameters of the struct.
+macro_rules! plain {
+    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        crate::shape::copy!([$($generics)*] $type);
         crate::shape::compared!([$($generics)*] $type { $($field),* });
     };
 }

@@ -9,7 +9,7 @@ use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Matrix, Shape};
+use crate::shape::{Array, Matrix, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -60,12 +60,7 @@ pub(super) struct Seeded<'a, M: Ode, T: Real, const C: usize> {
     pub columns: usize,
 }
 
-impl<M: Ode, T: Real, const C: usize> Clone for Seeded<'_, M, T, C> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Ode, T: Real, const C: usize> Copy for Seeded<'_, M, T, C> {}
+copy!(['a, M: Ode, T: Real, const C: usize] Seeded<'a, M, T, C>);
 
 impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
     #[inline(always)]

@@ -46,13 +46,6 @@ pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     is_dense: bool,
 }
 
-impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
-
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// Whether the whole matrix may be pivoted: not in registers, of which a lane that needs it is
     /// computed alone.

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{ArrayC, Identity};
 use crate::irk::driver::Parts;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work};
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::result::{DenseForward, Forward, ForwardAdjoint, Nominal};
@@ -23,7 +23,6 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) pass: ForwardPass<M, T, S>,
 }
-copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
 /// A pass over the steps, which writes to results elsewhere.
 #[derive(Zeroable)]
@@ -33,7 +32,6 @@ pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
     /// Zero if all derivatives of `z` are finite, else NaN.
     finite: [T; 1],
 }
-copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
     /// A step that is linearised, by the factors that were `kept` or are there, as

@@ -9,7 +9,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::KinematicPanel;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, dispatch, is_long, is_short, kernels,
     minus_ha, sweeps,
@@ -17,7 +17,7 @@ use crate::linalg::{
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Aligned, Array, Plain, Shape};
+use crate::shape::{Aligned, Array, Plain, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -39,7 +39,6 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     /// Zero if all that was written to a result after the last step is finite, else NaN.
     pub(in crate::irk) finite: [T; 1],
 }
-copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
 
 /// A step that is linearised, and the directions that go through it.
 pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {

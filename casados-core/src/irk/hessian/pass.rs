@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::ArrayC;
 use crate::irk::driver::Parts;
 use crate::irk::stage_array::Stages;
-use crate::irk::workspace::{Linearization, Step, Work, copy};
+use crate::irk::workspace::{Linearization, Step, Work};
 use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
@@ -37,7 +37,6 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
     pub(crate) pass: HessianPass<M, T, S>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 
 /// A pass over the steps, from the last to the first, which writes to a result elsewhere.
 #[derive(Zeroable)]
@@ -53,7 +52,6 @@ pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     /// Entries of `∇²(μᵀ f)` at all stages.
     entries: Aligned<Stages<M::Hessian<[T; S]>, T, S>>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianPass<M, T, S>);
 
 /// What the way back needs of a step.
 #[derive(Zeroable)]
@@ -63,7 +61,6 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting>
     /// The rows of `D` at all stages that enter second derivatives, in panels.
     d: Aligned<ArrayV<M, [ArrayC<M, T>; S]>>,
 }
-copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     /// Whether the factors of every step are made where they will be kept: no other step has the

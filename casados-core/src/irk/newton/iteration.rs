@@ -32,12 +32,13 @@ use super::increment::{PlaceResidual, Update, largest, subtract_increment};
 use super::jacobian_policy::Policy;
 use super::norm::{KinematicScales, Measure};
 use crate::irk::coefficients::Coefficients;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::Lanes;
+use crate::shape::copy;
 use crate::statistics::Statistics;
 use core::mem::take;
 

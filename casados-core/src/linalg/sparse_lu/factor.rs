@@ -21,6 +21,7 @@ use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
+use crate::shape::copy;
 use core::marker::PhantomData;
 
 /// What a matrix is eliminated by.
@@ -30,12 +31,7 @@ pub struct Planned<'a, M, E, const S: usize> {
     pub blocks: &'a [Block<E, S>],
 }
 
-impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
+copy!(['a, M, E, const S: usize] Planned<'a, M, E, S>);
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it
 /// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot

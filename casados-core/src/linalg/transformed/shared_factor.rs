@@ -24,13 +24,6 @@ pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
     rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Clone for SharedFactors<M, E, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, E: Lanes, const S: usize> Copy for SharedFactors<M, E, S> {}
-
 impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
     /// there for the `first_only` of stages that are alike, but not of a single lane.
