@@ -1,6 +1,6 @@
 //! The types: one number type over each kind of register.
 
-use super::functions::{self, Doubles, Single};
+use super::functions::{self, DoubleRegister, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]

@@ -1,8 +1,8 @@
 //! A number as a register of one: what machines without registers compute with.
 
-use super::Doubles;
+use super::DoubleRegister;
 
-impl Doubles for f64 {
+impl DoubleRegister for f64 {
     const FUSED: bool = false;
 
     #[inline(always)]

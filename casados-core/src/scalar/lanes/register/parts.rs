@@ -97,7 +97,7 @@ macro_rules! in_half_a_register {
 
 macro_rules! double {
     ($name:ident, $ops:ident) => {
-        impl Doubles for $name<{ $ops::WIDTH }> {
+        impl DoubleRegister for $name<{ $ops::WIDTH }> {
             const FUSED: bool = $ops::FUSED;
 
             #[inline(always)]
