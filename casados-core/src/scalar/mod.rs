@@ -15,6 +15,7 @@ mod each;
 mod field;
 mod float;
 pub(crate) mod lanes;
+mod number;
 mod real;
 mod rows;
 #[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
@@ -29,6 +30,7 @@ pub(crate) use field::{fast_two_sum, transposed, two_sum};
 pub use float::Float;
 #[doc(hidden)]
 pub use lanes::functions as elementary;
+pub(crate) use number::{as_it_is, mask_logic, one_mask, own_cell};
 #[doc(hidden)]
 pub use rows::Rows;
 pub(crate) use strided::Strided;
@@ -36,57 +38,6 @@ pub use tangent::Tangent;
 
 use crate::shape::Plain;
 use bytemuck::Zeroable;
-
-/// A number that lies in memory as itself.
-macro_rules! own_cell {
-    () => {
-        type Cell = Self;
-        #[inline(always)]
-        fn load(cell: &Self) -> Self {
-            *cell
-        }
-        #[inline(always)]
-        fn store(self, cell: &mut Self) {
-            *cell = self;
-        }
-    };
-}
-pub(crate) use own_cell;
-
-/// Comparisons of one number have one result: what a [`Field`] does with it.
-macro_rules! one_mask {
-    () => {
-        type Mask = bool;
-        #[inline(always)]
-        fn select(mask: bool, a: Self, b: Self) -> Self {
-            if mask { a } else { b }
-        }
-        #[inline(always)]
-        fn any(mask: bool) -> bool {
-            mask
-        }
-    };
-}
-pub(crate) use one_mask;
-
-/// What a [`Scalar`] does with it.
-macro_rules! mask_logic {
-    () => {
-        #[inline(always)]
-        fn and(a: bool, b: bool) -> bool {
-            a & b
-        }
-        #[inline(always)]
-        fn or(a: bool, b: bool) -> bool {
-            a | b
-        }
-        #[inline(always)]
-        fn not(a: bool) -> bool {
-            !a
-        }
-    };
-}
-pub(crate) use mask_logic;
 
 /// Who has one runs where the instructions of fused kernels are: AVX2, FMA, if `WIDE` AVX-512.
 ///
@@ -236,22 +187,6 @@ pub trait SideBySide<E, const S: usize> {
     /// With a register of them. To be `#[inline(always)]`.
     fn call<R: Lanes<Cell = [E; S]>>(self);
 }
-
-/// Numbers that are their own coarse ones.
-macro_rules! as_it_is {
-    () => {
-        type Coarse = Self;
-        #[inline(always)]
-        fn coarse(self) -> Self {
-            self
-        }
-        #[inline(always)]
-        fn fine(coarse: Self) -> Self {
-            coarse
-        }
-    };
-}
-pub(crate) use as_it_is;
 
 /// What nobody else can name.
 mod sealed {
