@@ -16,10 +16,9 @@ use nalgebra::{SMatrix, SVector};
 pub trait Plain: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static {}
 impl<T: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static> Plain for T {}
 
-/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
-/// on the parameters of the struct.
-macro_rules! plain {
-    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+/// `Copy` without the bounds of a derive.
+macro_rules! copy {
+    ([$($generics:tt)*] $type:ty) => {
         impl<$($generics)*> Clone for $type {
             #[inline(always)]
             fn clone(&self) -> Self {
@@ -27,6 +26,15 @@ macro_rules! plain {
             }
         }
         impl<$($generics)*> Copy for $type {}
+    };
+}
+pub(crate) use copy;
+
+/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
+/// on the parameters of the struct.
+macro_rules! plain {
+    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        crate::shape::copy!([$($generics)*] $type);
         crate::shape::compared!([$($generics)*] $type { $($field),* });
     };
 }
@@ -238,12 +246,6 @@ pub trait Shape: 'static {
 
     /// `[T; NX]`
     type ArrayX<T: Plain>: Array<T>;
-    /// `[T; NZ]`
-    type ArrayZ<T: Plain>: Array<T>;
-    /// `[T; NU]`
-    type ArrayU<T: Plain>: Array<T>;
-    /// `[T; NP]`
-    type ArrayP<T: Plain>: Array<T>;
     /// `[T; NK]`
     type ArrayK<T: Plain>: Array<T>;
     /// `[T; NV]`
@@ -297,8 +299,8 @@ pub trait Shape: 'static {
     type MatrixCP<T: Plain, const C: usize>: Matrix<T>;
 }
 
-/// The dimensions of a model. The last four follow from the first four (see [`Shape`]); they are
-/// written out because stable Rust cannot add in a type.
+/// The dimensions of a model. `NK`, `NV` and `NW` follow from the first four (see [`Shape`]); they
+/// are written out because stable Rust cannot add in a type.
 #[derive(Clone, Copy, Debug)]
 pub struct Dims<
     const NX: usize,
@@ -343,9 +345,6 @@ impl<
         NC
     };
     type ArrayX<T: Plain> = [T; NX];
-    type ArrayZ<T: Plain> = [T; NZ];
-    type ArrayU<T: Plain> = [T; NU];
-    type ArrayP<T: Plain> = [T; NP];
     type ArrayK<T: Plain> = [T; NK];
     type ArrayV<T: Plain> = [T; NV];
     type ArrayW<T: Plain> = [T; NW];

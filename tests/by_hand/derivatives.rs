@@ -185,7 +185,9 @@ for_methods!(dense_output_is_the_collocation_polynomial, B, {
         for position in [0.1, 0.45, 0.8] {
             let t = 0.2 + h * position;
             irk.solve(&x0, &u, h).unwrap();
+            let statistics = *irk.statistics();
             let dense = *irk.dense_forward(t).unwrap();
+            assert_eq!(*irk.statistics(), statistics);
             assert_eq!(irk.dense(t).unwrap(), &dense.dense);
             let expected = difference(
                 |w| {

@@ -56,7 +56,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
             euler.set_parameters(at.p)?;
         }
         euler.set_time(at.t)?;
-        euler.set_stages(y.as_ref())?;
+        euler.run.set_stages(y.as_ref())?;
         Ok(euler)
     }
 
@@ -91,7 +91,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         let start = *y;
         let solved = self.solve(at, y);
         match (&mut self.euler, solved) {
-            (Some(euler), Err(error)) => Err(euler.explain_from(error, start.as_ref())),
+            (Some(euler), Err(error)) => Err(euler.run.explain_from(error, start.as_ref())),
             (_, solved) => solved,
         }
     }
@@ -132,7 +132,7 @@ fn explain<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> 
         Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),
         other => return other,
     };
-    let Ok(points) = euler.points() else { return error };
+    let Ok(points) = euler.run.points() else { return error };
     let mut v = ArrayV::<M, T>::zeroed();
     for (v, [point]) in v.as_mut().iter_mut().zip(points.as_ref()) {
         *v = *point;

@@ -114,8 +114,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
             single.set_parameters(step.at.p)?;
         }
         single.set_time(step.at.t)?;
-        single.set_stages(step.y)?;
-        single.set_near(step.near)?;
+        single.run.set_stages(step.y)?;
+        single.run.set_near(step.near)?;
         Ok(single)
     }
 }

@@ -5,7 +5,7 @@ use crate::error::{Argument, Error};
 use crate::finite::{check_input, check_named};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape, copy};
 use bytemuck::Zeroable;
 
 /// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there
@@ -41,12 +41,7 @@ pub struct Intervals<'a, M: Dae, T: Plain = f64> {
     pub t0: &'a [T],
 }
 
-impl<M: Dae, T: Plain> Clone for Intervals<'_, M, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Plain> Copy for Intervals<'_, M, T> {}
+copy!(['a, M: Dae, T: Plain] Intervals<'a, M, T>);
 
 /// No interval at all: what is there is set in it.
 impl<M: Dae, T: Plain> Default for Intervals<'_, M, T> {
@@ -70,12 +65,7 @@ pub struct Interval<'a, M: Dae, T: Plain> {
     pub nu: &'a [T],
 }
 
-impl<M: Dae, T: Plain> Clone for Interval<'_, M, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Plain> Copy for Interval<'_, M, T> {}
+copy!(['a, M: Dae, T: Plain] Interval<'a, M, T>);
 
 /// All that a call was given, of the right lengths.
 pub struct Inputs<'a, M: Dae, T: Plain> {

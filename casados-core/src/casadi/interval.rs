@@ -208,7 +208,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     const RECORDS: bool = true;
     fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         tape.resize(self.options().steps, Zeroable::zeroed());
-        irk::Integrator::record(self, tape).map(|()| true)
+        self.copy_stages(tape).map(|()| true)
     }
     fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         self.set_solution(tape)

@@ -10,7 +10,7 @@ use super::forward::Variation;
 use super::scheme::{Grid, Scheme, is_zero};
 use super::step::{Own, Point, Record, add};
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, beside, kernels};
+use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
@@ -114,7 +114,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
     fn stage_seed [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
         scheme: &'k Scheme<M, E, S>,

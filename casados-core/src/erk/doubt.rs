@@ -2,7 +2,7 @@
 //! side by side each lane that has one is doubted, and the others go on.
 
 use crate::error::Error;
-use crate::linalg::{are_finite, beside, kernels};
+use crate::linalg::{are_finite, kernels, run_plain};
 use crate::scalar::Lanes;
 use crate::scalar::lanes::REGISTERS;
 use bytemuck::Zeroable;
@@ -59,7 +59,7 @@ impl<E: Lanes> Doubt<E> {
 /// without a branch for each.
 pub(super) const ONE_BY_ONE: bool = !REGISTERS;
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// Doubts lanes with a value that is not finite.
     fn notice [E: Lanes] [E] <A>(values: &'k [E], doubt: &'k mut Doubt<E>) {
         let mut finite = doubt.none();

@@ -9,7 +9,7 @@ use super::scheme::{Grid, Scheme};
 use super::step::{Base, Counts, Record};
 use super::sweeps::Sweeps;
 use crate::error::Error;
-use crate::linalg::{beside, kernels};
+use crate::linalg::{kernels, run_plain};
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
@@ -245,7 +245,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// The gradient `λᵀ dx`, of each direction in the first column.
     fn weigh [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
         dx: &'k ArrayX<M, ArrayW<M, E>>,

@@ -5,11 +5,11 @@ use super::scheme::{Grid, Scheme, is_zero};
 use super::step::{Base, Own, Point, Record, add};
 use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place};
-use crate::linalg::{Arithmetic, beside, kernels};
+use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Matrix, Shape};
+use crate::shape::{Array, Matrix, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -60,12 +60,7 @@ pub(super) struct Seeded<'a, M: Ode, T: Real, const C: usize> {
     pub columns: usize,
 }
 
-impl<M: Ode, T: Real, const C: usize> Clone for Seeded<'_, M, T, C> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Ode, T: Real, const C: usize> Copy for Seeded<'_, M, T, C> {}
+copy!(['a, M: Ode, T: Real, const C: usize] Seeded<'a, M, T, C>);
 
 impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
     #[inline(always)]
@@ -173,7 +168,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// The directions, of each state a row.
     pub fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
         one: E,

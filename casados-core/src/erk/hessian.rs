@@ -5,7 +5,7 @@ use super::scheme::{Scheme, directions, is_zero};
 use super::step::{Own, Point, add};
 use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, beside, kernels};
+use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 use crate::shape::Shape;
@@ -73,7 +73,7 @@ impl<M: Ode, E: Lanes> Curvature<M, E> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// `product = ∇²(μᵀ f) D`
     fn multiply [M: Ode, E: Lanes] [M, E] <A>(
         entries: &'k M::Hessian<[E; 1]>,

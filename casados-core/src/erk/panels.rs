@@ -9,7 +9,7 @@ use super::scheme::{Grid, Scheme};
 use super::step::{Base, Own, Point};
 use super::sweeps::Sweeps;
 use crate::error::{Error, Place};
-use crate::linalg::{beside, kernels};
+use crate::linalg::{kernels, run_plain};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 use crate::shape::Shape;
@@ -96,7 +96,7 @@ impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Panels<M, E, S> {
     }
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// Some columns.
     fn take [M: Ode, E: Lanes] [M, E] <A>(
         rows: &'k ArrayX<M, ArrayW<M, E>>,

@@ -4,7 +4,7 @@ use super::along::Beside;
 use super::doubt::{Doubt, ONE_BY_ONE};
 use super::scheme::{Grid, Scheme, is_zero};
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, beside, dispatch, dot_compensated, kernels, moved};
+use crate::linalg::{Arithmetic, dispatch, displaced, dot_compensated, kernels, run_plain};
 use crate::model::{ArrayK, ArrayV, ArrayX, Ode};
 use crate::result::Nominal;
 use crate::scalar::{Lanes, Strided};
@@ -140,7 +140,7 @@ fn check<E: Lanes>(
     })
 }
 
-kernels! { by beside;
+kernels! { by run_plain;
     /// The state of a stage and its time. The first state that is not finite, where they are looked
     /// at one by one.
     fn place [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
@@ -214,7 +214,7 @@ kernels! { by dispatch;
         for (index, ((end, rest), &x)) in end.iter_mut().zip(rest).zip(x).enumerate() {
             let slopes = record.k.iter().filter_map(|k| k.as_ref().get(index));
             let slope = dot_compensated::<A, E>(scheme.b.iter().zip(slopes));
-            [*end, *rest] = moved::<A, E>([x, *rest], *h, slope);
+            [*end, *rest] = displaced::<A, E>([x, *rest], *h, slope);
         }
     }
 }

@@ -8,7 +8,7 @@
 //! there is `ℓ_i(0) ν`.
 
 use super::driver::Parts;
-use super::workspace::{Linearization, Step, Work, copy};
+use super::workspace::{Linearization, Step, Work};
 use crate::error::Error;
 use crate::finite::check_output;
 use crate::irk::coefficients::Coefficients;
@@ -44,7 +44,6 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     nu: VectorZ<M, T>,
     weighted: bool,
 }
-copy!([M: Dae, T: Plain, const S: usize, const C: usize] Backward<M, T, S, C>);
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     /// `λ_N`: seeds in column-major order; and the weights of `z₀`, or none.
@@ -257,7 +256,6 @@ pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) result: Adjoint<M, T, C>,
     pub(crate) backward: Backward<M, T, S, C>,
 }
-copy!([M: Dae, T: Plain, const S: usize, const C: usize] AdjointMemory<M, T, S, C>);
 
 /// The memory of adjoints, of any number of seeds.
 pub struct Adjoints<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);

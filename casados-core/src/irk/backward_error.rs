@@ -16,7 +16,7 @@ use super::forward::sweep::Sweep;
 use super::workspace::{Linearization, Work};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
@@ -180,7 +180,7 @@ fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
 
 /// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
 #[inline(always)]
-fn moved<A: Arithmetic, E: Lanes, const S: usize>(
+fn displaced<A: Arithmetic, E: Lanes, const S: usize>(
     start: E,
     minus_ha: &Block<E, S>,
     (dk, dk_sizes): (&[E; S], &[E; S]),
@@ -221,7 +221,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
             return E::lt(zero, zero);
         }
-        let minus_ha = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
             *sizes = sizes_of(values);
         }
@@ -232,7 +232,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             }
             let size = sizes_of(&sum);
             if unknown < nx {
-                let xi = moved::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
+                let xi = displaced::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
                 (probe[unknown], sizes[unknown]) = (sum, size);
                 (probe[nx + unknown], sizes[nx + unknown]) = xi;
             } else {

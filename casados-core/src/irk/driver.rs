@@ -1,5 +1,5 @@
-//! What all calls of an integrator share: arguments checked, steps taken, and the record of them
-//! kept only if everything succeeded.
+//! What all calls of an integrator share: arguments checked, steps taken, and these kept only if
+//! everything succeeded.
 
 use super::step::Scheme;
 use super::workspace::{Step, Work};
@@ -25,14 +25,14 @@ pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
     pub coefficients: Coefficients<T, S>,
     pub statistics: Statistics,
     work: W::Nominal<Work<M, T, S, W::Fallback>>,
-    /// The record of the last successful call, and that of the call that runs.
+    /// The steps of the last successful call, and those of the call that runs.
     tapes: [W::Tape<Step<M, T, S>>; 2],
     last_tape: usize,
     /// Whether any call succeeded.
     any: bool,
-    /// Whether the record is a warm start.
+    /// Whether the last steps are a warm start.
     warm: bool,
-    /// Whether that record is the solution of the next call.
+    /// Whether their stages are the solution of the next call.
     solved: bool,
     given: bool,
     parameters: bool,
@@ -46,10 +46,11 @@ pub(crate) struct Arguments<'a, M: Dae, T: Real> {
     pub h: T,
 }
 
-/// What a call has to work with after its steps were taken.
+/// What a call has to work with after a step, and after all of them.
 pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
     pub work: &'a mut Work<M, T, S, F>,
     pub coefficients: &'a Coefficients<T, S>,
+    /// All steps; none as long as they are being taken.
     pub steps: &'a [Step<M, T, S>],
     pub statistics: &'a mut Statistics,
 }
@@ -64,7 +65,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
                 reason: "the memory of the integrator has fewer",
             });
         }
-        if !W::Fallback::KEPT && M::STRUCTURE.elimination.pivots.is_empty() {
+        if !W::Fallback::KEPT && !M::STRUCTURE.elimination.has_plan() {
             return Err(Error::NotPivoted { step: 0 });
         }
         let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::KEPT);
@@ -72,7 +73,12 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
             return Err(Error::NoInterpolation);
         }
-        Ok(Self {
+        Ok(Self::empty(options, coefficients, T::ZERO))
+    }
+
+    /// Without memory, and with nothing set but these.
+    fn empty(options: Options, coefficients: Coefficients<T, S>, time: T) -> Self {
+        Self {
             options,
             coefficients,
             statistics: Statistics::default(),
@@ -84,8 +90,21 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             solved: false,
             given: false,
             parameters: false,
-            time: T::ZERO,
-        })
+            time,
+        }
+    }
+
+    /// The tape of the last successful call, and that of the call that runs.
+    fn tapes(tapes: &mut [W::Tape<Step<M, T, S>>; 2], last: usize) -> [&mut W::Tape<Step<M, T, S>>; 2] {
+        let [first, second] = tapes;
+        if last == 0 { [first, second] } else { [second, first] }
+    }
+
+    /// The steps of the last successful call.
+    #[cfg(feature = "alloc")]
+    fn last_steps(&mut self) -> Result<&mut [Step<M, T, S>], Error> {
+        let [last, _] = Self::tapes(&mut self.tapes, self.last_tape);
+        W::tape(last, self.options.steps)
     }
 
     pub fn reserve(&mut self) -> Result<(), Error> {
@@ -160,8 +179,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         work.inputs.time.interval = arguments.h;
         work.inputs.time.step = arguments.h / T::from_whole(options.steps);
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
-        let [first, second] = tapes;
-        let (last, running) = if self.last_tape == 0 { (first, second) } else { (second, first) };
+        let [last, running] = Self::tapes(tapes, self.last_tape);
         // Both in the first call: later ones do not allocate.
         let steps = W::tape(running, options.steps)?;
         let last = W::tape(last, options.steps)?;
@@ -191,9 +209,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     /// innermost.
     #[cfg(feature = "alloc")]
     pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
-        let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
-        if let Some(step) = steps.first_mut() {
+        if let Some(step) = self.last_steps()?.first_mut() {
             for (to, from) in step.y.as_mut().as_flattened_mut().iter_mut().zip(y) {
                 *to = *from;
             }
@@ -218,10 +234,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
 
     /// The stages of every step, as a warm start.
     #[cfg(feature = "alloc")]
-    pub fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
-        for (step, y) in steps.iter_mut().zip(record) {
+    pub fn set_stages_of_steps(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        for (step, y) in self.last_steps()?.iter_mut().zip(stages) {
             crate::shape::assign(&mut *step.y, y);
         }
         (self.warm, self.solved) = (true, false);
@@ -230,13 +244,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
 
     /// The stages of every step of the next call.
     #[cfg(feature = "alloc")]
-    pub fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        self.set_record(record)?;
+    pub fn set_solution(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.set_stages_of_steps(stages)?;
         self.solved = true;
         Ok(())
     }
 
-    /// Everything succeeded: the record of this call is the one to keep.
+    /// Everything succeeded: the steps of this call are those to keep.
     pub fn keep(&mut self) -> Result<&Work<M, T, S, W::Fallback>, Error> {
         let work = W::nominal(&mut self.work)?;
         work.last_inputs = work.inputs;
@@ -252,8 +266,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             return Err(Error::NoResult);
         }
         let work = W::nominal(&mut self.work)?;
-        let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
+        let [last, _] = Self::tapes(&mut self.tapes, self.last_tape);
+        let steps = W::tape(last, self.options.steps)?;
         Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
     }
 }
@@ -263,20 +277,7 @@ impl<M: Dae, T: Real, const S: usize> Run<M, T, S, Heap> {
     /// The same settings with memory of its own. Parameters and start values for which there is no
     /// memory are as if they had never been set.
     pub fn fresh(&self) -> Self {
-        let mut run = Self {
-            options: self.options,
-            coefficients: self.coefficients.clone(),
-            statistics: Statistics::default(),
-            work: Default::default(),
-            tapes: Default::default(),
-            last_tape: 0,
-            any: false,
-            warm: false,
-            solved: false,
-            given: false,
-            parameters: false,
-            time: self.time,
-        };
+        let mut run = Self::empty(self.options, self.coefficients.clone(), self.time);
         let set = self.work.get().filter(|_| self.parameters || self.given);
         if let (Some(from), Ok(to)) = (set, <Heap>::nominal(&mut run.work)) {
             (to.parameters, to.given) = (from.parameters, from.given);

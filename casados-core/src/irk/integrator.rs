@@ -57,7 +57,7 @@ use core::marker::PhantomData;
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
-    pub(super) run: Run<M, T, S, W>,
+    pub(crate) run: Run<M, T, S, W>,
     pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,
     pub(super) directional: W::Directional<Directionals<M, T, S>>,
     pub(super) adjoint: W::Adjoint<Adjoints<M, T, S>>,
@@ -125,16 +125,7 @@ where
 #[cfg(feature = "alloc")]
 impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
     fn clone(&self) -> Self {
-        Self {
-            run: self.run.fresh(),
-            forward: Default::default(),
-            directional: Default::default(),
-            adjoint: Default::default(),
-            hessian: Default::default(),
-            hessian_tape: Default::default(),
-            sweep: None,
-            method: PhantomData,
-        }
+        Self::empty(self.run.fresh())
     }
 }
 
@@ -153,8 +144,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     pub const SIZE: usize = size_of::<Self>();
 
     pub(crate) fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
-        Ok(Self {
-            run: Run::new(options, tableau)?,
+        Ok(Self::empty(Run::new(options, tableau)?))
+    }
+
+    /// Without memory for derivatives.
+    fn empty(run: Run<M, T, S, W>) -> Self {
+        Self {
+            run,
             forward: Default::default(),
             directional: Default::default(),
             adjoint: Default::default(),
@@ -162,7 +158,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             hessian_tape: Default::default(),
             sweep: None,
             method: PhantomData,
-        })
+        }
     }
 
     /// As `build`, and what a first call would prepare: none takes longer than the others.
@@ -224,54 +220,23 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         &self.run.statistics
     }
 
-    /// Whether the start values of all following calls are solutions but for their last digits.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn set_near(&mut self, near: bool) -> Result<(), Error> {
-        self.run.set_near(near)
-    }
-
-    /// Start values of the stages of the first step, for an integrator with a warm start.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
-        self.run.set_stages(y)
-    }
-
-    /// The stages of every step, for an integrator with a warm start.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        self.run.set_record(record)
-    }
-
     /// The stages of every step of the next call, which has only to differentiate them.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
     #[cfg(feature = "alloc")]
-    pub fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        self.run.set_solution(record)
+    pub fn set_solution(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.run.set_solution(stages)
     }
 
     /// Copies the stages of every step of the last successful call.
     #[cfg(feature = "alloc")]
-    pub(crate) fn record(&mut self, record: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        for (y, step) in record.iter_mut().zip(self.run.last()?.steps) {
+    pub(crate) fn copy_stages(&mut self, to: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        for (y, step) in to.iter_mut().zip(self.run.last()?.steps) {
             crate::shape::assign(y, &step.y);
         }
         Ok(())
-    }
-
-    /// The variables at the stages where the last call ended, successful or not.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn points(&mut self) -> Result<&crate::model::ArrayV<M, [T; S]>, Error> {
-        self.run.points()
-    }
-
-    /// The error of the last call, whose first step started at `y`, with what that has to do with
-    /// it.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
-        self.run.explain_from(error, y)
     }
 
     /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages

@@ -111,7 +111,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         }
         let Step { x, y } = step;
         let mut undetermined = None;
-        if !M::STRUCTURE.elimination.pivots.is_empty() {
+        if M::STRUCTURE.elimination.has_plan() {
             let equations = StageEquations { coefficients, kept: None, n, x };
             let solved = self.newton(equations, options, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
@@ -162,7 +162,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ) -> Result<(), Error> {
         self.linearize_planned(coefficients, None, n, step, exact, statistics);
         self.check_model(n, 0)?;
-        if M::STRUCTURE.elimination.pivots.is_empty() {
+        if !M::STRUCTURE.elimination.has_plan() {
             self.factor_dense(coefficients, n, 0, statistics)?;
         }
         Ok(())
@@ -185,7 +185,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         statistics.jacobians += 1;
         self.evaluate_jacobian();
         let holds = exact || M::STRUCTURE.constant_matrix && self.validity.factors;
-        if !(holds || M::STRUCTURE.elimination.pivots.is_empty()) {
+        if !holds && M::STRUCTURE.elimination.has_plan() {
             statistics.factorizations += 1;
             let h = self.inputs.time.step;
             let Linearization { jacobian, factors } = &mut self.linear;

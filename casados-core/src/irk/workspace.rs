@@ -6,21 +6,8 @@ use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Lanes, Strided};
-use crate::shape::{Aligned, Plain, assign};
+use crate::shape::{Aligned, Plain, assign, copy};
 use bytemuck::Zeroable;
-
-/// `Copy` without the bounds of a derive.
-macro_rules! copy {
-    ([$($generics:tt)*] $type:ty) => {
-        impl<$($generics)*> Clone for $type {
-            fn clone(&self) -> Self {
-                *self
-            }
-        }
-        impl<$($generics)*> Copy for $type {}
-    };
-}
-pub(crate) use copy;
 
 /// One step: all that is needed to find out anything else about it.
 #[derive(Zeroable)]
@@ -122,10 +109,7 @@ pub(crate) struct Validity {
     pub rate: f64,
 }
 
-copy!([M: Dae, T: Plain, const S: usize] Step<M, T, S>);
 copy!([M: Dae, T: Plain] Inputs<M, T>);
-copy!([M: Dae, T: Plain, const S: usize, F: Fallback] Linearization<M, T, S, F>);
-copy!([M: Dae, T: Lanes, const S: usize, F: Fallback] Work<M, T, S, F>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     /// Copies what holds.

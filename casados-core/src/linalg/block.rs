@@ -12,7 +12,7 @@ pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
 /// `−hA` of a tableau: what states at the stages have of the derivatives there, with another sign.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn coupling<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> {
+pub fn minus_ha<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> {
     let mut block = [[h; S]; S];
     for (i, row) in a.iter().enumerate() {
         for (column, &a) in block.iter_mut().zip(row) {

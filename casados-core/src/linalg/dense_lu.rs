@@ -6,7 +6,7 @@
 use super::kernel::vector::{axpy, divide};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Plain};
+use crate::shape::{Array, Plain, copy};
 use bytemuck::Zeroable;
 
 /// A matrix over the unknowns of all stages, and after [`Dense::factor`] its factors.
@@ -21,12 +21,7 @@ pub struct Dense<M: Dae, T: Plain, const S: usize> {
     scales: ArrayK<M, [T; S]>,
 }
 
-impl<M: Dae, T: Plain, const S: usize> Clone for Dense<M, T, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Plain, const S: usize> Copy for Dense<M, T, S> {}
+copy!([M: Dae, T: Plain, const S: usize] Dense<M, T, S>);
 
 impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     /// `A = 0`

@@ -23,11 +23,11 @@ mod newton_matrix;
 mod sparse_lu;
 mod transformed;
 
-pub(crate) use block::{Packet, coupling, subtract, subtract_diagonal, subtract_transposed};
+pub(crate) use block::{Packet, minus_ha, subtract, subtract_diagonal, subtract_transposed};
 pub(crate) use kernel::{
     arithmetic::{Arithmetic, Block},
-    dispatch::{Kernel, beside, dispatch, kernels},
-    double_double::{dot_compensated, moved, two_product},
+    dispatch::{Kernel, dispatch, kernels, run_plain},
+    double_double::{displaced, dot_compensated, two_product},
     prefetch::Ahead,
     unroll::{AtRow, each_row, is_long, is_short},
     vector::{are_finite, axpy},

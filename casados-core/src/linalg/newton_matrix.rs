@@ -1,6 +1,6 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
-use super::block::coupling;
+use super::block::minus_ha;
 use super::dense_lu::Dense;
 use super::kernel::dispatch::{Kernel, dispatch};
 use super::kernel::unroll::{AtRow, each_row};
@@ -45,13 +45,6 @@ pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     /// Whether the dense factors are the ones that hold.
     is_dense: bool,
 }
-
-impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// Whether the whole matrix may be pivoted: not in registers, of which a lane that needs it is
@@ -126,12 +119,12 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, a, h, blocks } = self;
-        let coupling = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         let mut square = [[E::from_f64(0.0); S]; S];
         if const { !M::STRUCTURE.elimination.dependents.is_empty() } {
-            A::subtract_blocks(&mut square, &coupling, &coupling);
+            A::subtract_blocks(&mut square, &minus_ha, &minus_ha);
         }
-        each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, coupling, square, blocks });
+        each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, minus_ha, square, blocks });
     }
 }
 
@@ -139,7 +132,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
 struct Rows<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `−hA`
-    coupling: Block<E, S>,
+    minus_ha: Block<E, S>,
     /// `−(hA)²`
     square: Block<E, S>,
     blocks: &'a mut M::Factors<Block<E, S>>,
@@ -171,7 +164,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
                     column[stage] = column[stage] + value;
                 }
             } else {
-                let power = if of.order == 1 { &self.coupling } else { &self.square };
+                let power = if of.order == 1 { &self.minus_ha } else { &self.square };
                 for (column, power) in block.iter_mut().zip(power) {
                     A::subtract_products(column, &values, power);
                 }
@@ -182,13 +175,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, E>() } {
-            return;
-        }
-        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
-            *block = [[E::from_f64(0.0); S]; S];
-        }
+        factor::clear_fill::<M, E, _>(self.blocks.as_mut(), row, [[E::from_f64(0.0); S]; S]);
     }
 }
 

@@ -31,7 +31,7 @@ pub(crate) struct OneStep;
 /// [`Pivoting`] or [`Refusing`].
 pub trait Fallback: sealed::Sealed + 'static {
     /// A place for what only the fallback needs.
-    type Place<V: Stored + Copy>: Kept<V>;
+    type Place<V: Stored>: Kept<V>;
     /// Whether there is one.
     const KEPT: bool;
     /// Whether intervals may have several steps, and any options.
@@ -40,7 +40,7 @@ pub trait Fallback: sealed::Sealed + 'static {
 }
 
 /// A place that has a value, or has none.
-pub trait Kept<V>: Stored + Copy {
+pub trait Kept<V>: Stored {
     /// The value.
     fn get(&self) -> Option<&V>;
     /// The value, to be written.
@@ -49,12 +49,12 @@ pub trait Kept<V>: Stored + Copy {
 
 impl sealed::Sealed for Pivoting {}
 impl Fallback for Pivoting {
-    type Place<V: Stored + Copy> = Inside<V>;
+    type Place<V: Stored> = Inside<V>;
     const KEPT: bool = true;
 }
 impl sealed::Sealed for Refusing {}
 impl Fallback for Refusing {
-    type Place<V: Stored + Copy> = Absent;
+    type Place<V: Stored> = Absent;
     const KEPT: bool = false;
 }
 
@@ -62,12 +62,12 @@ impl Fallback for Refusing {
 impl sealed::Sealed for OneStep {}
 #[cfg(feature = "alloc")]
 impl Fallback for OneStep {
-    type Place<V: Stored + Copy> = Inside<V>;
+    type Place<V: Stored> = Inside<V>;
     const KEPT: bool = true;
     const INTERVALS: bool = false;
 }
 
-impl<V: Stored + Copy> Kept<V> for Inside<V> {
+impl<V: Stored> Kept<V> for Inside<V> {
     #[inline(always)]
     fn get(&self) -> Option<&V> {
         Some(&self.0)

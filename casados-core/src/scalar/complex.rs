@@ -7,7 +7,7 @@
 //! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
 //! complex elementary functions" (1987).
 
-use super::{Field, Rows, Scalar, own_cell};
+use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
 use num_complex::Complex64;
 
@@ -23,19 +23,13 @@ fn polar(r: f64, angle: f64) -> Complex64 {
 }
 
 impl Field for Complex64 {
-    type Mask = bool;
+    one_mask!();
 
     fn from_f64(value: f64) -> Self {
         c(value, 0.0)
     }
     fn is_smaller(self, other: Self) -> bool {
         self.norm_sqr() < other.norm_sqr()
-    }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        if mask { a } else { b }
-    }
-    fn any(mask: bool) -> bool {
-        mask
     }
 }
 
@@ -162,18 +156,15 @@ impl Scalar for Complex64 {
         )
     }
     fn hypot(self, other: Self) -> Self {
-        Scalar::sqrt(self * self + other * other)
+        let scale = [self, other].iter().fold(0.0, |scale, z| z.re.abs().max(z.im.abs()).max(scale));
+        if scale == 0.0 || !scale.is_finite() {
+            return Scalar::sqrt(self * self + other * other);
+        }
+        let (a, b) = (self / scale, other / scale);
+        Scalar::sqrt(a * a + b * b) * scale
     }
     fn powi(self, n: i32) -> Self {
-        let (mut power, mut base, mut left) = (c(1.0, 0.0), self, n.unsigned_abs());
-        while left > 0 {
-            if left & 1 == 1 {
-                power *= base;
-            }
-            base *= base;
-            left >>= 1;
-        }
-        if n < 0 { 1.0 / power } else { power }
+        power(self, n)
     }
     fn powf(self, other: Self) -> Self {
         if self.re < 0.0 && other.im == 0.0 {
@@ -209,13 +200,23 @@ impl Scalar for Complex64 {
     fn eq(self, other: Self) -> bool {
         self.re == other.re
     }
-    fn and(a: bool, b: bool) -> bool {
-        a & b
-    }
-    fn or(a: bool, b: bool) -> bool {
-        a | b
-    }
-    fn not(a: bool) -> bool {
-        !a
+    mask_logic!();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares of `1e200` and `1e-200` are not numbers that there are.
+    #[test]
+    fn hypotenuses_neither_overflow_nor_underflow() {
+        for scale in [1e-200, 1.0, 1e200] {
+            let (a, b) = (c(3.0 * scale, 1e-8 * scale), c(-4.0 * scale, 0.0));
+            let root = Scalar::hypot(a, b);
+            assert!((root.re / scale - 5.0).abs() <= 8.0 * f64::EPSILON, "{root}");
+            assert!((root.im / scale - 0.6e-8).abs() <= 8e-8 * f64::EPSILON, "{root}");
+        }
+        assert_eq!(Scalar::hypot(c(0.0, 0.0), c(0.0, 0.0)).re, 0.0);
+        assert_eq!(Scalar::hypot(c(3.0, 0.0), c(f64::INFINITY, 0.0)).re, f64::INFINITY);
     }
 }

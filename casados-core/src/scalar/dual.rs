@@ -10,25 +10,19 @@
 //!   `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
-use super::{Field, Rows, Scalar, own_cell};
+use super::{Field, Rows, Scalar, field::power, mask_logic, one_mask, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 
 macro_rules! dual {
     ($t:ty, $constant:expr; $($name:ident)*) => {
         impl Field for $t {
-            type Mask = bool;
+            one_mask!();
 
             fn from_f64(value: f64) -> Self {
                 Self::from(value)
             }
             fn is_smaller(self, other: Self) -> bool {
                 self.re.abs() < other.re.abs()
-            }
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
-            }
-            fn any(mask: bool) -> bool {
-                mask
             }
         }
 
@@ -63,15 +57,7 @@ macro_rules! dual {
             }
             fn powi(self, n: i32) -> Self {
                 if self.re == 0.0 && n >= 0 {
-                    let (mut power, mut base, mut left) = (Self::from(1.0), self, n);
-                    while left > 0 {
-                        if left & 1 == 1 {
-                            power *= base;
-                        }
-                        base *= base;
-                        left >>= 1;
-                    }
-                    return power;
+                    return power(self, n);
                 }
                 DualNum::powi(&self, n)
             }
@@ -107,15 +93,7 @@ macro_rules! dual {
             fn eq(self, other: Self) -> bool {
                 self.re == other.re
             }
-            fn and(a: bool, b: bool) -> bool {
-                a & b
-            }
-            fn or(a: bool, b: bool) -> bool {
-                a | b
-            }
-            fn not(a: bool) -> bool {
-                !a
-            }
+            mask_logic!();
         }
     };
     ($t:ty, $constant:expr) => {

@@ -142,13 +142,37 @@ pub trait Field:
     fn any(mask: Self::Mask) -> bool;
 }
 
+/// `baseⁿ`: squared and multiplied, and of a negative exponent the reciprocal.
+#[inline(always)]
+#[allow(dead_code)] // Single numbers with `std` have a method of their own.
+pub(crate) fn power<F: Field>(base: F, n: i32) -> F {
+    let (mut square, mut left) = (base, n.unsigned_abs());
+    let mut power = if left & 1 == 1 { base } else { F::from_f64(1.0) };
+    left >>= 1;
+    while left > 0 {
+        square = square * square;
+        if left & 1 == 1 {
+            power = power * square;
+        }
+        left >>= 1;
+    }
+    if n < 0 { power.reciprocal() } else { power }
+}
+
 /// `a + b`, rounded, and what rounding left of it: their sum is exact (D. Knuth).
 #[inline(always)]
-pub(crate) fn two_sum<E: Field>(a: E, b: E) -> [E; 2] {
+pub(crate) fn two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
     let sum = a + b;
     let second = sum - a;
     let first = sum - second;
     [sum, (a - first) + (b - second)]
+}
+
+/// The same where `a = 0` or `|a| ≥ |b|`, with half of the operations (T. J. Dekker).
+#[inline(always)]
+pub(crate) fn fast_two_sum<E: Copy + Add<Output = E> + Sub<Output = E>>(a: E, b: E) -> [E; 2] {
+    let sum = a + b;
+    [sum, b - (sum - a)]
 }
 
 /// Rows as columns.

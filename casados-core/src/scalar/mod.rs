@@ -15,6 +15,7 @@ mod each;
 mod field;
 mod float;
 pub(crate) mod lanes;
+mod number;
 mod real;
 mod rows;
 #[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
@@ -24,11 +25,12 @@ mod tangent;
 
 pub(crate) use each::each;
 pub use field::Field;
-pub(crate) use field::{transposed, two_sum};
+pub(crate) use field::{fast_two_sum, transposed, two_sum};
 #[doc(hidden)]
 pub use float::Float;
 #[doc(hidden)]
 pub use lanes::functions as elementary;
+pub(crate) use number::{as_it_is, mask_logic, one_mask, own_cell};
 #[doc(hidden)]
 pub use rows::Rows;
 pub(crate) use strided::Strided;
@@ -36,22 +38,6 @@ pub use tangent::Tangent;
 
 use crate::shape::Plain;
 use bytemuck::Zeroable;
-
-/// A number that lies in memory as itself.
-macro_rules! own_cell {
-    () => {
-        type Cell = Self;
-        #[inline(always)]
-        fn load(cell: &Self) -> Self {
-            *cell
-        }
-        #[inline(always)]
-        fn store(self, cell: &mut Self) {
-            *cell = self;
-        }
-    };
-}
-pub(crate) use own_cell;
 
 /// Who has one runs where the instructions of fused kernels are: AVX2, FMA, if `WIDE` AVX-512.
 ///
@@ -201,22 +187,6 @@ pub trait SideBySide<E, const S: usize> {
     /// With a register of them. To be `#[inline(always)]`.
     fn call<R: Lanes<Cell = [E; S]>>(self);
 }
-
-/// Numbers that are their own coarse ones.
-macro_rules! as_it_is {
-    () => {
-        type Coarse = Self;
-        #[inline(always)]
-        fn coarse(self) -> Self {
-            self
-        }
-        #[inline(always)]
-        fn fine(coarse: Self) -> Self {
-            coarse
-        }
-    };
-}
-pub(crate) use as_it_is;
 
 /// What nobody else can name.
 mod sealed {

@@ -1,16 +1,16 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, own_cell};
+use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, mask_logic, one_mask, own_cell};
 #[cfg(not(feature = "std"))]
-use super::{double, single};
+use super::{double, field::power, single};
 
 /// The methods of one real type, from `std` where it is there, else from `libm`, `single` and
 /// `double`.
 macro_rules! real {
     ($t:ident, $compiled:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {
-            type Mask = bool;
+            one_mask!();
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
@@ -29,14 +29,6 @@ macro_rules! real {
             #[inline(always)]
             fn is_smaller(self, other: Self) -> bool {
                 <$t>::abs(self) < <$t>::abs(other)
-            }
-            #[inline(always)]
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
-            }
-            #[inline(always)]
-            fn any(mask: bool) -> bool {
-                mask
             }
         }
 
@@ -80,23 +72,12 @@ macro_rules! real {
                 #[cfg(not(feature = "std"))]
                 return $powf(self, other);
             }
-            // Square and multiply; of a negative exponent, the reciprocal of the positive power.
             #[inline(always)]
             fn powi(self, n: i32) -> Self {
                 #[cfg(feature = "std")]
                 return <$t>::powi(self, n);
                 #[cfg(not(feature = "std"))]
-                {
-                    let (mut power, mut base, mut left) = (1.0, self, n.unsigned_abs());
-                    while left > 0 {
-                        if left & 1 == 1 {
-                            power *= base;
-                        }
-                        base *= base;
-                        left >>= 1;
-                    }
-                    if n < 0 { 1.0 / power } else { power }
-                }
+                return power(self, n);
             }
             #[inline(always)]
             fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
@@ -122,18 +103,7 @@ macro_rules! real {
             fn eq(self, other: Self) -> bool {
                 self == other
             }
-            #[inline(always)]
-            fn and(a: bool, b: bool) -> bool {
-                a & b
-            }
-            #[inline(always)]
-            fn or(a: bool, b: bool) -> bool {
-                a | b
-            }
-            #[inline(always)]
-            fn not(a: bool) -> bool {
-                !a
-            }
+            mask_logic!();
         }
 
         impl Sealed for $t {}

@@ -71,12 +71,12 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
             next[column] += 1;
         }
     }
-    beside(&terms, &next)
+    interleaved(&terms, &next)
 }
 
 /// Terms row by row, given where each row ends, such that those of rows with the same columns
 /// alternate.
-const fn beside<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
+const fn interleaved<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
     // Rows with the same columns are near each other, if there are any.
     const NEAR: usize = 8;
     let (mut terms, mut place, mut done, mut row) = (*by_row, 0, [false; C], 0);

@@ -54,6 +54,12 @@ impl Elimination {
         dependents: &[],
     };
 
+    /// Whether there is a plan.
+    #[must_use]
+    pub const fn has_plan(&self) -> bool {
+        !self.pivots.is_empty()
+    }
+
     /// How many blocks are fill.
     #[must_use]
     pub const fn fill(&self) -> usize {

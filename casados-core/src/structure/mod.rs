@@ -52,7 +52,8 @@ pub struct Structure {
     /// Read by right-hand sides of derivatives.
     pub by_column: &'static [u32],
     /// Entries of the Jacobian that are constant.
-    /// Read by [`Dae::describe`](crate::Dae::describe).
+    /// Read by [`is_explicit`](Self::is_explicit), [`Dae::describe`](crate::Dae::describe) and
+    /// pictures.
     pub constant: &'static [bool],
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.
     /// Read by second derivatives of one stage.
@@ -74,9 +75,9 @@ pub struct Structure {
     /// Read by initial guesses.
     pub autonomous: bool,
     /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton
-    /// matrix depend on the step size and the tableau only, so that they are assembled once; and
-    /// one exact iteration of Newton's method satisfies these equations to rounding.
-    /// Read by [`Dae::describe`](crate::Dae::describe).
+    /// matrix depend on the step size and the tableau only, and one exact iteration of Newton's
+    /// method satisfies these equations to rounding.
+    /// Read by [`Dae::describe`](crate::Dae::describe) and by checks of a model.
     pub constant_rows: &'static [bool],
     /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable
     /// but a derivative, or none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the

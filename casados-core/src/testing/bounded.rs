@@ -5,7 +5,7 @@
 //! emitted code it yields condition times epsilon of every entry, which is what tolerances of
 //! comparisons are made of.
 
-use crate::scalar::{Field, Lanes, Rows, Scalar, Sealed, own_cell};
+use crate::scalar::{Field, Lanes, Rows, Scalar, Sealed, mask_logic, one_mask, own_cell};
 use bytemuck::Zeroable;
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -119,19 +119,13 @@ macro_rules! functions {
 }
 
 impl Field for Bounded {
-    type Mask = bool;
+    one_mask!();
 
     fn from_f64(value: f64) -> Self {
         Self::exact(value)
     }
     fn is_smaller(self, other: Self) -> bool {
         self.value.abs() < other.value.abs()
-    }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        if mask { a } else { b }
-    }
-    fn any(mask: bool) -> bool {
-        mask
     }
 }
 
@@ -208,15 +202,7 @@ impl Scalar for Bounded {
     fn eq(self, other: Self) -> bool {
         self.value == other.value
     }
-    fn and(a: bool, b: bool) -> bool {
-        a & b
-    }
-    fn or(a: bool, b: bool) -> bool {
-        a | b
-    }
-    fn not(a: bool) -> bool {
-        !a
-    }
+    mask_logic!();
 }
 
 impl Sealed for Bounded {}

@@ -3,7 +3,7 @@
 use crate::function::{ArrayY, Function};
 use crate::model::{ArrayV, ArrayX, Dae};
 use crate::scalar::Real;
-use crate::shape::{Outputs, Shape};
+use crate::shape::{Outputs, Shape, copy};
 use bytemuck::Zeroable;
 
 /// In which direction a function crosses zero.
@@ -100,12 +100,7 @@ impl<M: Dae, T: Real> Event<M, T> {
     }
 }
 
-impl<M: Dae, T: Real> Clone for Event<M, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Real> Copy for Event<M, T> {}
+copy!([M: Dae, T: Real] Event<M, T>);
 
 impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -130,12 +125,7 @@ pub(super) struct Map<M: Dae, T: Real> {
     hessian: Curvature<M, T>,
 }
 
-impl<M: Dae, T: Real> Clone for Map<M, T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, T: Real> Copy for Map<M, T> {}
+copy!([M: Dae, T: Real] Map<M, T>);
 
 /// `y` of a function, from one that writes it.
 fn outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F, T>)) {

@@ -238,7 +238,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             pass.linearize((HessianStep::<M, E, S>::DIRECT && !last).then_some(linear), n, step, exact);
             // That of the last step is still there on the way back.
             if !(HessianStep::<M, E, S>::DIRECT || last) {
-                record.record(pass.work);
+                record.remember(pass.work);
             }
             let (linear, curved) = record.parts();
             let kept = (!last).then_some(&*linear);

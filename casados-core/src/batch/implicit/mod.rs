@@ -22,7 +22,7 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
 
     const ITERATES: bool = true;
     // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-    const TOGETHER: bool = !M::STRUCTURE.elimination.pivots.is_empty();
+    const TOGETHER: bool = M::STRUCTURE.elimination.has_plan();
 
     fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         Self::build(*options, *tableau)
@@ -50,7 +50,7 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
     fn start(&mut self, stages: Option<&[ArrayK<M, [T; S]>]>, solved: bool) -> Result<(), Error> {
         match stages {
             Some(stages) if solved => self.set_solution(stages),
-            Some(stages) => self.set_record(stages),
+            Some(stages) => self.run.set_stages_of_steps(stages),
             None => {
                 self.reset();
                 Ok(())
@@ -59,7 +59,7 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
     }
 
     fn stages(&mut self, to: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        self.record(to)
+        self.copy_stages(to)
     }
 
     fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::finite::check_output;
 use crate::irk::directions::Seeded;
 use crate::irk::driver::Parts;
-use crate::irk::workspace::{Work, copy};
+use crate::irk::workspace::Work;
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayW, Dae};
 use crate::result::{Directional, Seeds};
@@ -24,7 +24,6 @@ pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     /// The seeds, one row for each element of `w`.
     seeds: ArrayW<M, [T; C]>,
 }
-copy!([M: Dae, T: Plain, const S: usize, const C: usize] DirectionalMemory<M, T, S, C>);
 
 /// The memory of sensitivities in directions, of any number.
 pub struct Directionals<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);

@@ -1,10 +1,4 @@
-//! Forward sensitivities: implicit function theorem at the converged stages.
-//!
-//! ```text
-//! J dK = −(f_x,i V_n + f_w,i)        V_{n+1} = V_n + h Σ_i b_i dk_i
-//! ```
-//!
-//! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
+//! The forward pass in all directions `w = (x₀, u, p)` side by side, and its memory.
 
 use super::gradient::check_result;
 use super::matrices::Split;
@@ -13,7 +7,7 @@ use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{ArrayC, Identity};
 use crate::irk::driver::Parts;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work};
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::result::{DenseForward, Forward, ForwardAdjoint, Nominal};
@@ -29,7 +23,6 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) pass: ForwardPass<M, T, S>,
 }
-copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
 /// A pass over the steps, which writes to results elsewhere.
 #[derive(Zeroable)]
@@ -39,7 +32,6 @@ pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
     /// Zero if all derivatives of `z` are finite, else NaN.
     finite: [T; 1],
 }
-copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
     /// A step that is linearised, by the factors that were `kept` or are there, as

@@ -17,10 +17,10 @@ use super::checksum::total;
 use super::dense_fallback::put;
 use super::output::Target;
 use super::sweep::{Linearized, Outputs, Sweep};
-use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::{Coefficients, stage_values};
 use crate::irk::directions::{Directions, panel, panel_mut, panels};
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, slot};
+use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Piece, Real, SideBySide, Tangent};
@@ -159,26 +159,14 @@ impl<M: Dae, T: Real, const S: usize, const W: usize> Kernel for Aim<'_, M, T, S
         if c >= W || probe.len() < M::Shape::NX + dy.len() {
             return;
         }
-        // Columns of −hA: the stages of an unknown are a vector.
-        let mut columns = [[h; S]; S];
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in columns.iter_mut().zip(row) {
-                column[i] = -(h * a);
-            }
-        }
+        let minus_ha = minus_ha(a, h);
         let (xdot, rest) = probe.split_at_mut(v.len());
         let (xi, z) = rest.split_at_mut(v.len());
         for (to, from) in xdot.iter_mut().chain(z).zip(dy) {
             *to = from.map(|row| row[c]);
         }
         for ((xi, row), dk) in xi.iter_mut().zip(v).zip(xdot.iter()) {
-            let mut sum = [row[c]; S];
-            for (column, &dk) in columns.iter().zip(dk) {
-                for (sum, &element) in sum.iter_mut().zip(column) {
-                    *sum = A::subtract(*sum, element, dk);
-                }
-            }
-            *xi = sum;
+            *xi = stage_values::<A, T, S>(row[c], &minus_ha, dk);
         }
     }
 }

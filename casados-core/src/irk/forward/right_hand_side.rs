@@ -7,7 +7,7 @@
 
 use crate::irk::directions::{Directions, panel_of};
 use crate::irk::jacobian_entries::entry;
-use crate::irk::kinematic::{Forward, dependence, minus_c};
+use crate::irk::kinematic::{KinematicPanel, dependence, minus_c};
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
 use crate::model::{Dae, Dependent};
 use crate::scalar::{Lanes, each};
@@ -179,7 +179,7 @@ fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
 
 /// The same of a panel, whatever `V_n` is.
 pub(in crate::irk) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    pub kinematic: Forward<'a, M, E, D, S, W>,
+    pub kinematic: KinematicPanel<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
     pub dy: &'a mut [Packet<E, S, W>],
 }
@@ -206,7 +206,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
             self.row_by_row::<A>();
         }
         self.kinematic.subtract_derivatives::<A>(self.dy);
-        let Forward { jacobian, directions, column, .. } = self.kinematic;
+        let KinematicPanel { jacobian, directions, column, .. } = self.kinematic;
         each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy: &mut *self.dy, column });
     }
 

@@ -8,16 +8,16 @@ use super::stage_rows::CurvedRows;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
-use crate::irk::kinematic::Forward;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::kinematic::KinematicPanel;
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, coupling, dispatch, is_long, is_short,
-    kernels, sweeps,
+    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, dispatch, is_long, is_short, kernels,
+    minus_ha, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Aligned, Array, Plain, Shape};
+use crate::shape::{Aligned, Array, Plain, Shape, copy};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -39,7 +39,6 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     /// Zero if all that was written to a result after the last step is finite, else NaN.
     pub(in crate::irk) finite: [T; 1],
 }
-copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
 
 /// A step that is linearised, and the directions that go through it.
 pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
@@ -261,7 +260,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         for weight in &mut minus_weights {
             *weight = -(h * *weight);
         }
-        let shared = &Shared { nodes, minus_ha: coupling(&coefficients.a, h), minus_weights };
+        let shared = &Shared { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
         panels!(D::COLUMNS, E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum
@@ -320,7 +319,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
         if const { !Self::UNIT } && !(self.first && D::SPARSE) {
-            let kinematic = Forward { jacobian, v, directions, column };
+            let kinematic = KinematicPanel { jacobian, v, directions, column };
             Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
             place::<M, E, D, S, W>(jacobian, nodes, &mut self.placed, dy, column);
@@ -342,7 +341,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
             return;
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
-        let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
+        let kinematic = KinematicPanel::<M, E, D, S, W> { jacobian, v, directions, column };
         let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
         if const { !Self::sums_late::<A>() } && self.phase != Phase::After {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);

@@ -22,8 +22,8 @@ use crate::irk::forward::sweep::Phase;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Factors, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling,
-    dispatch, is_long, sweeps,
+    Ahead, Arithmetic, Block, Factors, Kernel, Packet, Planned, TransposedDown, TransposedUp, dispatch,
+    is_long, minus_ha, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -36,7 +36,7 @@ use core::marker::PhantomData;
 /// panels do not. Only of single numbers: registers of them leave no room for packets.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
-    if COLUMNS < 16 || size_of::<E>() > 8 || structure.elimination.pivots.is_empty() {
+    if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
         return false;
     }
     // Each of its products is an operation for the sum, too.
@@ -96,7 +96,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> MatrixAdjoint<'_, M, E, R, S
             only,
             jacobian: &linear.jacobian,
             factors: linear.factors.planned(),
-            minus_ha: coupling(&coefficients.a, h),
+            minus_ha: minus_ha(&coefficients.a, h),
             minus_hb: coefficients.b.map(|b| -(h * b)),
             entries,
             d,

@@ -41,7 +41,8 @@ impl<E: Lanes, const S: usize> Inverse<E, S> {
     /// No more than this may `Σ |b_i (A⁻¹ 1)_i|` be: so often rounding errors of `Λ` are added.
     const MOST: f64 = 16.0;
 
-    /// Of a tableau whose `A` has an inverse that is good enough, and steps of a size.
+    /// Of a tableau whose `A` has an inverse that is good enough, and steps of a size that has a
+    /// reciprocal: not of length zero.
     pub fn new(coefficients: &Coefficients<E, S>, h: E) -> Option<Self> {
         let ones = solve_ones(*coefficients.tableau.a());
         let (mut keep, mut size, mut minus_weights) = (1.0, 0.0, [E::from_f64(0.0); S]);
@@ -50,8 +51,9 @@ impl<E: Lanes, const S: usize> Inverse<E, S> {
             size += (b * one).abs();
             *to = E::from_f64(-one) * h.reciprocal();
         }
+        let finite = minus_weights.iter().all(|weight| E::all(weight.is_finite()));
         // What is not finite is not small either.
-        (size <= Self::MOST).then_some(Self { minus_weights, keep: E::from_f64(keep) })
+        (finite && size <= Self::MOST).then_some(Self { minus_weights, keep: E::from_f64(keep) })
     }
 }
 

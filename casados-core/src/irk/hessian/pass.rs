@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::ArrayC;
 use crate::irk::driver::Parts;
 use crate::irk::stage_array::Stages;
-use crate::irk::workspace::{Linearization, Step, Work, copy};
+use crate::irk::workspace::{Linearization, Step, Work};
 use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
@@ -37,7 +37,6 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
     pub(crate) pass: HessianPass<M, T, S>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 
 /// A pass over the steps, from the last to the first, which writes to a result elsewhere.
 #[derive(Zeroable)]
@@ -53,7 +52,6 @@ pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     /// Entries of `∇²(μᵀ f)` at all stages.
     entries: Aligned<Stages<M::Hessian<[T; S]>, T, S>>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianPass<M, T, S>);
 
 /// What the way back needs of a step.
 #[derive(Zeroable)]
@@ -63,7 +61,6 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting>
     /// The rows of `D` at all stages that enter second derivatives, in panels.
     d: Aligned<ArrayV<M, [ArrayC<M, T>; S]>>,
 }
-copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     /// Whether the factors of every step are made where they will be kept: no other step has the
@@ -71,7 +68,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     #[cfg(feature = "alloc")]
     pub(crate) const DIRECT: bool = {
         let structure = &M::STRUCTURE;
-        !(structure.linear_in_state || structure.constant_matrix || structure.elimination.pivots.is_empty())
+        !(structure.linear_in_state || structure.constant_matrix || !structure.elimination.has_plan())
     };
 
     /// Where the way forth writes `D`.
@@ -85,7 +82,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     }
 
     /// Remembers the linearisation on the way forth.
-    pub(crate) fn record(&mut self, work: &Work<M, E, S, F>) {
+    pub(crate) fn remember(&mut self, work: &Work<M, E, S, F>) {
         self.linear.copy_from(&work.linear);
     }
 
@@ -104,15 +101,15 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     pub(crate) fn run<F: Fallback>(
         &mut self,
         mut parts: Parts<'_, M, T, S, F>,
-        records: &[HessianStep<M, T, S, F>],
+        kept: &[HessianStep<M, T, S, F>],
         [lambda, nu]: [&[T]; 2],
         ahead: &[T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
         let steps = parts.steps;
-        for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            let kept = &mut record.kept(n + 1 == steps.len());
+        for (n, (step, remembered)) in steps.iter().zip(kept).enumerate().rev() {
+            let kept = &mut remembered.kept(n + 1 == steps.len());
             self.backward.step(&mut parts, kept, n, step, &mut along)?;
             let Parts { work, coefficients, .. } = &mut parts;
             self.curvature(work, coefficients, n, step);
@@ -124,7 +121,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(work, *kept, coefficients, record, [n, steps.len()], ahead);
+            self.subtract(work, *kept, coefficients, remembered, [n, steps.len()], ahead);
         }
         Ok(())
     }

@@ -20,7 +20,7 @@ use crate::irk::directions::Directions;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, coupling, dispatch, each_row, kinematic, slot,
+    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, dispatch, each_row, kinematic, minus_ha, slot,
     subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
@@ -148,7 +148,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, a, h, rows } = self;
-        around::<A, M, E, S, W, WHAT>(jacobian, &coupling(a, h), rows);
+        around::<A, M, E, S, W, WHAT>(jacobian, &minus_ha(a, h), rows);
     }
 }
 
@@ -255,7 +255,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
 }
 
 /// A panel of forward sensitivities.
-pub(super) struct Forward<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+pub(super) struct KinematicPanel<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// `V` at the start of the step.
     pub v: &'a [[E; W]],
@@ -264,7 +264,7 @@ pub(super) struct Forward<'a, M: Dae, E: Plain, D, const S: usize, const W: usiz
     pub column: usize,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward<'_, M, E, D, S, W> {
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> KinematicPanel<'_, M, E, D, S, W> {
     /// `c V_v`
     #[inline(always)]
     pub fn own<A: Arithmetic>(&self, of: &Kinematic) -> [E; W] {
@@ -330,9 +330,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
     }
 }
 
-/// See [`Forward::reconstruct`].
+/// See [`KinematicPanel::reconstruct`].
 struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
-    of: &'b Forward<'a, M, E, D, S, W>,
+    of: &'b KinematicPanel<'a, M, E, D, S, W>,
     minus_ha: &'b Block<E, S>,
     rows: &'b mut [Packet<E, S, W>],
     visitor: &'b mut V,

@@ -6,7 +6,7 @@ use crate::irk::coefficients::nodes;
 use crate::irk::coefficients::stage_values;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Work;
-use crate::linalg::{coupling, kernels, kinematic};
+use crate::linalg::{kernels, kinematic, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::Lanes;
@@ -97,7 +97,7 @@ kernels! {
         h: E,
     ) {
         let (points, y) = (points.as_mut(), y.as_mut());
-        let minus_ha = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         for state in 0..count::<M>() {
             let Some(of) = kinematic::<M>(state) else { continue };
             if let Some(v) = velocity::<M>(of)
@@ -173,7 +173,7 @@ kernels! {
         a: &'k [[E; S]; S],
         h: E,
     ) {
-        let minus_ha = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         for dependent in M::STRUCTURE.elimination.dependents {
             let of = kinematic::<M>(dependent.state as usize);
             let residual = of.and_then(|of| f.as_ref().get(of.equation as usize)).copied();

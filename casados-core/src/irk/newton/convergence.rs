@@ -4,9 +4,9 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
 
-/// Unknowns that were larger than their first increment, and have moved by no more than so much of
-/// their size since then, still are of that size, and what follows them too, whose increments count
-/// for so much of their bound ([`TYPICAL`](super::norm)).
+/// If an unknown has moved by less than this part of its size since it was measured, its size is
+/// still valid, and so is that of kinematic states which follow from it. (Of an unknown that was no
+/// larger than its first increment nothing is known.)
 const LITTLE_MOVED: f64 = 1.0 / 8.0;
 
 /// What is known of every lane. One that is neither active nor has converged has failed.

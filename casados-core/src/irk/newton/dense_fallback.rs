@@ -1,14 +1,15 @@
-//! The careful way: Newton's method with the current Jacobian in every iteration, the whole matrix
-//! pivoted, and every value looked at. It is taken where there is no plan of elimination, and where
-//! the fast way did not arrive: then it gives the solution, or says what is wrong.
+//! The careful way: Newton's method with the current Jacobian in every iteration, or that of the
+//! first one if it is to be [frozen](Jacobian::Frozen), the whole matrix pivoted, and every value
+//! looked at. It is taken where there is no plan of elimination, and where the fast way did not
+//! arrive: then it gives the solution, or says what is wrong.
 //!
-//! It has converged as soon as one of these holds, both of them invariant under scaling of
-//! equations and of variables:
+//! A fixed number of iterations is made without a test. Others have converged as soon as one of
+//! these holds, both of them invariant under scaling of equations and of variables:
 //! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
 //! - the increment that would come next, at most `θ/(1−θ) ‖Δ‖`, is below the tolerance.
 //!
 //! Where rounding errors of the model are larger than expected, residual and increments stop
-//! shrinking. Then it has converged too if either is small: more cannot be known.
+//! shrinking. Then they have converged too if either is small: more cannot be known.
 
 use crate::error::{Error, Place, Quantity};
 use crate::finite::not_finite;
@@ -120,7 +121,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ) -> Result<(), Error> {
         let h = self.inputs.time.step;
         statistics.factorizations += 1;
-        statistics.dense += usize::from(!M::STRUCTURE.elimination.pivots.is_empty());
+        statistics.dense += usize::from(M::STRUCTURE.elimination.has_plan());
         self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(|missing| {
             match missing {
                 Some((unknown, stage)) => Error::Singular {

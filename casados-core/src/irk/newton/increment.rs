@@ -1,7 +1,6 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::norm::{KinematicScales, Measure};
-use super::norm::{part, part_mut};
+use super::norm::{KinematicScales, Measure, larger_strand, part, part_mut};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kernels, kinematic, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
@@ -119,10 +118,9 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             subtract(core::array::from_mut(y), increment, active);
             others.take(increment, core::array::from_ref(weight), core::array::from_mut(size));
         }
-        let ([largest, excess, sum], others) = (some.total(), others.total());
-        let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
-        let number = E::le(sum.abs(), E::from_f64(f64::MAX));
-        (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
+        let ([largest, excess, sum], [of_others, others_excess, others_sum]) = (some.total(), others.total());
+        let size = larger_strand([[largest, sum], [of_others, others_sum]]);
+        (size, E::select(E::le(excess.max(others_excess), zero), zero, infinite))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Newton's method on the stages of one step.
 //!
 //! ```text
-//! J Δ = −f(y),   y ← y + Δ
+//! J Δ = f(y),   y ← y − Δ
 //! ```
 //!
 //! Increments are measured relative to the size of each unknown,
@@ -32,12 +32,13 @@ use super::increment::{PlaceResidual, Update, largest, subtract_increment};
 use super::jacobian_policy::Policy;
 use super::norm::{KinematicScales, Measure};
 use crate::irk::coefficients::Coefficients;
-use crate::irk::workspace::{Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::Lanes;
+use crate::shape::copy;
 use crate::statistics::Statistics;
 use core::mem::take;
 
@@ -45,7 +46,7 @@ use core::mem::take;
 const ROUNDING: f64 = 1.0;
 /// Where sums over the steps are compensated, what an iteration leaves undone must not add up
 /// either: it has the same sign in every step.
-const LITTLE: f64 = 1.0 / 64.0;
+const COMPENSATED_ROUNDING: f64 = 1.0 / 64.0;
 
 /// Linear equations are refined so often if one iteration was not enough.
 const REFINEMENTS: usize = 4;
@@ -117,7 +118,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     ) -> Solved<E> {
         let (StageEquations { coefficients, mut kept, .. }, newton) = (equations, &options.newton);
         let exact = M::STRUCTURE.linear_in_state;
-        let rounding = if options.compensated { LITTLE } else { ROUNDING } * E::EPSILON;
+        let rounding = if options.compensated { COMPENSATED_ROUNDING } else { ROUNDING } * E::EPSILON;
         let tolerances = Tolerances { tolerance: newton.tolerance.max(rounding), rounding };
         let may_share = const { Self::SHARES } && newton.jacobian.is_adaptive() && !exact;
         let basis = coefficients.basis.as_ref().filter(|_| may_share);
@@ -311,12 +312,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// double precision they take no operation of it.
     fn iterate(
         &mut self,
-        StageEquations { coefficients, mut kept, n, x }: StageEquations<'_, M, E, S, F>,
+        equations: StageEquations<'_, M, E, S, F>,
         jacobian: Jacobian,
         count: usize,
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
     ) -> Solved<E> {
+        let StageEquations { coefficients, mut kept, .. } = equations;
         let valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
@@ -324,11 +326,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         for iteration in 0..count {
             let missing = self.is_missing(!valid);
-            if missing {
-                self.place(coefficients, n, x, y);
-            } else {
-                self.place_unknowns(coefficients, n, x, y);
-            }
+            self.place_iterate(equations, y, missing, false);
             if valid || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
                 self.evaluate_residual();
@@ -339,9 +337,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 kept = None;
                 self.factor(coefficients);
             }
-            if missing {
-                self.eliminate_missing(coefficients);
-            }
+            self.complete_residual(coefficients, missing, false);
             statistics.iterations += 1;
             self.place_residual();
             kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);

@@ -18,13 +18,13 @@ use core::marker::PhantomData;
 
 /// The first shared Jacobian is that of start values, which may be far away: that increments grow
 /// with it is not its fault.
-const FAR: usize = 1;
+const FIRST_RENEWAL: usize = 1;
 /// So often the shared Jacobian is renewed in a step before the stages' own are taken.
-const MEANS: usize = 3;
+const MAX_SHARED_RENEWALS: usize = 3;
 
 /// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian,
 /// with which increments never shrink quadratically.
-const STILL: [f64; 2] = [2.0, 3.0];
+const ITERATIONS_AFTER_RENEWAL: [f64; 2] = [2.0, 3.0];
 
 /// The state of the rule while a step is solved.
 pub(super) struct Policy<M, E, const S: usize> {
@@ -102,7 +102,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
     /// the stages, their own Jacobians are taken.
     #[inline(always)]
     fn shares(&self) -> bool {
-        self.may_share && (self.simplified || self.renewals < MEANS)
+        self.may_share && (self.simplified || self.renewals < MAX_SHARED_RENEWALS)
     }
 
     /// The factors are renewed.
@@ -116,9 +116,9 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
     /// After an iteration that is not the last, whose factors may have been renewed `early`.
     #[inline(always)]
     pub fn after(&mut self, status: &Status, iteration: usize, early: bool) {
-        if iteration > 1 && self.renewals > FAR && status.grows {
+        if iteration > 1 && self.renewals > FIRST_RENEWAL && status.grows {
             // The shared one does not do.
-            self.renewals = MEANS;
+            self.renewals = MAX_SHARED_RENEWALS;
         }
         // Those of a solution nearby do for all iterations, unless increments hardly shrink.
         self.near &= !status.stuck;
@@ -133,7 +133,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
     /// How many iterations new factors cost, with those that they take themselves.
     #[inline(always)]
     fn expensive(shared: bool) -> f64 {
-        STILL[usize::from(shared)] + Self::RENEWAL[usize::from(shared)]
+        ITERATIONS_AFTER_RENEWAL[usize::from(shared)] + Self::RENEWAL[usize::from(shared)]
     }
 
     /// Whether the residual that an increment leaves, as a part of the first one, lets so many
@@ -143,7 +143,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
     /// another root than Newton's method does.
     pub fn leaves_much(&self, left: E, tolerance: f64) -> bool {
         let cheap = usize::from(self.may_share);
-        let expensive = STILL[cheap] + Self::RESIDUAL + Self::RENEWAL[cheap];
+        let expensive = ITERATIONS_AFTER_RENEWAL[cheap] + Self::RESIDUAL + Self::RENEWAL[cheap];
         let mut cell: E::Cell = Zeroable::zeroed();
         left.store(&mut cell);
         let (mut slowest, mut grows) = (0.0f64, false);

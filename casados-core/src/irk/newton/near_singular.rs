@@ -11,6 +11,7 @@
 //! may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole
 //! matrix tells.
 
+use super::increment::subtract_increment;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::Work;
 use crate::linalg::kinematic;
@@ -117,11 +118,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.place_residual();
         self.linear.factors.solve(&mut self.increment);
         let mut y = *y;
-        for (y, increment) in y.as_mut().iter_mut().zip(self.increment.as_ref()) {
-            for (y, [delta]) in y.iter_mut().zip(increment) {
-                *y = *y - *delta;
-            }
-        }
+        subtract_increment(y.as_mut(), self.increment.as_ref());
         y
     }
 }

@@ -44,7 +44,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             let (weight, size) = (core::array::from_mut(weight), core::array::from_mut(size));
             others.take(&mut states, y, increment, weight, size);
         }
-        let most = size_of([some.total(), others.total()]);
+        let most = larger_strand([some.total(), others.total()]);
         if const { !is_any::<M>() } {
             return most;
         }
@@ -202,7 +202,7 @@ pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
 
 /// The largest of two strands, or what is not a number.
 #[inline(always)]
-fn size_of<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
+pub(super) fn larger_strand<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
     let total = sum + other;
     E::select(E::le(total.abs(), E::from_f64(f64::MAX)), a.max(b), total)
 }

@@ -93,7 +93,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Whether the residual of an equation and its row of the Jacobian are finite.
     fn has_value(&self, equation: usize) -> bool {
         let jacobian = self.linear.jacobian.as_ref();
-        for (row, _, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
+        for (row, _, values) in entries::<M, _>(jacobian) {
             if row == equation && not_finite(values).is_some() {
                 return false;
             }

@@ -3,7 +3,7 @@
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
 use crate::irk::dense_output::Point;
-use crate::irk::driver::Arguments;
+use crate::irk::driver::{Arguments, Parts};
 use crate::irk::forward::gradient::gradient;
 use crate::irk::forward::memory::{ForwardMemory, StepOf};
 use crate::irk::integrator::Integrator;
@@ -13,6 +13,7 @@ use crate::quadrature::{Along, begin, finish};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
+use crate::statistics::Statistics;
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Allocates what `forward` needs, so that no call of it will.
@@ -185,7 +186,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let last = self.run.last()?;
         let point = Point::new(t, &last.work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
         let done = self.sweep.take().filter(|done| *done <= point.step);
-        let mut parts = last;
+        // Those of the last call stay what they are.
+        let mut statistics = Statistics::default();
+        let mut parts = Parts { statistics: &mut statistics, ..last };
         parts.work.inputs = parts.work.last_inputs;
         // Factors that are there may be those of a call that failed.
         parts.work.begin();

@@ -117,25 +117,25 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let HessianMemory { result, pass } = self.run.needs(W::hessian(&mut self.hessian))?;
         let distant = to.is_some();
         let to = to.unwrap_or(result);
-        let records = self.run.needs(W::hessian_tape(&mut self.hessian_tape, count))?;
+        let kept = self.run.needs(W::hessian_tape(&mut self.hessian_tape, count))?;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            let Some(record) = records.get_mut(n) else { return Ok(()) };
+            let Some(kept) = kept.get_mut(n) else { return Ok(()) };
             let (at, to) = (StepOf { n, count, distant }, &mut to.first.forward);
-            forward.step::<_, false>(parts, at, Some(record.curved()), to)?;
+            forward.step::<_, false>(parts, at, Some(kept.curved()), to)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
             // That of the last step is still there on the way back.
             if n + 1 < count {
-                record.record(parts.work);
+                kept.remember(parts.work);
             }
             Ok(())
         })?;
         forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
         finish(&mut along)?;
         let ahead = if distant { to.h_xx.as_slice() } else { &[] };
-        pass.run(parts, records, [lambda, nu], ahead, reborrow(&mut along))?;
+        pass.run(parts, kept, [lambda, nu], ahead, reborrow(&mut along))?;
         pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
         self.keep_forward().map(|_| ())
     }

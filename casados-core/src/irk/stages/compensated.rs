@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, kernels, moved, two_product};
+use crate::linalg::{Arithmetic, Kernel, dispatch, displaced, dot_compensated, kernels, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
@@ -52,7 +52,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn correct_residual(&mut self) {
         let (begin, end) = (M::Shape::NX, 2 * M::Shape::NX);
         let (jacobian, [beyond, _]) = (self.linear.jacobian.as_ref(), &self.probe);
-        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, M::STRUCTURE.jacobian.len()) {
+        for (r, c, values) in entries::<M, _>(jacobian) {
             if !(begin..end).contains(&c) {
                 continue;
             }
@@ -88,7 +88,7 @@ impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
         for ((xi, beyond), ((&x, &compensation), k)) in points.iter_mut().zip(beyond).zip(states) {
             for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&more)) {
                 let [sum, lost] = dot_compensated::<A, E>(a.iter().zip(k));
-                [*xi, *beyond] = moved::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
+                [*xi, *beyond] = displaced::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
             }
         }
     }
@@ -123,7 +123,7 @@ kernels! {
         h: E,
     ) {
         for ((x, compensation), k) in x.iter_mut().zip(compensation).zip(y) {
-            [*x, *compensation] = moved::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
+            [*x, *compensation] = displaced::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::irk::coefficients::stage_values;
 use crate::irk::kinematic::{self, are_together, derivative, unknowns};
 use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Times, Work};
-use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, kernels};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, dispatch, each_row, kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, SideBySide, Strided};
@@ -212,7 +212,7 @@ impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_
         if y.len() < nx || points.len() < nx + y.len() {
             return;
         }
-        let minus_ha = coupling(a, h);
+        let minus_ha = minus_ha(a, h);
         // Of kinematic states, which are most often the first or the last, there is nothing to
         // copy.
         let (first, end) = if UNKNOWNS { const { unknowns::<M>() } } else { (0, y.len()) };

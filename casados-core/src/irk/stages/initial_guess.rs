@@ -1,8 +1,8 @@
 //! Where Newton's method starts: the unknowns of the stages before its first iteration.
 
-use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::{Coefficients, stage_values};
 use crate::irk::workspace::{Step, Work};
-use crate::linalg::kernels;
+use crate::linalg::{kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes};
@@ -32,9 +32,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     ) {
         self.alike = false;
         match (from, before, &coefficients.next) {
-            (InitialGuess::Previous(record) | InitialGuess::Solution(record), ..) => {
-                if let Some(record) = record.get(n) {
-                    assign(y, &record.y);
+            (InitialGuess::Previous(steps) | InitialGuess::Solution(steps), ..) => {
+                if let Some(step) = steps.get(n) {
+                    assign(y, &step.y);
                 }
             }
             (_, Some(before), Some(next)) if const { F::INTERVALS } => {
@@ -96,22 +96,10 @@ kernels! {
         next: &'k [[E; S]; S],
         to: &'k mut [[E; S]],
     ) {
-        let zero = E::from_f64(0.0);
-        // By columns: the stages of an unknown are a vector.
-        let mut columns = [[zero; S]; S];
-        for (i, row) in next.iter().enumerate() {
-            for (column, &l) in columns.iter_mut().zip(row) {
-                column[i] = -l;
-            }
-        }
+        // The Lagrange polynomials are to these values what `hA` is to derivatives.
+        let minus_next = minus_ha(next, E::from_f64(1.0));
         for (to, from) in to.iter_mut().zip(from) {
-            let mut sum = [zero; S];
-            for (column, &value) in columns.iter().zip(from) {
-                for (sum, &element) in sum.iter_mut().zip(column) {
-                    *sum = A::subtract(*sum, element, value);
-                }
-            }
-            *to = sum;
+            *to = stage_values::<A, E, S>(E::from_f64(0.0), &minus_next, from);
         }
     }
 }

@@ -66,7 +66,7 @@ pub(crate) use kernels;
 /// Runs a kernel on registers as [`dispatch`] does, and one on single numbers as all code around it
 /// is compiled: where that is more than kernels could save.
 #[inline(always)]
-pub fn beside<K: Kernel>(kernel: K) -> K::Output {
+pub fn run_plain<K: Kernel>(kernel: K) -> K::Output {
     if const { align_of::<K::Number>() < 32 } { kernel.run::<Separate>() } else { dispatch(kernel) }
 }
 

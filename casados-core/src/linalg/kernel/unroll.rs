@@ -13,7 +13,7 @@ use crate::model::{Dae, Pivot, Supernode, Update};
 mod lines;
 
 /// Whether there are lines at all.
-const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
+const UNROLLING: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
 /// So many chunks, and so many pivots, can be written one after the other.
 const MOST: usize = 48;
@@ -50,7 +50,7 @@ pub trait AtRow {
 /// Whether the rows of a table are unrolled.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
     let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
-    WANTED && A::UNROLLED && V::UNROLLED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
+    UNROLLING && A::UNROLLED && V::UNROLLED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
 }
 
 /// All rows of a table.
@@ -211,7 +211,7 @@ const fn is_short_plan<A: Arithmetic, M: Dae>(updates: bool, instructions: usize
     let few = updates && instructions <= FEW;
     let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };
-    WANTED && A::UNROLLED && plan.pivots.len() <= MOST && count * instructions <= most
+    UNROLLING && A::UNROLLED && plan.pivots.len() <= MOST && count * instructions <= most
 }
 
 /// How many blocks a pivot updates.

@@ -21,6 +21,7 @@ use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
+use crate::shape::copy;
 use core::marker::PhantomData;
 
 /// What a matrix is eliminated by.
@@ -30,12 +31,7 @@ pub struct Planned<'a, M, E, const S: usize> {
     pub blocks: &'a [Block<E, S>],
 }
 
-impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
+copy!(['a, M, E, const S: usize] Planned<'a, M, E, S>);
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it
 /// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
@@ -128,6 +124,18 @@ pub const fn begins_with_update<M: Dae, E>() -> bool {
     align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
 }
 
+/// Fill of the matrix, a row of its assembly.
+#[inline(always)]
+pub fn clear_fill<M: Dae, E, B: Copy>(blocks: &mut [B], row: usize, zero: B) {
+    let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+    if const { begins_with_update::<M, E>() } {
+        return;
+    }
+    if let Some(block) = blocks.get_mut(of.block as usize) {
+        *block = zero;
+    }
+}
+
 /// Always; but the optimiser then knows their number, and with it how often loops over constant
 /// tables go round.
 #[inline(always)]
@@ -137,7 +145,7 @@ pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
-pub fn beside<'a, M: Dae, E, const S: usize>(
+pub fn blocks_with_slots<'a, M: Dae, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {

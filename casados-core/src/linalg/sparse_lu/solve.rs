@@ -5,7 +5,7 @@
 //! other. Where one column fills registers, what is added to a row is added in them instead, and
 //! stored once.
 
-use super::factor::{Planned, beside, has_all};
+use super::factor::{Planned, blocks_with_slots, has_all};
 use super::micro_panel::{is_zero, load, store, subtract_of};
 use crate::linalg::block::{Packet, negate, subtract};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
@@ -17,34 +17,6 @@ use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
-/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
-/// registers themselves two at a time, or the packet of all stages would not fit them.
-macro_rules! packets {
-    ($first:ty, $second:ty: $solve:expr) => {{
-        let Solve { factors, rows } = $solve;
-        let mut column = 0;
-        if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
-            while column + 8 <= R::LEN {
-                sweeps::<A, M, E, R, S, 8, $first, $second>(factors, rows, column, &mut ());
-                column += 8;
-            }
-        }
-        if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
-            sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
-            column += 4;
-        }
-        if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
-            while column + 2 <= R::LEN {
-                sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
-                column += 2;
-            }
-        }
-        if const { R::LEN % 2 == 1 } {
-            sweeps::<A, M, E, R, S, 1, $first, $second>(factors, rows, column, &mut ());
-        }
-    }};
-}
-
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
 /// columns.
 ///
@@ -54,22 +26,7 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve::<M, E, R, S> { factors, rows });
-}
-
-struct Solve<'a, M, E, R, const S: usize> {
-    factors: Planned<'a, M, E, S>,
-    rows: &'a mut [[R; S]],
-}
-
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
-    type Number = E;
-    type Output = ();
-    const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        packets!(Down, Up: self);
-    }
+    dispatch(Solve::<M, E, R, Down, Up, S> { factors, rows, systems: PhantomData });
 }
 
 /// Solves `Mᵀ X = R` in place.
@@ -77,18 +34,46 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(SolveTransposed(Solve { factors, rows }));
+    dispatch(Solve::<M, E, R, TransposedDown, TransposedUp, S> { factors, rows, systems: PhantomData });
 }
 
-struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
+/// registers themselves two at a time, or the packet of all stages would not fit them.
+struct Solve<'a, M, E, R, First, Second, const S: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+    systems: PhantomData<(First, Second)>,
+}
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, First: System, Second: System, const S: usize> Kernel
+    for Solve<'_, M, E, R, First, Second, S>
+{
     type Number = E;
     type Output = ();
     const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        packets!(TransposedDown, TransposedUp: self.0);
+        let Self { factors, rows, .. } = self;
+        let mut column = 0;
+        if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
+            while column + 8 <= R::LEN {
+                sweeps::<A, M, E, R, S, 8, First, Second>(factors, rows, column, &mut ());
+                column += 8;
+            }
+        }
+        if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
+            sweeps::<A, M, E, R, S, 4, First, Second>(factors, rows, column, &mut ());
+            column += 4;
+        }
+        if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
+            while column + 2 <= R::LEN {
+                sweeps::<A, M, E, R, S, 2, First, Second>(factors, rows, column, &mut ());
+                column += 2;
+            }
+        }
+        if const { R::LEN % 2 == 1 } {
+            sweeps::<A, M, E, R, S, 1, First, Second>(factors, rows, column, &mut ());
+        }
     }
 }
 
@@ -135,19 +120,21 @@ pub fn sweeps<
         return;
     }
     let viewer_of_first = &mut ();
-    let mut first = Along::<First, Sweep<'_, M, E, R, (), S, W>>(
-        Sweep { factors, rows, column, visitor: viewer_of_first },
+    let mut first = Along::<First, Substitution<'_, M, E, R, (), S, W>>(
+        Substitution { factors, rows, column, visitor: viewer_of_first },
         PhantomData,
     );
     from_first::<A, M, _>(&mut first);
     let rows = first.0.rows;
-    let mut second =
-        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, visitor }, PhantomData);
+    let mut second = Along::<Second, Substitution<'_, M, E, R, _, S, W>>(
+        Substitution { factors, rows, column, visitor },
+        PhantomData,
+    );
     from_last::<A, M, _>(&mut second);
 }
 
 /// `W` columns of right-hand sides on their way.
-pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
+pub struct Substitution<'a, M, E, R, V, const S: usize, const W: usize> {
     pub factors: Planned<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
@@ -167,7 +154,7 @@ pub trait System {
         const S: usize,
         const W: usize,
     >(
-        sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+        substitution: &mut Substitution<'_, M, E, R, V, S, W>,
         pivot: &'static Pivot,
     );
 }
@@ -176,7 +163,7 @@ pub trait System {
 struct Along<Y, T>(T, PhantomData<Y>);
 
 impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    AtPivot for Along<Y, Sweep<'_, M, E, R, V, S, W>>
+    AtPivot for Along<Y, Substitution<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
@@ -198,10 +185,10 @@ macro_rules! system {
         impl System for $name {
             #[inline(always)]
             fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
-                sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+                substitution: &mut Substitution<'_, M, E, R, V, S, W>,
                 pivot: &'static Pivot,
             ) {
-                sweep.$what::<A>(pivot);
+                substitution.$what::<A>(pivot);
             }
         }
     };
@@ -225,7 +212,7 @@ system!(
 );
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    Sweep<'_, M, E, R, V, S, W>
+    Substitution<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
@@ -256,7 +243,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         {
             return;
         }
-        for (block, other) in beside(*factors, pivot.lower()) {
+        for (block, other) in blocks_with_slots(*factors, pivot.lower()) {
             if other >= rows.len() {
                 continue;
             }
@@ -290,7 +277,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        for (block, other) in beside(*factors, pivot.upper()) {
+        for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             let Some(other) = rows.get(other) else { continue };
             subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
         }

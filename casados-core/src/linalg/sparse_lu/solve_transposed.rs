@@ -5,16 +5,18 @@
 //! in registers, and stored once. Packets take two blocks at a time, so that additions need not
 //! wait for each other.
 
-use super::factor::{Planned, beside};
+use super::factor::{Planned, blocks_with_slots};
 use super::micro_panel::{load, store};
-use super::solve::Sweep;
+use super::solve::Substitution;
 use crate::linalg::block::{negate, subtract_transposed};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> Sweep<'_, M, E, R, V, S, W> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
+    Substitution<'_, M, E, R, V, S, W>
+{
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(in crate::linalg) fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
@@ -29,7 +31,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> S
             packet = solution;
             store(rows, pivot.slot as usize, *column, &packet);
         }
-        for (block, other) in beside(*factors, pivot.upper()) {
+        for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             if other >= rows.len() {
                 continue;
             }

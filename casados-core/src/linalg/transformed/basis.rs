@@ -164,9 +164,8 @@ mod tests {
         check::<9, 9>(&RadauIIA::<9>::TABLEAU);
     }
 
-    /// The real eigenvalue of the three-stage Radau IIA method: 1/γ with γ = (6 + 81^(1/3) −
-    /// 9^(1/3)) / 30 … its inverse `3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner,
-    /// section IV.8.
+    /// The real eigenvalue of the three-stage Radau IIA method, `(6 + 81^(1/3) − 9^(1/3)) / 30`:
+    /// its inverse `γ = 3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner, section IV.8.
     #[test]
     fn published_eigenvalue() {
         let basis = Eigenbasis::<f64, 3, 3>::new(&RadauIIA::<3>::TABLEAU).expect("a basis");

@@ -41,7 +41,7 @@ pub struct EigenFactors<M: Dae, T: Plain> {
 impl<M: Dae, T: Real> EigenFactors<M, T> {
     /// Whether the plan is in use, so that pivoting may give better factors.
     pub fn is_planned(&self) -> bool {
-        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
+        !self.pivoted && M::STRUCTURE.elimination.has_plan()
     }
 
     /// From now on, whether every matrix is to be pivoted.
@@ -65,7 +65,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         if self.is_dense {
             self.factor_dense(jacobian, &scale)?;
         }
-        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
+        Ok(!self.is_dense || !M::STRUCTURE.elimination.has_plan())
     }
 
     /// By the plan; whether that went well.

@@ -24,13 +24,6 @@ pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
     rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Clone for SharedFactors<M, E, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, E: Lanes, const S: usize> Copy for SharedFactors<M, E, S> {}
-
 impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
     /// there for the `first_only` of stages that are alike, but not of a single lane.
@@ -128,13 +121,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, Number<E, S>>() } {
-            return;
-        }
-        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
-            *block = [[Complex::zero()]];
-        }
+        factor::clear_fill::<M, Number<E, S>, _>(self.blocks.as_mut(), row, [[Complex::zero()]]);
     }
 }
 

@@ -227,10 +227,10 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let residual =
                 Point::<M, T, S>::at(&interval, &self.coefficients, count).follow(stages, &[], T::ZERO).1;
             self.newton.begin(&interval).map_err(failed(k))?;
-            self.newton.set_record(stages).map_err(failed(k))?;
+            self.newton.run.set_stages_of_steps(stages).map_err(failed(k))?;
             let (x, u) = (vector(interval.x), vector(interval.u));
             let after = *self.newton.forward(&x, &u, interval.h).map_err(failed(k))?;
-            self.newton.record(increments).map_err(failed(k))?;
+            self.newton.copy_stages(increments).map_err(failed(k))?;
             for (increment, y) in increments.iter_mut().zip(stages) {
                 let increment = increment.as_mut().as_flattened_mut().iter_mut();
                 for (increment, &y) in increment.zip(y.as_ref().as_flattened()) {

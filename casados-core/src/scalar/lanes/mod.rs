@@ -19,7 +19,15 @@
 //!
 //! **Bits.** `+ − × ÷ √`, comparisons and `powi` give in each lane the bits that `f64` (`f32`)
 //! gives. Elementary functions are those of [`functions`], with the bounds that are listed there.
-#![allow(dead_code)]
+// Where there are no registers, nobody asks for any.
+#![cfg_attr(
+    not(any(
+        target_arch = "x86_64",
+        all(target_arch = "aarch64", target_feature = "neon"),
+        all(target_arch = "wasm32", target_feature = "simd128")
+    )),
+    allow(dead_code)
+)]
 
 mod blocks;
 #[cfg(feature = "alloc")]
@@ -46,6 +54,12 @@ mod neon;
     all(target_arch = "wasm32", target_feature = "simd128")
 ))]
 mod register;
+#[cfg(any(
+    target_arch = "x86_64",
+    all(target_arch = "aarch64", target_feature = "neon"),
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+mod shared;
 #[cfg(all(
     test,
     any(

@@ -2,57 +2,13 @@
 #![allow(unsafe_code)]
 
 use super::functions::Call;
+use super::shared::{define, through_memory};
 use core::arch::aarch64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the
 // machine has the instructions, and NEON is compiled in (`is_there` says so where it is not: such a
 // target has no `std`). Loads and stores, which take pointers, are made on arrays that are as large
 // as the register, and ask for no alignment.
-
-/// Functions of an expression of intrinsics each.
-macro_rules! define {
-    ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
-        $(#[$attribute])*
-        #[inline(always)]
-        #[allow(unused_unsafe)]
-        pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
-            // SAFETY: see the head of the file.
-            unsafe { $body }
-        }
-    )* };
-}
-
-macro_rules! shared {
-    ($element:ty, $width:literal, $load:ident, $store:ident) => {
-        pub const WIDTH: usize = $width;
-
-        /// Lanes that are not used are copies of the last one that is.
-        #[inline(always)]
-        pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
-            let all: [$element; $width] =
-                core::array::from_fn(|lane| cell[if lane < N { lane } else { N - 1 }]);
-            // SAFETY: the array is as large as the register.
-            unsafe { $load(all.as_ptr()) }
-        }
-        #[inline(always)]
-        pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
-            let mut all = [0.0; $width];
-            // SAFETY: the array is as large as the register.
-            unsafe { $store(all.as_mut_ptr(), a) };
-            cell.copy_from_slice(&all[..N]);
-        }
-        /// The numbers of each lane beside each other.
-        #[inline(always)]
-        pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
-            super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)
-        }
-        /// Calls `F`; not inlined.
-        #[inline(never)]
-        pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {
-            F::call(argument)
-        }
-    };
-}
 
 /// Two `f64`.
 pub mod neon_f64 {
@@ -61,7 +17,7 @@ pub mod neon_f64 {
     pub type Mask = uint64x2_t;
     pub const FUSED: bool = true;
 
-    shared!(f64, 2, vld1q_f64, vst1q_f64);
+    through_memory!(f64, 2, |from| vld1q_f64(from), |to, a| vst1q_f64(to, a));
     define! {
         total(a: Register) -> f64 { vaddvq_f64(a) }
         largest(a: Register) -> f64 { vmaxvq_f64(a) }
@@ -94,9 +50,6 @@ pub mod neon_f64 {
         add_bits(a: Register, b: Register) -> Register {
             vreinterpretq_f64_u64(vaddq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
         }
-        sub_bits(a: Register, b: Register) -> Register {
-            vreinterpretq_f64_u64(vsubq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
-        }
         shift_left<BITS>(a: Register) -> Register {
             vreinterpretq_f64_u64(vshlq_n_u64::<BITS>(vreinterpretq_u64_f64(a)))
         }
@@ -113,7 +66,7 @@ pub mod neon_f32 {
     pub type Register = float32x4_t;
     pub type Mask = uint32x4_t;
 
-    shared!(f32, 4, vld1q_f32, vst1q_f32);
+    through_memory!(f32, 4, |from| vld1q_f32(from), |to, a| vst1q_f32(to, a));
     define! {
         total(a: Register) -> f32 { vaddvq_f32(a) }
         largest(a: Register) -> f32 { vmaxvq_f32(a) }

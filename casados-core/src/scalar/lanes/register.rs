@@ -1,6 +1,6 @@
 //! The types: one number type over each kind of register.
 
-use super::functions::{self, Doubles, Single};
+use super::functions::{self, DoubleRegister, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
@@ -11,7 +11,7 @@ use super::wasm::{wasm_f32 as base_f32, wasm_f64 as base_f64};
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::{Level, functions::Elementary, level, may_be};
-use crate::scalar::{Field, Lanes, Packed, Piece, Rows, Scalar, Sealed, as_it_is};
+use crate::scalar::{Field, Lanes, Packed, Piece, Rows, Scalar, Sealed, as_it_is, field::power};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -147,20 +147,10 @@ macro_rules! register {
                 let sign = $ops::and(self.0, $ops::splat(-0.0));
                 Self($ops::select($ops::eq(self.0, self.0), $ops::or(sign, $ops::splat(1.0)), self.0))
             }
-            // As `f64` does it: square and multiply, and of a negative exponent the reciprocal.
+            // As `f64` does it.
             #[inline(always)]
             fn powi(self, n: i32) -> Self {
-                let (mut base, mut left) = (self, n.unsigned_abs());
-                let mut power = if left & 1 == 1 { base } else { Self::splat(1.0) };
-                left >>= 1;
-                while left > 0 {
-                    base = base * base;
-                    if left & 1 == 1 {
-                        power = power * base;
-                    }
-                    left >>= 1;
-                }
-                if n < 0 { Self::splat(1.0) / power } else { power }
+                power(self, n)
             }
             #[inline(always)]
             fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
@@ -324,6 +314,10 @@ complex!(F64x8, f64, avx512_f64);
 complex!(F32x8, f32, avx2_f32);
 #[cfg(target_arch = "x86_64")]
 complex!(F32x16, f32, avx512_f32);
+#[cfg(target_arch = "x86_64")]
+slices!(F64x4, f64, avx2_f64);
+#[cfg(target_arch = "x86_64")]
+slices!(F32x8, f32, avx2_f32);
 #[cfg(target_arch = "x86_64")]
 fours!(F64x8, f64, avx512_f64);
 #[cfg(target_arch = "x86_64")]

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::functions::Call;
+use super::shared::through_memory;
 use core::arch::wasm32::*;
 
 /// Functions of an expression of intrinsics each, which are safe: a module with instructions that a
@@ -16,37 +17,13 @@ macro_rules! define {
     )* };
 }
 
-macro_rules! shared {
+/// What is the same for numbers of either kind.
+macro_rules! numbers {
     ($element:ty, $width:literal) => {
-        pub const WIDTH: usize = $width;
         pub type Register = v128;
         pub type Mask = v128;
 
-        /// Lanes that are not used are copies of the last one that is.
-        #[inline(always)]
-        pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
-            let all: [$element; $width] =
-                core::array::from_fn(|lane| cell[if lane < N { lane } else { N - 1 }]);
-            // SAFETY: the array is as large as the register, and no alignment is asked for.
-            unsafe { v128_load(all.as_ptr().cast()) }
-        }
-        #[inline(always)]
-        pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
-            let mut all = [0.0; $width];
-            // SAFETY: the array is as large as the register, and no alignment is asked for.
-            unsafe { v128_store(all.as_mut_ptr().cast(), a) };
-            cell.copy_from_slice(&all[..N]);
-        }
-        /// The numbers of each lane beside each other.
-        #[inline(always)]
-        pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
-            super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)
-        }
-        /// Calls `F`; not inlined.
-        #[inline(never)]
-        pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {
-            F::call(argument)
-        }
+        through_memory!($element, $width, |from| v128_load(from.cast()), |to, a| v128_store(to.cast(), a));
         define! {
             and(a: Register, b: Register) -> Register { v128_and(a, b) }
             or(a: Register, b: Register) -> Register { v128_or(a, b) }
@@ -64,7 +41,7 @@ pub mod wasm_f64 {
     use super::*;
     pub const FUSED: bool = false;
 
-    shared!(f64, 2);
+    numbers!(f64, 2);
     define! {
         total(a: Register) -> f64 { f64x2_extract_lane::<0>(a) + f64x2_extract_lane::<1>(a) }
         largest(a: Register) -> f64 { f64x2_extract_lane::<0>(max(a, i64x2_shuffle::<1, 0>(a, a))) }
@@ -83,7 +60,6 @@ pub mod wasm_f64 {
         eq(a: Register, b: Register) -> Mask { f64x2_eq(a, b) }
         bits(m: Mask) -> u32 { u32::from(i64x2_bitmask(m)) }
         add_bits(a: Register, b: Register) -> Register { i64x2_add(a, b) }
-        sub_bits(a: Register, b: Register) -> Register { i64x2_sub(a, b) }
         shift_left<BITS>(a: Register) -> Register { i64x2_shl(a, BITS as u32) }
         shift_right<BITS>(a: Register) -> Register { u64x2_shr(a, BITS as u32) }
     }
@@ -94,7 +70,7 @@ pub mod wasm_f32 {
     pub use super::wasm_f64 as doubles;
     use super::*;
 
-    shared!(f32, 4);
+    numbers!(f32, 4);
     define! {
         turned(a: Register) -> Register { i32x4_shuffle::<2, 3, 0, 1>(a, a) }
         swapped(a: Register) -> Register { i32x4_shuffle::<1, 0, 3, 2>(a, a) }

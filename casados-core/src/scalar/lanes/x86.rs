@@ -4,6 +4,7 @@
 #![allow(unsafe_code)]
 
 use super::functions::{Call, CallWithEight, CallWithFour};
+use super::shared::define;
 use core::arch::x86_64::*;
 
 // SAFETY of every `unsafe` of this file and its modules: the one condition of calling these
@@ -20,19 +21,6 @@ macro_rules! wrap {
         pub fn $name($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $intrinsic $(::<$constant>)? ($($argument),*) }
-        }
-    )* };
-}
-
-/// Functions of an expression of intrinsics each.
-macro_rules! define {
-    ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
-        $(#[$attribute])*
-        #[inline(always)]
-        #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
-        pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
-            // SAFETY: see the head of the file.
-            unsafe { $body }
         }
     )* };
 }
@@ -177,9 +165,6 @@ pub mod sse2_f64 {
         add_bits(a: Register, b: Register) -> Register {
             _mm_castsi128_pd(_mm_add_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
         }
-        sub_bits(a: Register, b: Register) -> Register {
-            _mm_castsi128_pd(_mm_sub_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
-        }
         shift_left<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_slli_epi64::<BITS>(_mm_castpd_si128(a))) }
         shift_right<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_srli_epi64::<BITS>(_mm_castpd_si128(a))) }
     }
@@ -283,9 +268,6 @@ pub mod avx2_f64 {
         bits(m: Mask) -> u32 { _mm256_movemask_pd(m) as u32 }
         add_bits(a: Register, b: Register) -> Register {
             _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
-        }
-        sub_bits(a: Register, b: Register) -> Register {
-            _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
         }
         shift_left<BITS>(a: Register) -> Register {
             _mm256_castsi256_pd(_mm256_slli_epi64::<BITS>(_mm256_castpd_si256(a)))

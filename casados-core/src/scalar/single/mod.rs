@@ -161,8 +161,8 @@ const ROUND: f32 = 12_582_912.0;
 /// `a + b` and what rounding took, for `|a| ≥ |b|`.
 #[inline(always)]
 fn ordered_sum(a: f32, b: f32) -> (f32, f32) {
-    let sum = a + b;
-    (sum, b - (sum - a))
+    let [high, low] = super::fast_two_sum(a, b);
+    (high, low)
 }
 
 /// `a + b` and what rounding took.

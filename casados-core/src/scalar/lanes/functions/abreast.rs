@@ -5,7 +5,7 @@
 //! meanwhile. Of functions one after the other it would have to find that among instructions that
 //! are further ahead than it looks.
 
-use super::{Doubles, each};
+use super::{DoubleRegister, each};
 use crate::scalar::{Field, Lanes, Scalar};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -82,9 +82,9 @@ macro_rules! operations {
             );
         }
 
-        impl<D: Doubles> Double for D {
+        impl<D: DoubleRegister> Double for D {
             type Mask = <D as Field>::Mask;
-            const FUSED: bool = <D as Doubles>::FUSED;
+            const FUSED: bool = <D as DoubleRegister>::FUSED;
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
@@ -111,7 +111,7 @@ macro_rules! operations {
             $(
                 #[inline(always)]
                 fn $shift<const BITS: i32>(self) -> Self {
-                    <D as Doubles>::$shift::<BITS>(self)
+                    <D as DoubleRegister>::$shift::<BITS>(self)
                 }
             )*
             $(
@@ -233,19 +233,17 @@ operations! {
     /// The larger one; `other` if one of them is NaN.
     max = Lanes;
     /// bitwise and
-    and_bits = Doubles;
+    and_bits = DoubleRegister;
     /// bitwise or
-    or_bits = Doubles;
+    or_bits = DoubleRegister;
     /// bitwise exclusive or
-    xor_bits = Doubles;
+    xor_bits = DoubleRegister;
     /// The sum of both as 64-bit integers.
-    add_bits = Doubles;
-    /// The difference of both as 64-bit integers.
-    sub_bits = Doubles;
+    add_bits = DoubleRegister;
     }
     ternary {
     /// `self a + b`, in one instruction if there is one, else rounded twice.
-    mul_add = Doubles;
+    mul_add = DoubleRegister;
     /// `self − a b`
     subtract_product = Field;
     }

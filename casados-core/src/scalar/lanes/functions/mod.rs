@@ -48,7 +48,7 @@ use bytemuck::Zeroable;
 
 /// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are
 /// written as doubles.
-pub trait Doubles: Lanes {
+pub trait DoubleRegister: Lanes {
     /// Whether [`mul_add`](Self::mul_add) rounds once.
     const FUSED: bool;
 
@@ -62,8 +62,6 @@ pub trait Doubles: Lanes {
     fn xor_bits(self, other: Self) -> Self;
     /// The sum of both as 64-bit integers.
     fn add_bits(self, other: Self) -> Self;
-    /// The difference of both as 64-bit integers.
-    fn sub_bits(self, other: Self) -> Self;
     /// The bits moved up, zeros below.
     fn shift_left<const BITS: i32>(self) -> Self;
     /// The bits moved down, zeros above.
@@ -75,7 +73,7 @@ pub trait Doubles: Lanes {
 /// A register of `f32`, whose functions are computed in two registers of doubles.
 pub trait Single: Lanes {
     /// The register of doubles.
-    type Double: Doubles;
+    type Double: DoubleRegister;
     /// The lower and the upper half.
     fn widen(self) -> [Self::Double; 2];
     /// The number that has these halves, rounded.
@@ -111,7 +109,7 @@ fn repair2<D: Double>(rare: D::Mask, a: D, b: D, result: &mut D, f: fn(f64, f64)
 }
 
 #[cold]
-fn each<D: Doubles, F: Copy>(
+fn each<D: DoubleRegister, F: Copy>(
     rare: <D as Field>::Mask,
     [a, b]: [D; 2],
     result: &mut D,

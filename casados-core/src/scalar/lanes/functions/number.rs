@@ -1,8 +1,8 @@
 //! A number as a register of one: what machines without registers compute with.
 
-use super::Doubles;
+use super::DoubleRegister;
 
-impl Doubles for f64 {
+impl DoubleRegister for f64 {
     const FUSED: bool = false;
 
     #[inline(always)]
@@ -24,10 +24,6 @@ impl Doubles for f64 {
     #[inline(always)]
     fn add_bits(self, other: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_add(other.to_bits()))
-    }
-    #[inline(always)]
-    fn sub_bits(self, other: Self) -> Self {
-        Self::from_bits(self.to_bits().wrapping_sub(other.to_bits()))
     }
     #[inline(always)]
     fn shift_left<const BITS: i32>(self) -> Self {

@@ -3,6 +3,7 @@
 //! and dot product" (2005).
 
 use super::Double;
+use crate::scalar::{fast_two_sum, two_sum};
 
 /// `high + low`, with `|low|` at most a few units in the last place of `high`.
 #[derive(Clone, Copy)]
@@ -26,16 +27,15 @@ pub fn pattern<D: Double>(bits: u64) -> D {
 /// `a + b`, exactly.
 #[inline(always)]
 pub fn sum<D: Double>(a: D, b: D) -> Pair<D> {
-    let high = a + b;
-    let from_b = high - a;
-    Pair { high, low: (a - (high - from_b)) + (b - from_b) }
+    let [high, low] = two_sum(a, b);
+    Pair { high, low }
 }
 
 /// `a + b`, exactly where `a = 0` or `|a| ≥ |b|`.
 #[inline(always)]
 pub fn ordered_sum<D: Double>(a: D, b: D) -> Pair<D> {
-    let high = a + b;
-    Pair { high, low: b - (high - a) }
+    let [high, low] = fast_two_sum(a, b);
+    Pair { high, low }
 }
 
 /// `a b`, exactly as long as nothing overflows or underflows.

@@ -97,7 +97,7 @@ macro_rules! in_half_a_register {
 
 macro_rules! double {
     ($name:ident, $ops:ident) => {
-        impl Doubles for $name<{ $ops::WIDTH }> {
+        impl DoubleRegister for $name<{ $ops::WIDTH }> {
             const FUSED: bool = $ops::FUSED;
 
             #[inline(always)]
@@ -119,10 +119,6 @@ macro_rules! double {
             #[inline(always)]
             fn add_bits(self, other: Self) -> Self {
                 Self($ops::add_bits(self.0, other.0))
-            }
-            #[inline(always)]
-            fn sub_bits(self, other: Self) -> Self {
-                Self($ops::sub_bits(self.0, other.0))
             }
             #[inline(always)]
             fn shift_left<const BITS: i32>(self) -> Self {
@@ -181,6 +177,25 @@ macro_rules! complex {
                 let difference = Self::load(target).subtract_product(Self::twice(a, 0), numbers);
                 difference.subtract_product(Self::twice(a, $ops::WIDTH / 2), turned).store(target);
             }
+            /// Half of the elements, in both halves.
+            #[inline(always)]
+            fn twice(elements: &[$element; $ops::WIDTH], begin: usize) -> Self {
+                let mut all = [0.0; $ops::WIDTH];
+                let half = &elements[begin..begin + $ops::WIDTH / 2];
+                let (low, high) = all.split_at_mut($ops::WIDTH / 2);
+                low.copy_from_slice(half);
+                high.copy_from_slice(half);
+                Self::load(&all)
+            }
+        }
+    };
+}
+
+/// Products of slices of any length.
+#[cfg(target_arch = "x86_64")]
+macro_rules! slices {
+    ($name:ident, $element:ident, $ops:ident) => {
+        impl $name<{ $ops::WIDTH }> {
             /// `target − a b`, element by element, as far as all go.
             #[inline(always)]
             pub fn subtract_each(target: &mut [$element], a: &[$element], b: &[$element]) {
@@ -193,16 +208,6 @@ macro_rules! complex {
                 for ((target, &a), &b) in target_rest.iter_mut().zip(a_rest).zip(b_rest) {
                     *target = target.subtract_product(a, b);
                 }
-            }
-            /// Half of the elements, in both halves.
-            #[inline(always)]
-            fn twice(elements: &[$element; $ops::WIDTH], begin: usize) -> Self {
-                let mut all = [0.0; $ops::WIDTH];
-                let half = &elements[begin..begin + $ops::WIDTH / 2];
-                let (low, high) = all.split_at_mut($ops::WIDTH / 2);
-                low.copy_from_slice(half);
-                high.copy_from_slice(half);
-                Self::load(&all)
             }
         }
     };

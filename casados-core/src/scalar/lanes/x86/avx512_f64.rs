@@ -73,9 +73,6 @@ define! {
     add_bits(a: Register, b: Register) -> Register {
         _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
     }
-    sub_bits(a: Register, b: Register) -> Register {
-        _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
-    }
     shift_left<BITS>(a: Register) -> Register {
         _mm512_castsi512_pd(_mm512_sll_epi64(_mm512_castpd_si512(a), _mm_cvtsi32_si128(BITS)))
     }
