@@ -14,8 +14,8 @@ use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
+use crate::finite::{check_input, check_named};
 use crate::integrator::{self, Integrator as _};
-use crate::irk::{check, check_named};
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -180,7 +180,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         mut output: impl FnMut(T, &Dense<M, T>),
     ) -> Result<&Nominal<M, T>, Error> {
         self.last = None;
-        check(Argument::T, times)?;
+        check_input(Argument::T, times)?;
         let (start, end) = (self.start, self.end(h)?);
         let mut before = start;
         for (index, t) in times.iter().enumerate() {
@@ -222,7 +222,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::NoResult`], also if that call failed or steps are not remembered;
     /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        check(Argument::T, &[t])?;
+        check_input(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;
         self.dense_in(span, t)
     }
@@ -281,7 +281,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
     /// resolve.
     pub(super) fn end(&self, h: T) -> Result<T, Error> {
-        check(Argument::H, &[h])?;
+        check_input(Argument::H, &[h])?;
         let end = self.start + h;
         if end == self.start && h != T::ZERO {
             let (t, h) = (self.start.to_f64(), h.to_f64());
@@ -295,7 +295,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.statistics = AdaptiveStatistics::default();
         check_named::<M, T>(Argument::X0, x0.as_slice())?;
         check_named::<M, T>(Argument::U, u.as_slice())?;
-        check(Argument::T, &[t_end, t_end - self.start])?;
+        check_input(Argument::T, &[t_end, t_end - self.start])?;
         if !self.parameters {
             return Err(Error::ParametersNotSet);
         }

@@ -22,7 +22,7 @@ use super::segment::{Segment, add, dense, filled, refill};
 use super::sensitivities::{Memory, chain, dynamic, fill, place};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
-use crate::irk::{check, check_named};
+use crate::finite::{check_input, check_named};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
 use crate::quadrature::{Along, Backwards, begin, finish, reborrow};

@@ -16,7 +16,7 @@ use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
-use crate::irk::not_finite;
+use crate::finite::not_finite;
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};

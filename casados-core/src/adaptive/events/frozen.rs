@@ -7,7 +7,7 @@ use super::evaluate::{evaluate, finite};
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
-use crate::irk::check_named;
+use crate::finite::check_named;
 use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};

@@ -33,7 +33,7 @@ use super::segment::{Segment, dense, refill};
 use super::sensitivities::{chain, dynamic, fill};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
-use crate::irk::{check_named, not_finite};
+use crate::finite::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,

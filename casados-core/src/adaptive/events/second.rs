@@ -18,7 +18,7 @@ use super::super::sealed::Engine;
 use super::super::sensitivities::{fill, place};
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::error::{Argument, Error};
-use crate::irk::{check_named, not_finite};
+use crate::finite::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,

@@ -9,7 +9,7 @@ use super::super::statistics::AdaptiveStatistics;
 use super::evaluate::{evaluate, finite, place};
 use super::{Event, Hybrid, Moment, Occurrence};
 use crate::error::{Argument, Error};
-use crate::irk::check_named;
+use crate::finite::check_named;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};

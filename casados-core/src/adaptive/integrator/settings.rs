@@ -19,7 +19,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last time stays.
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
-        check(Argument::T, &[t])?;
+        check_input(Argument::T, &[t])?;
         self.start = t;
         Ok(())
     }

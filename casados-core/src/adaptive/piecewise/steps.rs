@@ -19,7 +19,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.statistics = AdaptiveStatistics::default();
         self.integrator.reserve()?;
         check_named::<M, T>(Argument::X0, x0.as_slice())?;
-        check(Argument::T, ends)?;
+        check_input(Argument::T, ends)?;
         let start = self.integrator.start;
         let last = ends.last().copied().unwrap_or(start);
         let mut before = start;

@@ -6,7 +6,6 @@
 //!
 //! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
 
-use super::gradient::check_result;
 use super::matrices::Split;
 use super::sweep::{Linearized, Outputs, Sweep};
 use crate::error::Error;
@@ -160,7 +159,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
         // Only where one is not finite it is looked for.
-        if self.end(nominal, to).is_finite() { Ok(()) } else { check_result(to, step) }
+        if self.end(nominal, to).is_finite() { Ok(()) } else { crate::finite::check_forward(to, step) }
     }
 }
 
