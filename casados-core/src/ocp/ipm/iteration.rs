@@ -13,7 +13,7 @@ use super::work::Work;
 use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::{Exact, Slopes};
-use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction, larger};
+use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
@@ -22,7 +22,7 @@ use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
 use crate::ocp::units::of_tolerance;
 use crate::ocp::watch::Watch;
-use crate::qp::{QpError, StageDims, Store};
+use crate::qp::{QpError, StageDims, Store, larger};
 use crate::scalar::Real;
 
 /// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
