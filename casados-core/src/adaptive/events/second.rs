@@ -155,6 +155,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             segment.history = history;
             result?;
         }
+        adjoint.check()?;
         let (nx, nu, h) = (M::Shape::NX, M::Shape::NU, second.h.as_ref());
         if let Some((index, _)) = not_finite(ArrayW::<M, T>::flat(h)) {
             return Err(Error::Overflow { step: 0, index });
