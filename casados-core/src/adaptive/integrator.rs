@@ -92,7 +92,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
-        options.check(T::EPSILON.to_f64())?;
+        options.check(T::EPSILON)?;
         let out_of_memory = Error::OutOfMemory { bytes: size_of::<Base<M, T>>() };
         let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
@@ -124,7 +124,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &self.options
     }
 
-    /// What the last call did, successful or not.
+    /// What the last call did to choose its steps, successful or not.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
