@@ -87,10 +87,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         self.memory.factors.factor(jacobian, self.scheme.basis.values(), h)
     }
 
-    fn set_pivoted(&mut self, pivoted: bool) -> bool {
-        let planned = self.memory.factors.is_planned();
+    fn set_pivoted(&mut self, pivoted: bool) {
         self.memory.factors.set_pivoted(pivoted);
-        planned != self.memory.factors.is_planned()
     }
 
     fn begin(&mut self, point: &ArrayV<M, T>) {
