@@ -171,7 +171,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.judge(error, others, &self.options);
         state.gaps = barrier.0.dynamics;
-        state.violation = state.gaps.max(barrier.0.inequalities);
+        state.violation = larger(state.gaps, barrier.0.inequalities);
         let is_alone = state.lengths.alone;
         if is_alone {
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
@@ -181,8 +181,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let worst = elastic::worst(ocp, state, (work.penalties, work.units));
         let violation = worst.map_or(0.0, |worst| worst.violation);
-        let size = state.error.max(violation);
-        if !is_alone && size < state.best_residual || row.iteration == 0 {
+        let size = larger(state.error, violation);
+        let is_best = size < state.best_residual || state.best_residual.is_nan();
+        if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
             state.best_violation = state.violation;
             self.best.copy_from(&ocp.iterate);
