@@ -92,7 +92,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
-        options.check(T::EPSILON)?;
+        options.check::<T>()?;
         let out_of_memory = Error::OutOfMemory { bytes: size_of::<Base<M, T>>() };
         let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
@@ -220,7 +220,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     ///
     /// # Errors
     /// [`Error::NoResult`], also if that call failed or steps are not remembered;
-    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check_input(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;

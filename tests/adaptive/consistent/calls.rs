@@ -320,3 +320,38 @@ fn dense_derivatives_are_those_of_the_last_good_call() {
     }
     check!(Gauss<2>, Gauss<4>, RadauIIA<3>);
 }
+
+/// A tolerance of zero or infinity divides by that.
+#[test]
+fn tolerances_are_numbers_of_the_type() {
+    type Single = Adaptive<Growth, Radau, f32>;
+    for atol in [1e-60, 1e60] {
+        let options = AdaptiveOptions { rtol: 1e-4, atol, ..Default::default() };
+        assert!(Adaptive::<Growth, Radau>::new(options).is_ok());
+        let error = Single::new(options).map(|_| ()).unwrap_err();
+        assert!(
+            matches!(error, Error::InvalidOption { option: "atol", value, .. } if value == atol),
+            "{error}"
+        );
+    }
+}
+
+/// With a velocity of `−10³⁰⁸`.
+#[ode]
+fn fall(_x: f64) -> f64 {
+    -1e308
+}
+
+/// What is between states that are numbers is one, or an error.
+#[test]
+fn dense_output_is_finite() {
+    let options = AdaptiveOptions { initial_step: Some(3.0), ..Default::default() };
+    let mut fall = Adaptive::<Fall, DormandPrince5>::new(options).unwrap();
+    // Where products are not rounded before they are added, the state at the end is a number.
+    if fall.solve(&vector![1.5e308], &vector![], 3.0).is_ok() {
+        match fall.dense(1.0) {
+            Ok(dense) => assert!(dense.x[0].is_finite()),
+            Err(error) => assert!(matches!(error, Error::Overflow { .. }), "{error}"),
+        }
+    }
+}
