@@ -3,7 +3,9 @@
 use crate::error::{Argument, Error};
 use crate::linalg::{are_finite, kernels};
 use crate::model::Dae;
+use crate::result::{Forward, Hessian};
 use crate::scalar::Real;
+use crate::shape::Matrix;
 
 /// Of what has no names: times and lengths.
 ///
@@ -49,6 +51,52 @@ pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Err
         Some((index, _)) => Err(Error::Overflow { step, index }),
         None => Ok(()),
     }
+}
+
+/// # Errors
+/// [`Error::Overflow`] of the first derivative that is not finite.
+#[cfg_attr(feature = "std", inline(never))]
+pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
+    for values in [
+        result.dx_dx0.as_slice(),
+        result.dx_du.as_slice(),
+        result.dx_dp.as_slice(),
+        result.dz_dx0.as_slice(),
+        result.dz_du.as_slice(),
+        result.dz_dp.as_slice(),
+        result.dz0_dx0.as_slice(),
+        result.dz0_du.as_slice(),
+        result.dz0_dp.as_slice(),
+    ] {
+        check_output(values, step)?;
+    }
+    Ok(())
+}
+
+/// A gradient by `x₀`, `u` and `p`.
+///
+/// # Errors
+/// [`Error::Overflow`] of the first element that is not finite.
+pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), Error> {
+    check_output(x0, 0)?;
+    check_output(u, 0)?;
+    check_output(p, 0)
+}
+
+/// # Errors
+/// [`Error::Overflow`] of the first second derivative that is not finite.
+pub(crate) fn check_second<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
+    for values in [
+        result.h_xx.as_slice(),
+        result.h_xu.as_slice(),
+        result.h_uu.as_slice(),
+        result.h_xp.as_slice(),
+        result.h_up.as_slice(),
+        result.h_pp.as_slice(),
+    ] {
+        check_output(values, 0)?;
+    }
+    Ok(())
 }
 
 /// The first element that is infinite or NaN.

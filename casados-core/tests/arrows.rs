@@ -24,7 +24,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("dual", "shape scalar model"),
     ("linalg", "shape tableau memory scalar model"),
     ("result", "shape model"),
-    ("finite", "error scalar model linalg"),
+    ("finite", "error shape scalar model linalg result"),
     ("quadrature", "error shape scalar function model linalg result finite"),
     ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (
@@ -42,8 +42,8 @@ const ARROWS: &[(&str, &str)] = &[
     ),
     (
         "adaptive",
-        "error shape statistics tableau memory options scalar function model linalg result quadrature integrator \
-         erk irk",
+        "error shape statistics tableau memory options scalar function model linalg result finite quadrature \
+         integrator erk irk",
     ),
     (
         "batch",
@@ -52,8 +52,8 @@ const ARROWS: &[(&str, &str)] = &[
     ("testing", "error shape memory scalar model result integrator"),
     (
         "ocp",
-        "error shape structure memory scalar record function model qp linalg result quadrature integrator constrained irk \
-         batch",
+        "error shape structure memory scalar record function model qp linalg result finite quadrature integrator \
+         constrained irk batch",
     ),
     ("plot", "structure scalar ocp"),
     (

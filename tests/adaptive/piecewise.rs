@@ -236,3 +236,38 @@ fn mistakes_are_errors() {
     assert_close(x, [(-2.5_f64).exp()], 1e-4);
     assert!(matches!(horizon.dense(2.6), Err(Error::OutsideInterval { .. })));
 }
+
+/// `ẋ = 10³⁰⁸ p`
+#[ode]
+fn pushed(_x: f64, _u: f64, p: f64) -> f64 {
+    1e308 * p
+}
+
+/// `ẋ = 10⁴ u` and `z = 10³⁰⁶ x`
+#[dae]
+fn steep(xdot: f64, x: f64, z: f64, u: f64) -> [f64; 2] {
+    [xdot - 1e4 * u, 1e-306 * z - x]
+}
+
+/// Those of each interval are numbers.
+#[test]
+fn derivatives_beyond_the_range_are_an_error() {
+    let adaptive = Adaptive::<Pushed, DormandPrince5>::new(options(1e-6)).unwrap();
+    let mut horizon = Piecewise::new(adaptive);
+    horizon.integrator().set_parameters(&vector![0.0]).unwrap();
+    let (x0, u, ends) = (Vector1::new(1.0), [vector![0.0]; 4], [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(horizon.solve(&x0, &u, &ends).unwrap().x, x0);
+    for result in [
+        horizon.forward(&x0, &u, &ends).map(|_| ()),
+        horizon.adjoint(&x0, &u, &ends, &Vector1::new(1.0)).map(|_| ()),
+        horizon.hessian(&x0, &u, &ends, &Vector1::new(1.0)).map(|_| ()),
+    ] {
+        assert!(matches!(result, Err(Error::Overflow { .. })), "{result:?}");
+    }
+
+    let mut horizon = Piecewise::new(Adaptive::<Steep, Radau>::new(options(1e-6)).unwrap());
+    let (x0, u) = (Vector1::new(0.0), [vector![0.0]; 2]);
+    assert!(horizon.solve(&x0, &u, &ends[..2]).is_ok());
+    let result = horizon.forward(&x0, &u, &ends[..2]).map(|_| ());
+    assert!(matches!(result, Err(Error::Overflow { .. })), "{result:?}");
+}

@@ -199,6 +199,11 @@ fn saved_and_read() -> Test {
     let text = serde_json::to_string(&solution)?;
     let again: Trajectory = serde_json::from_str(&text)?;
     assert_eq!(again, solution);
+    // Of a series that was written elsewhere there may be no times.
+    let mut elsewhere = again.series()[0].clone();
+    assert_eq!(again.times_of(&elsewhere), again.times());
+    elsewhere.first = usize::MAX;
+    assert!(again.times_of(&elsewhere).is_empty());
     ocp.guess(&[0.0; 2], &[0.0])?.restore(&again)?;
     assert_eq!(ocp.solution()?, solution);
     Ok(())

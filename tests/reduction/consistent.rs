@@ -4,7 +4,7 @@ use super::mechanisms::{CarAxis, Pendulum};
 use bytemuck::Zeroable;
 use casados::__private::function::ArrayV;
 use casados::error::Argument;
-use casados::{Consistent, Constrained, Dae, Function, Inconsistent, Shape};
+use casados::{Consistent, Constrained, Dae, Function, Inconsistent, Shape, dae};
 use nalgebra::{DMatrix, DVector, Vector4, vector};
 
 const LENGTH: f64 = 0.7;
@@ -100,4 +100,18 @@ fn what_cannot_be_satisfied_is_named() {
     let nan = solve(all, vector![0.4, f64::NAN, 0.3, 0.2], LENGTH).unwrap_err();
     assert!(matches!(nan, Inconsistent::NonFiniteInput { argument: Argument::X0, index: 1, .. }), "{nan}");
     assert_eq!(<Pendulum as Dae>::Shape::NX, 4);
+}
+
+/// A point on a rail whose place is `10¹⁰ p`.
+#[dae(index_reduction)]
+fn rail(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
+    [xdot[0] - x[1], xdot[1] - z, 1e-10 * x[0] - p]
+}
+
+#[test]
+fn states_beyond_the_range_are_an_error() {
+    let solve = |p: f64| Consistent::<Rail>::new().solve(&vector![1.0, 1.0], &vector![p], 0.0);
+    assert!((solve(2.0).unwrap() - vector![2e10, 0.0]).amax() < 1e-5);
+    let error = solve(1e300).unwrap_err();
+    assert!(matches!(error, Inconsistent::NonFinite { .. }), "{error}");
 }

@@ -1,6 +1,7 @@
 //! Intervals that are divided: four parts of one step are four steps, in values and all
 //! derivatives; and the projection of every step.
 
+use casados::error::Argument;
 use casados::prelude::*;
 use casados::result::Hessian;
 use casados::testing::check_sensitivities;
@@ -137,9 +138,33 @@ fn what_is_wrong_in_a_part_is_told() {
     assert_eq!(divided.solve(&x0, &u, H).unwrap_err(), Error::ParametersNotSet);
     divided.set_parameters(&vector![9.0, 0.2]).unwrap();
     assert!(matches!(divided.solve(&x0, &u, f64::NAN), Err(Error::NonFiniteInput { .. })));
-    assert!(matches!(
-        divided.adjoint(&x0, &u, H, &vector![f64::NAN, 0.0]),
-        Err(Error::NonFiniteInput { .. })
-    ));
+    let lambda = vector![f64::NAN, 0.0];
+    for error in
+        [divided.adjoint(&x0, &u, H, &lambda).map(|_| ()), divided.hessian(&x0, &u, H, &lambda).map(|_| ())]
+    {
+        let Err(Error::NonFiniteInput { argument, name, .. }) = error else { panic!("{error:?}") };
+        assert_eq!((argument, name), (Argument::Lambda, "x[0]"));
+    }
     assert!(divided.hessian(&x0, &u, H, &vector![1.0, 0.0]).is_ok());
+}
+
+/// A force of `1e308 u`.
+#[ode]
+fn pushed(_x: [f64; 1], u: f64) -> [f64; 1] {
+    [1e308 * u]
+}
+
+/// The derivatives of each part are numbers, and their sum is none.
+#[test]
+fn results_beyond_the_range_are_an_error() {
+    let mut divided = Divided::<_, 4>::new(Erk::<Pushed, Rk4>::new(Options::default()).unwrap());
+    let (x0, u, lambda) = (vector![1.0], vector![0.0], vector![1.0]);
+    assert_eq!(divided.solve(&x0, &u, 4.0).unwrap().x, x0);
+    for result in [
+        divided.forward(&x0, &u, 4.0).map(|_| ()),
+        divided.adjoint(&x0, &u, 4.0, &lambda).map(|_| ()),
+        divided.hessian(&x0, &u, 4.0, &lambda).map(|_| ()),
+    ] {
+        assert!(matches!(result, Err(Error::Overflow { .. })), "{result:?}");
+    }
 }

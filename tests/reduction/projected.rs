@@ -1,6 +1,7 @@
 //! Projection onto the invariants at the end of every step: they hold to rounding, and derivatives
 //! of first and second order are those of the projected map.
 
+use casados::error::Quantity;
 use casados::prelude::*;
 use casados::testing::check_sensitivities;
 use casados::{Error, Integrator, Projected};
@@ -157,4 +158,70 @@ fn what_cannot_be_projected_is_an_error() {
     // It is usable after that.
     irk.set_parameters(&vector![0.7]).unwrap();
     assert!(irk.solve(&vector![0.7, 0.0, 0.0, 0.0], &vector![], 0.01).is_ok());
+}
+
+/// A circle whose squared length has a value at `p = 0`, and no derivative.
+#[dae(index_reduction(projection))]
+fn edge(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] + z * x[0],
+        xdot[3] + z * x[1] + 9.81,
+        x[0] * x[0] + x[1] * x[1] - 1.0 - p.sqrt(),
+    ]
+}
+
+/// The same with a first derivative, and no second one.
+#[dae(index_reduction(projection))]
+fn corner(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] + z * x[0],
+        xdot[3] + z * x[1] + 9.81,
+        x[0] * x[0] + x[1] * x[1] - 1.0 - p.powf(1.5),
+    ]
+}
+
+#[test]
+fn derivatives_by_parameters_are_finite_or_an_error() {
+    let (x0, lambda) = (vector![1.0, 0.0, 0.0, 0.0], vector![1.0, 2.0, 3.0, 4.0]);
+    let mut edge = Projected::new(Irk::<Edge, RadauIIA<2>>::new(Options::default()).unwrap());
+    edge.set_parameters(&vector![0.0]).unwrap();
+    assert!(edge.solve(&x0, &vector![], 0.1).is_ok());
+    for error in [
+        edge.forward(&x0, &vector![], 0.1).map(|_| ()),
+        edge.adjoint(&x0, &vector![], 0.1, &lambda).map(|_| ()),
+        edge.hessian(&x0, &vector![], 0.1, &lambda).map(|_| ()),
+    ] {
+        let Err(Error::NonFiniteModel { quantity, equation, value, .. }) = error else { panic!("{error:?}") };
+        assert_eq!((quantity, equation, value), (Quantity::Jacobian, 4, f64::NEG_INFINITY));
+    }
+    let mut corner = Projected::new(Irk::<Corner, RadauIIA<2>>::new(Options::default()).unwrap());
+    corner.set_parameters(&vector![0.0]).unwrap();
+    assert_eq!(corner.forward(&x0, &vector![], 0.1).unwrap().dx_dp.amax(), 0.0);
+    let error = corner.hessian(&x0, &vector![], 0.1, &lambda).map(|_| ()).unwrap_err();
+    assert!(matches!(error, Error::Overflow { .. }), "{error}");
+}
+
+#[test]
+fn parameters_and_time_are_those_of_the_projection() {
+    let x0 = vector![0.4, (1.3f64 * 0.4).sin() + 0.1 * 0.3f64.sin(), 0.8, 0.7];
+    let mut irk = Irk::<Bead, RadauIIA<1>>::new(Options::default()).unwrap();
+    irk.set_parameters(&vector![1.3]).unwrap();
+    irk.set_time(2.0).unwrap();
+    // What the integrator was given before is not known here.
+    let mut bead = Projected::new(irk);
+    let u = vector![0.6];
+    assert_eq!(bead.solve(&x0, &u, 0.25).unwrap_err(), Error::ParametersNotSet);
+    assert_eq!(bead.forward(&x0, &u, 0.25).map(|_| ()), Err(Error::ParametersNotSet));
+    bead.set_parameters(&vector![1.3]).unwrap();
+    let begun = bead.solve(&x0, &u, 0.25).unwrap().x;
+    bead.set_time(0.0).unwrap();
+    assert_eq!(begun, bead.solve(&x0, &u, 0.25).unwrap().x);
+    // Nor what it is given behind the projection.
+    bead.integrator().set_parameters(&vector![2.0]).unwrap();
+    bead.integrator().set_time(1.0).unwrap();
+    assert_eq!(begun, bead.solve(&x0, &u, 0.25).unwrap().x);
 }

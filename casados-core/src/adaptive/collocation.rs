@@ -21,7 +21,8 @@ use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
 use super::stages::{Convergence, Failure, FilteredDefect, Look, MOST, Stages, Start};
 use crate::error::Error;
-use crate::irk::{dot, not_finite};
+use crate::finite::not_finite;
+use crate::irk::dot;
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
@@ -87,10 +88,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         self.memory.factors.factor(jacobian, self.scheme.basis.values(), h)
     }
 
-    fn set_pivoted(&mut self, pivoted: bool) -> bool {
-        let planned = self.memory.factors.is_planned();
+    fn set_pivoted(&mut self, pivoted: bool) {
         self.memory.factors.set_pivoted(pivoted);
-        planned != self.memory.factors.is_planned()
     }
 
     fn begin(&mut self, point: &ArrayV<M, T>) {

@@ -11,19 +11,12 @@ use crate::scalar::{Real, Scalar};
 /// it says all, and the second one fades out.
 pub(super) const LENIENT: f64 = 4.0;
 
-/// What the controller may do, of one method.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// A step is this much shorter than the one that would just be accepted.
-    pub safety: f64,
-    /// The most by which a step is shorter than the one before.
-    pub shrink: f64,
-    /// The most by which a step is longer than the one before.
-    pub grow: f64,
-}
-
-/// Of implicit methods.
-pub(super) const IMPLICIT: Limits = Limits { safety: 0.9, shrink: 0.2, grow: 8.0 };
+/// A step of an implicit method is this much shorter than the one that would just be accepted,
+const SAFETY: f64 = 0.9;
+/// by no more than this shorter than the one before,
+const SHRINK: f64 = 0.2;
+/// and by no more than this longer.
+const GROW: f64 = 8.0;
 
 /// What is remembered of the last accepted step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,13 +28,13 @@ impl Predictive {
     /// The factor for the step size after a step of size `h` with the estimated error `error`,
     /// relative to the tolerance, that behaves like `h^(1/exponent)`. `effort` is one, or less if
     /// the step took many iterations.
-    pub fn factor(&mut self, h: f64, error: f64, exponent: f64, effort: f64, limits: &Limits) -> f64 {
-        let safety = limits.safety * effort;
-        let (least, most) = (1.0 / limits.grow, 1.0 / limits.shrink);
+    pub fn factor(&mut self, h: f64, error: f64, exponent: f64, effort: f64) -> f64 {
+        let safety = SAFETY * effort;
+        let (least, most) = (1.0 / GROW, 1.0 / SHRINK);
         let mut quotient = (power(error, exponent) / safety).clamp(least, most);
         if error < 1.0 {
             if let Some((step, before)) = self.last {
-                let predicted = step / h * power(error * error / before, exponent) / limits.safety;
+                let predicted = step / h * power(error * error / before, exponent) / SAFETY;
                 quotient = quotient.max(predicted.clamp(least, most));
             }
             self.last = Some((h, error.max(1e-2)));
@@ -236,7 +229,7 @@ impl Proportional {
     /// difference by chance, and would be accepted.
     pub fn error_of_difference<T: Real>(&mut self, direction: f64, t: T, h: T, difference: f64) -> f64 {
         let (t, h) = (direction * t.to_f64(), h.to_f64().abs());
-        let is_over_jump = t < self.refused_to && h > Self::SHORTEST * T::EPSILON.to_f64() * t.abs();
+        let is_over_jump = t < self.refused_to && h > Self::SHORTEST * T::EPSILON * t.abs();
         if difference >= MUCH {
             self.refused_to = self.refused_to.max(t + h);
         }

@@ -4,6 +4,7 @@ use super::norm::norm;
 use super::pairs::Pair;
 use crate::erk::{Grid, Point, Record, Scheme};
 use crate::error::{Error, Place};
+use crate::finite::check_output;
 use crate::model::{ArrayX, Dae, Ode};
 use crate::result::Dense;
 use crate::scalar::Real;
@@ -256,7 +257,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
             let cubic = change - h * end_slope[index] - bend;
             *to = start + theta * (change + rest * (bend + theta * (cubic + *to)));
         }
-        Ok(())
+        check_output(to, 0)
     }
 
     fn is_stiff(&self) -> bool {

@@ -48,8 +48,7 @@ impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error> {
         let stages = state.levels.get::<B>(entry.level)?;
-        interpolate(stages, x, y, t - entry.t, entry.h, dense);
-        Ok(())
+        interpolate(stages, x, y, t - entry.t, entry.h, dense)
     }
 
     fn replays(state: &mut Self::State) -> &mut Self::Replays {

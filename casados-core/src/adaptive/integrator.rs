@@ -14,8 +14,8 @@ use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
+use crate::finite::{check_input, check_named};
 use crate::integrator::{self, Integrator as _};
-use crate::irk::{check, check_named};
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -92,7 +92,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
-        options.check(T::EPSILON.to_f64())?;
+        options.check::<T>()?;
         let out_of_memory = Error::OutOfMemory { bytes: size_of::<Base<M, T>>() };
         let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
@@ -124,7 +124,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &self.options
     }
 
-    /// What the last call did, successful or not.
+    /// What the last call did to choose its steps, successful or not.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
@@ -180,7 +180,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         mut output: impl FnMut(T, &Dense<M, T>),
     ) -> Result<&Nominal<M, T>, Error> {
         self.last = None;
-        check(Argument::T, times)?;
+        check_input(Argument::T, times)?;
         let (start, end) = (self.start, self.end(h)?);
         let mut before = start;
         for (index, t) in times.iter().enumerate() {
@@ -220,9 +220,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     ///
     /// # Errors
     /// [`Error::NoResult`], also if that call failed or steps are not remembered;
-    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        check(Argument::T, &[t])?;
+        check_input(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;
         self.dense_in(span, t)
     }
@@ -281,7 +281,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
     /// resolve.
     pub(super) fn end(&self, h: T) -> Result<T, Error> {
-        check(Argument::H, &[h])?;
+        check_input(Argument::H, &[h])?;
         let end = self.start + h;
         if end == self.start && h != T::ZERO {
             let (t, h) = (self.start.to_f64(), h.to_f64());
@@ -295,7 +295,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.statistics = AdaptiveStatistics::default();
         check_named::<M, T>(Argument::X0, x0.as_slice())?;
         check_named::<M, T>(Argument::U, u.as_slice())?;
-        check(Argument::T, &[t_end, t_end - self.start])?;
+        check_input(Argument::T, &[t_end, t_end - self.start])?;
         if !self.parameters {
             return Err(Error::ParametersNotSet);
         }

@@ -3,6 +3,7 @@
 use super::sealed::Family;
 use super::stages::Stages;
 use crate::error::Error;
+use crate::finite::check_output;
 use crate::model::Dae;
 use crate::result::Dense;
 use crate::scalar::Real;
@@ -60,6 +61,9 @@ pub(super) fn weighted<T: Real>(weights: &[f64], y: &[T]) -> T {
 
 /// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`,
 /// `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+///
+/// # Errors
+/// [`Error::Overflow`]
 pub(super) fn interpolate<M: Dae, T: Real>(
     stages: &dyn Stages<M, T>,
     x: &[T],
@@ -67,7 +71,7 @@ pub(super) fn interpolate<M: Dae, T: Real>(
     passed: T,
     h: T,
     dense: &mut Dense<M, T>,
-) {
+) -> Result<(), Error> {
     let theta = (passed / h).to_f64();
     let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
     let mut unknowns = y.chunks_exact(stages.count());
@@ -77,4 +81,6 @@ pub(super) fn interpolate<M: Dae, T: Real>(
     for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
         *to = weighted(&lagrange, z);
     }
+    check_output(dense.x.as_slice(), 0)?;
+    check_output(dense.z.as_slice(), 0)
 }

@@ -210,8 +210,6 @@ mod sealed {
     pub trait Family: 'static {
         /// How many.
         const LEVELS: usize;
-        /// The number of stages of the first.
-        const STAGES: usize;
         /// See [`Engine`].
         const ENDS_ON_STAGE: bool;
         /// What takes their steps again.
@@ -227,7 +225,6 @@ use sealed::Family;
 
 impl Family for Radau {
     const LEVELS: usize = 3;
-    const STAGES: usize = 3;
     const ENDS_ON_STAGE: bool = true;
     type Replays<M: Dae, T: Real> =
         Three<Single<M, RadauIIA<3>, T, 3>, Single<M, RadauIIA<5>, T, 5>, Single<M, RadauIIA<7>, T, 7>>;
@@ -244,7 +241,6 @@ macro_rules! single {
     ($($method:ident: $stages:literal, $groups:literal, $ends_on_stage:literal);*) => {
         $(impl Family for $method<$stages> {
             const LEVELS: usize = 1;
-            const STAGES: usize = $stages;
             const ENDS_ON_STAGE: bool = $ends_on_stage;
             type Replays<M: Dae, T: Real> = Single<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {

@@ -1,6 +1,7 @@
 //! What can be chosen about an adaptive integrator.
 
 use crate::error::Error;
+use crate::scalar::Real;
 
 /// What can be chosen about an adaptive integrator.
 ///
@@ -27,7 +28,7 @@ use crate::error::Error;
 pub struct AdaptiveOptions {
     /// Relative tolerance of the error of one step, between 10 ε of the number type and 1.
     pub rtol: f64,
-    /// Absolute tolerance of the error of one step, finite and above zero.
+    /// Absolute tolerance of the error of one step, finite and above zero in the number type.
     pub atol: f64,
     /// The length of the first step, finite and above zero; chosen if it is not given.
     pub initial_step: Option<f64>,
@@ -65,12 +66,11 @@ const FINEST: f64 = 10.0;
 
 impl AdaptiveOptions {
     /// # Errors
-    /// [`Error::InvalidOption`] for the first value that makes no sense. `epsilon` is that of the
-    /// number type.
-    pub fn check(&self, epsilon: f64) -> Result<(), Error> {
+    /// [`Error::InvalidOption`] for the first value that makes no sense with the number type.
+    pub fn check<T: Real>(&self) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
-        check_relative(self.rtol, epsilon)?;
-        check_absolute(self.atol)?;
+        check_relative::<T>(self.rtol)?;
+        check_absolute::<T>(self.atol)?;
         if let Some(step) = self.initial_step
             && !(step > 0.0 && step.is_finite())
         {
@@ -91,8 +91,8 @@ impl AdaptiveOptions {
 
 /// # Errors
 /// [`Error::InvalidOption`]
-pub(super) fn check_relative(rtol: f64, epsilon: f64) -> Result<(), Error> {
-    if rtol >= FINEST * epsilon && rtol <= 1.0 {
+pub(super) fn check_relative<T: Real>(rtol: f64) -> Result<(), Error> {
+    if rtol >= FINEST * T::EPSILON && rtol <= 1.0 {
         return Ok(());
     }
     Err(Error::InvalidOption {
@@ -104,13 +104,14 @@ pub(super) fn check_relative(rtol: f64, epsilon: f64) -> Result<(), Error> {
 
 /// # Errors
 /// [`Error::InvalidOption`]
-pub(super) fn check_absolute(atol: f64) -> Result<(), Error> {
-    if atol > 0.0 && atol.is_finite() {
+pub(super) fn check_absolute<T: Real>(atol: f64) -> Result<(), Error> {
+    let number = T::from_f64(atol);
+    if number > T::ZERO && number.is_finite() {
         return Ok(());
     }
     Err(Error::InvalidOption {
         option: "atol",
         value: atol,
-        reason: "an absolute tolerance is finite and above 0",
+        reason: "an absolute tolerance is finite and above 0 in the number type",
     })
 }

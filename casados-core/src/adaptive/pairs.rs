@@ -39,11 +39,11 @@ pub trait Pair<const S: usize>: Method<S> {
     /// of those above.
     const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
 
-    /// The estimate from the two differences.
+    /// The estimate from the two differences; what is not finite stays so.
     fn combined(fine: f64, coarse: Option<f64>) -> f64 {
         let Some(coarse) = coarse else { return fine };
         let both = fine * fine + 0.01 * coarse * coarse;
-        if both > 0.0 { fine * fine / Scalar::sqrt(both) } else { 0.0 }
+        if both > 0.0 && both.is_finite() { fine * fine / Scalar::sqrt(both) } else { both }
     }
 }
 
@@ -270,4 +270,19 @@ impl Pair<12> for DormandPrince8 {
             [96.32455395918828, -39.17726167561544, -149.72683625798564],
         ),
     ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_no_error_of_zero() {
+        let combined = <DormandPrince8 as Pair<12>>::combined;
+        assert_eq!((combined(0.0, Some(0.0)), combined(0.3, Some(0.0))), (0.0, 0.3));
+        assert!((combined(0.3, Some(4.0)) - 0.09 / 0.5).abs() < 1e-15);
+        for [fine, coarse] in [[f64::NAN, 1.0], [1.0, f64::NAN], [1.0, f64::INFINITY], [1e200, 1.0]] {
+            assert!(!combined(fine, Some(coarse)).is_finite(), "{fine} {coarse}");
+        }
+    }
 }

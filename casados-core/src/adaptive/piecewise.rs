@@ -22,7 +22,7 @@ use super::segment::{Segment, add, dense, filled, refill};
 use super::sensitivities::{Memory, chain, dynamic, fill, place};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
-use crate::irk::{check, check_named};
+use crate::finite::{check_input, check_named, check_output};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
 use crate::quadrature::{Along, Backwards, begin, finish, reborrow};
@@ -99,7 +99,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         &mut self.integrator
     }
 
-    /// What the last call did in all intervals.
+    /// What the last call did to choose its steps, in all intervals.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
@@ -243,6 +243,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
             axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
+        // Those by `x₀` and each control are of one interval, which has looked at them.
+        check_output(result.grad_p.as_slice(), 0)?;
         self.solved = true;
         Ok(result)
     }
@@ -303,15 +305,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             at.project(k, step.as_ref(), v, product, sum);
             segment.history = history;
         }
+        check_output(adjoint.grad_p.as_slice(), 0)?;
+        check_output(sum, 0)?;
         let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(sum)?;
         let result = PiecewiseHessian { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp };
-        match sum.iter().position(|value| !value.is_finite()) {
-            Some(index) => Err(Error::Overflow { step: 0, index }),
-            None => {
-                self.solved = true;
-                Ok(result)
-            }
-        }
+        self.solved = true;
+        Ok(result)
     }
 
     /// Following calls take the steps of the last successful one, whatever they are given, and

@@ -16,7 +16,7 @@ use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
-use crate::irk::not_finite;
+use crate::finite::not_finite;
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
@@ -116,8 +116,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ) -> Result<(), Error> {
         self.prepare(x0, span)?;
         self.begin_sensitivities(x0, span.start)?;
-        self.tighten::<B>(B::STAGES);
-        levels.get::<B>(0)?;
+        let stages = levels.get::<B>(0)?.count();
+        self.tighten::<B>(stages);
         let mut walk = Walk::new(span, self.options.max_step);
         let first = self.first_step(span, walk.longest)?;
         if span.end == span.start {

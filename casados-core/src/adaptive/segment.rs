@@ -7,7 +7,7 @@ use super::sealed::Engine;
 use super::sensitivities::{Frozen, Memory};
 use super::tape::Tape;
 use crate::error::{Argument, Error};
-use crate::irk::check;
+use crate::finite::check_input;
 use crate::model::{ArrayK, Dae, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
@@ -85,7 +85,7 @@ pub(super) fn dense<'a, M: Dae, B: Engine<M, T>, T: Real>(
     end: &Nominal<M, T>,
     t: T,
 ) -> Result<&'a Dense<M, T>, Error> {
-    check(Argument::T, &[t])?;
+    check_input(Argument::T, &[t])?;
     let (Some(first), Some(last)) = (segments.first(), segments.last()) else {
         return Err(Error::NoResult);
     };

@@ -11,7 +11,7 @@
 
 mod blocks;
 
-use blocks::{algebraic, finite, in_step};
+use blocks::{algebraic, in_step};
 pub(super) use blocks::{fill, place};
 
 use super::consistent::Consistent;
@@ -21,7 +21,7 @@ use super::run::{Base, Span};
 use super::sealed::Engine;
 use super::tape::Tape;
 use crate::error::Error;
-use crate::irk::{check_result, not_finite};
+use crate::finite::{check_forward, check_output};
 use crate::linalg::axpy;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorX, VectorZ};
 use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
@@ -168,8 +168,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         let count = self.tape.entries().len();
         self.steps::<B>(state, x0, |replays, taken, step| {
             if let Some(history) = &mut history {
-                let bytes = history.len().saturating_mul(size_of::<T>());
-                history.try_reserve(nx * M::Shape::NW).map_err(|_| Error::OutOfMemory { bytes })?;
+                let more = nx * M::Shape::NW;
+                let bytes = history.len().saturating_add(more).saturating_mul(size_of::<T>());
+                history.try_reserve(more).map_err(|_| Error::OutOfMemory { bytes })?;
                 for row in v.as_ref() {
                     history.extend_from_slice(row.as_ref());
                 }
@@ -223,7 +224,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         }
         result.nominal = self.base.result;
         finish(&mut along)?;
-        check_result(result, count)
+        check_forward(result, count)
     }
 
     /// The gradient of `λᵀx`, after the solution: backwards over the steps.
@@ -262,8 +263,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         let others = &gradient.as_ref()[nx..];
         adjoint.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
         adjoint.grad_p.as_mut_slice().copy_from_slice(&others[nu..]);
-        finite(now.as_slice())?;
-        finite(others)
+        check_output(now.as_slice(), 0)?;
+        check_output(others, 0)
     }
 
     /// The gradient and the Hessian of `λᵀx`, after [`Frozen::forward`] with its history.
@@ -339,10 +340,10 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         hessian.first.grad_x0 = *now;
         hessian.first.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
         hessian.first.grad_p.as_mut_slice().copy_from_slice(&others[nu..nu + np]);
-        finite(now.as_slice())?;
-        finite(others)?;
+        check_output(now.as_slice(), 0)?;
+        check_output(others, 0)?;
         for row in sum {
-            finite(row.as_ref())?;
+            check_output(row.as_ref(), 0)?;
         }
         Ok(())
     }

@@ -150,9 +150,8 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// The unknown for which there is no pivot.
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize>;
-    /// From now on, whether every matrix is to be pivoted as a whole; whether that changes
-    /// anything.
-    fn set_pivoted(&mut self, pivoted: bool) -> bool;
+    /// From now on, whether every matrix is to be pivoted as a whole.
+    fn set_pivoted(&mut self, pivoted: bool);
     /// Starts from the same `ẋ` and `z` at all stages, those of the start of the step.
     fn begin(&mut self, point: &ArrayV<M, T>);
     /// Starts from the polynomial of the last accepted step, whose size is given relative to this

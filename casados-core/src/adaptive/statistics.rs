@@ -1,6 +1,9 @@
 //! What the last call did.
 
-/// What the last call of an adaptive integrator did, successful or not.
+/// What the last call of an adaptive integrator did to choose its steps, successful or not.
+///
+/// Steps that are there are taken again for derivatives and integrals, and by all calls while they
+/// are frozen: what that takes is not counted. So all is zero of calls with frozen steps.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -24,7 +27,8 @@ pub struct AdaptiveStatistics {
     pub steps: usize,
     /// Steps whose error was too large.
     pub rejected: usize,
-    /// Steps whose stages were not found: Newton's method was slow or failed.
+    /// Steps without an estimate of their error: Newton's method was slow or failed, the matrix was
+    /// singular, or a value was not finite.
     pub failed: usize,
     /// Evaluations of the residual at one point.
     pub residuals: usize,

@@ -318,10 +318,11 @@ impl<M: Ode, T: Real> Variational<M, T> {
             };
             let fine = size(&error);
             let coarse = B::COARSE.and_then(|_| coarse.as_ref().get(direction)).map(size);
-            worst = worst.max(B::combined(fine, coarse));
-            if !fine.is_finite() {
+            let combined = B::combined(fine, coarse);
+            if !combined.is_finite() {
                 return Ok(f64::NAN);
             }
+            worst = worst.max(combined);
         }
         Ok(worst)
     }

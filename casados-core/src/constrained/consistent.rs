@@ -219,7 +219,8 @@ impl<M: Constrained, T: Real> Work<M, T> {
         Ok(())
     }
 
-    /// The next iterate, and by how much it moved, relative to the size of the states.
+    /// The next iterate, and by how much it moved, relative to the size of the states; NaN if it is
+    /// not finite.
     fn advance(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
         let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
         let (given, found) = (given.as_slice(), found.as_mut_slice());
@@ -243,6 +244,10 @@ impl<M: Constrained, T: Real> Work<M, T> {
             moved = moved.max((next - found[state]).to_f64().abs());
             size = size.max(next.to_f64().abs());
             found[state] = next;
+        }
+        // A maximum does not show what is not a number.
+        if not_finite(found).is_some() {
+            return f64::NAN;
         }
         if size > 0.0 { moved / size } else { moved }
     }

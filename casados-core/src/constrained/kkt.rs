@@ -11,7 +11,7 @@
 //! macro writes `F` and its derivatives.
 
 use super::Projectable;
-use crate::error::Error;
+use crate::error::{Error, Place, Quantity};
 use crate::finite::not_finite;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::model::{VectorP, VectorX};
@@ -102,7 +102,27 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
                 change(&mut self.factors, row, column, |_| value);
             }
         }
-        if not_finite(self.f.as_ref()).is_some() || !self.factorise() { Err(self.refusal()) } else { Ok(()) }
+        let finite =
+            [self.f.as_ref(), self.factors.as_slice()].iter().all(|values| not_finite(values).is_none());
+        if finite && self.factorise() { Ok(()) } else { Err(self.refusal()) }
+    }
+
+    /// # Errors
+    /// [`Error::NonFiniteModel`] where the invariants have a value, but no derivative by a
+    /// parameter.
+    pub fn check_parameters(&self) -> Result<(), Error> {
+        // Of the invariants, if they have one; those of `Gᵀν` are in the rows before.
+        let mut found: Option<(usize, T)> = None;
+        self.by_parameters(|row, _, value| {
+            if !value.is_finite() && found.is_none_or(|(last, _)| last < row) {
+                found = Some((row, value));
+            }
+        });
+        let Some((row, value)) = found else { return Ok(()) };
+        let (equation, _) = invariant::<M>(row.saturating_sub(M::Shape::NX));
+        let at = Place { step: 0, stage: 0, iteration: 0 };
+        let (quantity, equation) = (Quantity::Jacobian, equation as usize);
+        Err(Error::NonFiniteModel { quantity, equation, value: value.to_f64(), at })
     }
 
     /// What is violated most.
@@ -114,9 +134,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
                 (worst, residual) = (output, value);
             }
         }
-        let reduction = M::STRUCTURE.reduction;
-        let (equation, derivative) =
-            reduction.and_then(|reduction| reduction.invariant(worst)).unwrap_or((0, 0));
+        let (equation, derivative) = invariant::<M>(worst);
         Error::NotProjected { equation, derivative, residual }
     }
 
@@ -231,6 +249,11 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     ) {
         <Equations<M> as Function>::hessian::<T>(&self.v, mu, hessian);
     }
+}
+
+/// The equation of an invariant, and which derivative of it this is.
+fn invariant<M: Projectable>(index: usize) -> (u32, u32) {
+    M::STRUCTURE.reduction.and_then(|reduction| reduction.invariant(index)).unwrap_or((0, 0))
 }
 
 /// Exchanges two elements.

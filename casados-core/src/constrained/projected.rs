@@ -2,7 +2,8 @@
 
 use super::Projectable;
 use super::kkt::{Equations, Kkt, Variable, variable};
-use crate::error::Error;
+use crate::error::{Argument, Error};
+use crate::finite::{check_forward, check_named, check_output, check_second};
 use crate::function::{ArrayY, Function};
 use crate::integrator::Integrator;
 use crate::memory::{Family, Memory, WithAdjoint, WithForward, WithHessian};
@@ -49,7 +50,8 @@ use core::marker::PhantomData;
 #[non_exhaustive]
 pub struct Projected<I: Integrator<Model: Projectable>> {
     integrator: I,
-    parameters: VectorP<I::Model, I::Number>,
+    /// Those that were set.
+    parameters: Option<VectorP<I::Model, I::Number>>,
     time: I::Number,
     nominal: Place<I, NominalMemory<I::Model, I::Number>>,
     forward: <I::Memory as Memory>::Forward<Forward<I::Model, I::Number>>,
@@ -92,12 +94,13 @@ fn add<T: Real>(to: &mut [T], from: &[T]) {
 }
 
 impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I> {
-    /// The integrator with a projection. Parameters and the time of the integrator are those that
-    /// are set here, or zero.
+    /// The integrator with a projection. Its parameters have to be set here: without them there is
+    /// [`Error::ParametersNotSet`] of a model that has some. Its time is the one that is set here,
+    /// or zero.
     pub fn new(integrator: I) -> Self {
         Self {
             integrator,
-            parameters: VectorP::<M, T>::zeroed(),
+            parameters: None,
             time: T::ZERO,
             nominal: Default::default(),
             forward: Default::default(),
@@ -106,16 +109,41 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         }
     }
 
-    /// The integrator itself.
+    /// The integrator itself. Before each call it is given the parameters and the time that are set
+    /// here.
     pub fn integrator(&mut self) -> &mut I {
         &mut self.integrator
     }
 
-    /// Projects `x̂`, the end of a call.
-    fn project(&mut self, end: &Nominal<M, T>, h: T) -> Result<&mut NominalMemory<M, T>, Error> {
+    /// Before a call: the integrator has the parameters and the time of the projection.
+    ///
+    /// # Errors
+    /// [`Error::ParametersNotSet`]
+    fn begin(&mut self) -> Result<VectorP<M, T>, Error> {
+        self.integrator.set_time(self.time)?;
+        match &self.parameters {
+            Some(p) => {
+                self.integrator.set_parameters(p)?;
+                Ok(*p)
+            }
+            None if M::Shape::NP > 0 => Err(Error::ParametersNotSet),
+            None => Ok(VectorP::<M, T>::zeroed()),
+        }
+    }
+
+    /// Integrates, and projects the end.
+    fn project(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&mut NominalMemory<M, T>, Error> {
+        let p = self.begin()?;
+        let end = *self.integrator.solve_along(x0, u, h, along)?;
         let memory = I::Memory::nominal(&mut self.nominal)?;
-        memory.result = *end;
-        memory.kkt.project(&mut memory.result.x, &self.parameters, self.time + h)?;
+        memory.result = end;
+        memory.kkt.project(&mut memory.result.x, &p, self.time + h)?;
         Ok(memory)
     }
 }
@@ -146,7 +174,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
 
     fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         self.integrator.set_parameters(p)?;
-        self.parameters = *p;
+        self.parameters = Some(*p);
         Ok(())
     }
 
@@ -171,8 +199,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         h: T,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        let end = *self.integrator.solve_along(x0, u, h, along)?;
-        Ok(&self.project(&end, h)?.result)
+        Ok(&self.project(x0, u, h, along)?.result)
     }
 
     fn forward_along(
@@ -185,14 +212,17 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithForward,
     {
+        let p = self.begin()?;
         let forward = self.integrator.forward_along(x0, u, h, along)?;
         let result = I::Memory::forward(&mut self.forward)?;
         result.clone_from(forward);
         let memory = I::Memory::nominal(&mut self.nominal)?;
-        memory.kkt.project(&mut result.nominal.x, &self.parameters, self.time + h)?;
+        memory.kkt.project(&mut result.nominal.x, &p, self.time + h)?;
+        memory.kkt.check_parameters()?;
         directions(&memory.kkt, &mut result.dx_dx0, false, |_, _, _| {});
         directions(&memory.kkt, &mut result.dx_du, false, |_, _, _| {});
         directions(&memory.kkt, &mut result.dx_dp, true, |_, _, _| {});
+        check_forward(result, 0)?;
         Ok(result)
     }
 
@@ -207,10 +237,11 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithAdjoint<1>,
     {
-        crate::finite::check_named::<M, T>(crate::error::Argument::Lambda, lambda.as_slice())?;
-        let end = *self.integrator.solve(x0, u, h)?;
-        let memory = self.project(&end, h)?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        let memory = self.project(x0, u, h, None)?;
+        memory.kkt.check_parameters()?;
         let mu = memory.kkt.multipliers(lambda);
+        check_output(mu.as_ref(), 0)?;
         let mut of_integrator = VectorX::<M, T>::zeroed();
         of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
@@ -225,6 +256,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
                 *gradient = *gradient - value * *mu;
             }
         });
+        check_output(result.grad_p.as_slice(), 0)?;
         Ok(result)
     }
 
@@ -239,10 +271,11 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithHessian,
     {
-        crate::finite::check_named::<M, T>(crate::error::Argument::Lambda, lambda.as_slice())?;
-        let end = *self.integrator.solve(x0, u, h)?;
-        let memory = self.project(&end, h)?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        let memory = self.project(x0, u, h, None)?;
+        memory.kkt.check_parameters()?;
         let mu = memory.kkt.multipliers(lambda);
+        check_output(mu.as_ref(), 0)?;
         let mut of_integrator = VectorX::<M, T>::zeroed();
         of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
@@ -251,7 +284,11 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         memory.result.clone_from(hessian);
         let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
         memory.finish(kkt, &mu, x);
-        Ok(&memory.result)
+        let result = &memory.result;
+        check_forward(&result.first.forward, 0)?;
+        check_output(result.first.grad_p.as_slice(), 0)?;
+        check_second(result)?;
+        Ok(result)
     }
 }
 

@@ -61,7 +61,7 @@ pub trait Integrator {
     fn set_time(&mut self, t: Self::Number) -> Result<(), Error>;
     /// Forgets the warm start, of an integrator that has one.
     fn reset(&mut self);
-    /// What the last call did.
+    /// What the last call did; of an adaptive integrator what it did to choose its steps.
     fn statistics(&self) -> Statistics;
 
     /// As [`solve`](Self::solve), with an integrand or without.

@@ -47,20 +47,12 @@ pub use forward::{
 };
 pub use integrator::Integrator;
 
-// Finite checks, which rooms above find here too.
-pub(crate) use crate::finite::not_finite;
-#[cfg(feature = "alloc")]
-pub(crate) use crate::finite::{check_input as check, check_named};
-
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
     coefficients::{Coefficients, dot},
     driver::Arguments,
-    forward::{
-        gradient::{check_result, multiply},
-        memory::StepOf,
-    },
+    forward::{gradient::multiply, memory::StepOf},
     hessian::pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
     newton::iteration::StageEquations,

@@ -60,7 +60,7 @@ impl Labels {
     /// # Errors
     /// [`OcpError::InvalidValue`]
     pub fn check_finite<T: Real>(self, values: &[T]) -> Result<(), OcpError> {
-        match crate::irk::not_finite(values) {
+        match crate::finite::not_finite(values) {
             None => Ok(()),
             Some((index, value)) => Err(self.invalid(index, value)),
         }

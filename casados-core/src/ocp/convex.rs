@@ -50,13 +50,32 @@ pub trait Convex<T> {
     /// symmetric and positive semidefinite. Both are zero before the call.
     fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T;
 
-    /// What is wrong with its constants: which, their value, and what they have to be.
+    /// Whether its constants make sense.
     ///
     /// # Errors
-    /// These three.
-    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+    /// The first one that does not; problems say it as
+    /// [`OcpError::InvalidWeight`](super::OcpError::InvalidWeight).
+    fn check(&self) -> Result<(), InvalidConstant> {
         Ok(())
     }
+}
+
+/// A constant of a [`Convex`] function that makes no sense.
+///
+/// ```
+/// use casados::ocp::{Convex, Huber};
+///
+/// let invalid = Huber { weights: [1.0, 1.0], delta: [0.5, 0.0] }.check().unwrap_err();
+/// assert_eq!((invalid.output, invalid.value), (1, 0.0));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InvalidConstant {
+    /// The residual that it belongs to.
+    pub output: usize,
+    /// Its value.
+    pub value: f64,
+    /// What it has to be.
+    pub allowed: &'static str,
 }
 
 /// Huber's function of every residual, with a weight of its own: `½ w r²` where `|r| ≤ δ`, and
@@ -119,14 +138,15 @@ fn separate<T: Real, const NY: usize>(
 }
 
 /// Whether weights and `δ` make sense.
-fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), (usize, f64, &'static str)> {
+fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
+    let invalid = |output, value, allowed| Err(InvalidConstant { output, value, allowed });
     for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
         let (weight, delta) = (weight.to_f64(), delta.to_f64());
         if !(weight >= 0.0 && weight.is_finite()) {
-            return Err((i, weight, "finite and not negative"));
+            return invalid(i, weight, "finite and not negative");
         }
         if !(delta > 0.0 && delta.is_finite()) {
-            return Err((i, delta, "finite and positive: it is the `delta` of Huber's function"));
+            return invalid(i, delta, "finite and positive: it is the `delta` of Huber's function");
         }
     }
     Ok(())
@@ -144,7 +164,7 @@ impl<T: Real, const NY: usize> Convex<T> for Huber<T, NY> {
             }
         })
     }
-    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+    fn check(&self) -> Result<(), InvalidConstant> {
         check(&self.weights, &self.delta)
     }
 }
@@ -158,7 +178,7 @@ impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
             [r * r / (T::ONE + root), r / root, T::ONE / (root * root * root)]
         })
     }
-    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+    fn check(&self) -> Result<(), InvalidConstant> {
         check(&self.weights, &self.delta)
     }
 }
@@ -295,7 +315,7 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
     }
 
     fn check_weights(&self) -> Result<(), OcpError> {
-        self.outer.check().map_err(|(output, value, allowed)| {
+        self.outer.check().map_err(|InvalidConstant { output, value, allowed }| {
             let outputs = [output, output];
             OcpError::InvalidWeight { function: F::STRUCTURE.name, outputs, value, allowed }
         })

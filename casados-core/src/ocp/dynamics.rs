@@ -5,6 +5,7 @@ use super::error::OcpError;
 use super::names::Names;
 use super::pattern::Origin;
 use crate::model::Dae;
+use crate::qp::larger;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
@@ -307,11 +308,6 @@ pub(super) fn add_stages<T: Real>([sum, largest]: [T; 2], [more, other]: [T; 2])
     [sum + more, larger(largest, other)]
 }
 
-/// The larger one; what is not a number stays.
-pub(super) fn larger<T: PartialOrd>(a: T, b: T) -> T {
-    if b <= a { a } else { b }
-}
-
 /// A vector of these elements.
 pub(super) fn vector<T: Plain, V: Matrix<T>>(elements: &[T]) -> V {
     let mut vector = V::zeroed();
@@ -319,4 +315,17 @@ pub(super) fn vector<T: Plain, V: Matrix<T>>(elements: &[T]) -> V {
         *to = *from;
     }
     vector
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_stays() {
+        let first = add_stages([1.0, f64::NAN], [1.0, 2.0]);
+        let second = add_stages([1.0, 2.0], [1.0, f64::NAN]);
+        assert!(first[1].is_nan() && second[1].is_nan());
+        assert_eq!(add_stages([1.0, 2.0], [1.0, 3.0]), [2.0, 3.0]);
+    }
 }

@@ -298,7 +298,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let np = P::Shape::NP;
         let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
-        if let Some((index, _)) = crate::irk::not_finite(p) {
+        if let Some((index, _)) = crate::finite::not_finite(p) {
             let stage = index.checked_div(np).unwrap_or(0);
             return Err(OcpError::Missing { part: Part::Parameters, stage });
         }
@@ -309,7 +309,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::InvalidValue`]
     pub(super) fn check_iterate(&self) -> Result<(), OcpError> {
         // All numbers at once; names are looked for where one of these is not finite.
-        if crate::irk::not_finite(self.iterate.numbers()).is_some() { self.name_not_finite() } else { Ok(()) }
+        if crate::finite::not_finite(self.iterate.numbers()).is_some() {
+            self.name_not_finite()
+        } else {
+            Ok(())
+        }
     }
 
     /// Finds functions of algebraic states, where these have no derivatives.

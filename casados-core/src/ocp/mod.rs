@@ -142,7 +142,7 @@ pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};
-pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
+pub use convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
 pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};

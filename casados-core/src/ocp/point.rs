@@ -50,7 +50,7 @@ pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, [x, z, u, p]: [&[T];
 /// # Errors
 /// [`OcpError::NonFiniteFunction`]
 pub(super) fn finite_outputs<F: Function, T: Real>(y: &ArrayY<F, T>, stage: usize) -> Result<(), OcpError> {
-    match crate::irk::not_finite(y.as_ref()) {
+    match crate::finite::not_finite(y.as_ref()) {
         None => Ok(()),
         Some((output, value)) => {
             Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
@@ -66,7 +66,7 @@ pub(super) fn finite<F: Function, T: Real>(y: &ArrayY<F, T>, value: T, stage: us
     if value.is_finite() {
         return Ok(value);
     }
-    let (output, value) = crate::irk::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
+    let (output, value) = crate::finite::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
     Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
 }
 

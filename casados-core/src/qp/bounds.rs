@@ -85,7 +85,7 @@ pub struct BoundsMut<'a, T> {
 }
 
 impl<T: Real> BoundsMut<'_, T> {
-    /// One component.
+    /// One component; none if there is not as much.
     pub fn set(&mut self, index: usize, lower: T, upper: T) {
         for (bounds, value) in [(&mut *self.lower, lower), (&mut *self.upper, upper)] {
             if let Some(bound) = bounds.get_mut(index) {
@@ -93,12 +93,12 @@ impl<T: Real> BoundsMut<'_, T> {
             }
         }
     }
-    /// Makes both bounds of a component soft.
+    /// Makes both bounds of a component soft; of none if there is not as much.
     pub fn soften(&mut self, index: usize, linear: T, quadratic: T) {
         self.soften_side(index, Side::Lower, linear, quadratic);
         self.soften_side(index, Side::Upper, linear, quadratic);
     }
-    /// Makes one bound of a component soft.
+    /// Makes one bound of a component soft; of none if there is not as much.
     pub fn soften_side(&mut self, index: usize, side: Side, linear: T, quadratic: T) {
         let [of_linear, of_quadratic] = match side {
             Side::Lower => [&mut *self.lower_linear, &mut *self.lower_quadratic],

@@ -320,3 +320,18 @@ fn dense_derivatives_are_those_of_the_last_good_call() {
     }
     check!(Gauss<2>, Gauss<4>, RadauIIA<3>);
 }
+
+/// A tolerance of zero or infinity divides by that.
+#[test]
+fn tolerances_are_numbers_of_the_type() {
+    type Single = Adaptive<Growth, Radau, f32>;
+    for atol in [1e-60, 1e60] {
+        let options = AdaptiveOptions { rtol: 1e-4, atol, ..Default::default() };
+        assert!(Adaptive::<Growth, Radau>::new(options).is_ok());
+        let error = Single::new(options).map(|_| ()).unwrap_err();
+        assert!(
+            matches!(error, Error::InvalidOption { option: "atol", value, .. } if value == atol),
+            "{error}"
+        );
+    }
+}

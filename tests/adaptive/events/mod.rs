@@ -320,3 +320,35 @@ fn touching_and_undefined_functions() {
     let error = hybrid.solve(&Vector1::new(0.0), &vector![], 4.0).unwrap_err();
     assert!(matches!(error, Error::NonFiniteFunction { function: "Root", output: 0, .. }), "{error}");
 }
+
+#[ode]
+fn thrown(x: [f64; 2], _u: f64) -> [f64; 2] {
+    [x[1], -10.0]
+}
+
+#[function]
+fn above(x: [f64; 2], _u: f64) -> f64 {
+    x[0]
+}
+
+/// It has a value at `u = 0`, and no derivative.
+#[function]
+fn kicked(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[0], u.sqrt() - 0.8 * x[1]]
+}
+
+#[test]
+fn jumps_without_derivatives_are_an_error() {
+    let event = Event::jump::<Above, Kicked>(Crossing::Falling);
+    let adaptive = Adaptive::<Thrown, Radau>::new(options(1e-8)).unwrap();
+    let mut hybrid = Hybrid::new(adaptive, &[event]).unwrap();
+    let (x0, u, lambda) = (vector![5.0, 0.0], vector![0.0], vector![1.0, 1.0]);
+    assert!(hybrid.solve(&x0, &u, 1.5).is_ok());
+    for result in [
+        hybrid.forward(&x0, &u, 1.5).map(|_| ()),
+        hybrid.adjoint(&x0, &u, 1.5, &lambda).map(|_| ()),
+        hybrid.hessian(&x0, &u, 1.5, &lambda).map(|_| ()),
+    ] {
+        assert!(matches!(result, Err(Error::Overflow { .. })), "{result:?}");
+    }
+}

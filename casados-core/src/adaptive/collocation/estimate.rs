@@ -80,7 +80,9 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         self.defect(start.h, residuals)?;
         let first = norm(&self.memory.error.as_ref()[..nx], start.scale.as_ref());
         self.memory.error = at_end;
-        Ok(self.second(first, start).max(error))
+        let at_start = self.second(first, start);
+        // Written so that NaN stays.
+        Ok(if at_start <= error { error } else { at_start })
     }
 
     /// The residual at the point that is there.

@@ -2,7 +2,7 @@
 
 use super::Event;
 use crate::error::{Error, Place};
-use crate::irk::not_finite;
+use crate::finite::not_finite;
 use crate::model::{ArrayV, Dae, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};

@@ -7,7 +7,7 @@ use super::evaluate::{evaluate, finite};
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
-use crate::irk::check_named;
+use crate::finite::check_named;
 use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -134,7 +134,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
             let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
             let change = -value / products.fold(rate, |sum, (g, f)| sum + *g * *f);
-            let resolution = T::from_f64(T::EPSILON.to_f64()) * t.abs().max(whole.abs());
+            let resolution = T::from_f64(T::EPSILON) * t.abs().max(whole.abs());
             if change.abs() <= resolution
                 || (iteration > 3 && change.abs() >= last && last <= T::from_f64(64.0) * resolution)
             {

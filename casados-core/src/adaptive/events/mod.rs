@@ -33,7 +33,7 @@ use super::segment::{Segment, dense, refill};
 use super::sensitivities::{chain, dynamic, fill};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
-use crate::irk::{check_named, not_finite};
+use crate::finite::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
@@ -159,7 +159,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         self.most = most;
     }
 
-    /// What the last call did between all events.
+    /// What the last call did to choose its steps, between all events.
     #[must_use]
     pub fn statistics(&self) -> &AdaptiveStatistics {
         &self.statistics
@@ -306,6 +306,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             axpy(T::ONE, gradient.grad_u.as_slice(), result.grad_u.as_mut_slice());
             axpy(T::ONE, gradient.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
+        result.check()?;
         (self.moments, self.asked) = (moments, Some(span));
         Ok(result)
     }

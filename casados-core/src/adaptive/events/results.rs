@@ -1,6 +1,7 @@
 //! What calls with events return.
 
 use super::*;
+use crate::finite::check_gradient;
 
 /// An event that happened.
 ///
@@ -163,6 +164,14 @@ pub struct HybridAdjoint<M: Dae, T: Real = f64> {
     pub grad_u: VectorU<M, T>,
     /// `∇(λᵀx)` with respect to `p`
     pub grad_p: VectorP<M, T>,
+}
+
+impl<M: Dae, T: Real> HybridAdjoint<M, T> {
+    /// # Errors
+    /// [`Error::Overflow`] of the first derivative that is not finite.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        check_gradient(self.grad_x0.as_slice(), self.grad_u.as_slice(), self.grad_p.as_slice())
+    }
 }
 
 plain!([M: Dae, T: Real] Occurrence<M, T> { event, t, before, after });

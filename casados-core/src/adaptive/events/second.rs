@@ -18,7 +18,7 @@ use super::super::sealed::Engine;
 use super::super::sensitivities::{fill, place};
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::error::{Argument, Error};
-use crate::irk::{check_named, not_finite};
+use crate::finite::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
@@ -155,6 +155,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             segment.history = history;
             result?;
         }
+        adjoint.check()?;
         let (nx, nu, h) = (M::Shape::NX, M::Shape::NU, second.h.as_ref());
         if let Some((index, _)) = not_finite(ArrayW::<M, T>::flat(h)) {
             return Err(Error::Overflow { step: 0, index });

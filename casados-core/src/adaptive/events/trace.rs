@@ -9,7 +9,7 @@ use super::super::statistics::AdaptiveStatistics;
 use super::evaluate::{evaluate, finite, place};
 use super::{Event, Hybrid, Moment, Occurrence};
 use crate::error::{Argument, Error};
-use crate::irk::check_named;
+use crate::finite::check_named;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -191,7 +191,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             for (g, v) in gradient.as_ref().iter().zip(self.v.as_ref().as_ref()) {
                 size += (*g * *v).to_f64().abs();
             }
-            let is_apart = |size: f64| value.abs() > ROUNDING * T::EPSILON.to_f64() * size;
+            let is_apart = |size: f64| value.abs() > ROUNDING * T::EPSILON * size;
             // A segment after an event begins where a function is zero but for the rounding of the
             // time, which counts by the slope.
             if k == 0 && is_apart(size) {
@@ -244,7 +244,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 break;
             }
             (h, last) = (next, change.abs());
-            let resolution = T::from_f64(T::EPSILON.to_f64()) * time.abs().max(entry.h.abs());
+            let resolution = T::from_f64(T::EPSILON) * time.abs().max(entry.h.abs());
             if last <= resolution {
                 break;
             }

@@ -19,7 +19,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last time stays.
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
-        check(Argument::T, &[t])?;
+        check_input(Argument::T, &[t])?;
         self.start = t;
         Ok(())
     }
@@ -42,7 +42,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`]: then the last ones stay.
     pub fn set_relative_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for rtol in x.as_slice().iter().chain(z.as_slice()) {
-            check_relative(rtol.to_f64(), T::EPSILON.to_f64())?;
+            check_relative::<T>(rtol.to_f64())?;
         }
         stack::<M, T>(&mut self.base.rtol, x, z);
         Ok(())
@@ -54,7 +54,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`]: then the last ones stay.
     pub fn set_absolute_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for atol in x.as_slice().iter().chain(z.as_slice()) {
-            check_absolute(atol.to_f64())?;
+            check_absolute::<T>(atol.to_f64())?;
         }
         stack::<M, T>(&mut self.base.atol, x, z);
         Ok(())

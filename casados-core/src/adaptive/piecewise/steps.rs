@@ -19,7 +19,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.statistics = AdaptiveStatistics::default();
         self.integrator.reserve()?;
         check_named::<M, T>(Argument::X0, x0.as_slice())?;
-        check(Argument::T, ends)?;
+        check_input(Argument::T, ends)?;
         let start = self.integrator.start;
         let last = ends.last().copied().unwrap_or(start);
         let mut before = start;
@@ -159,6 +159,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             collect(nominal, &local.nominal, k);
             if k + 1 == *count {
                 at.chain(k, &local.dz_dx0, &local.dz_du, &local.dz_dp, v, next);
+                check_output(&next[..M::Shape::NZ * width], 0)?;
                 fill(&mut result.dz_dx0, |r, c| next[r * width + c]);
                 fill(&mut result.dz_dp, |r, c| next[r * width + at.p() + c]);
                 for (k, du) in result.dz_du.iter_mut().enumerate() {
@@ -177,9 +178,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         result.nominal = *nominal;
         finish(&mut along)?;
         sums.map_or(Ok(()), |sums| sums.check())?;
-        match v.iter().position(|value| !value.is_finite()) {
-            Some(index) => Err(Error::Overflow { step: 0, index }),
-            None => Ok(result),
-        }
+        check_output(v, 0)?;
+        Ok(result)
     }
 }

@@ -215,8 +215,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let Base { point, dense, .. } = &mut *self.base;
         let x = &point.as_ref()[nx..2 * nx];
         let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
-            interpolate(&*stages, x, stages.accepted(), time - t, h, dense);
-            Ok(())
+            interpolate(&*stages, x, stages.accepted(), time - t, h, dense)
         };
         let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
         after(&mut accepted, dense)?;

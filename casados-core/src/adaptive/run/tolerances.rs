@@ -45,7 +45,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         } else {
             Scalar::powf(finest, s / (s + 1.0)).min(0.03)
         };
-        let rounding = T::EPSILON.to_f64() / finest;
+        let rounding = T::EPSILON / finest;
         (*newton_tolerance, *noise) = (wanted.max(10.0 * rounding), 100.0 * rounding);
         self.measure();
     }

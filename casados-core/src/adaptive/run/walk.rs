@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{IMPLICIT, Predictive, Refusals, Roughness, Trend};
+use crate::adaptive::control::{Predictive, Refusals, Roughness, Trend};
 use crate::adaptive::stages::Convergence;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -211,7 +211,7 @@ impl<T: Real> Walk<T> {
         let order = stages as f64 + 1.0;
         let most = 2.0 * self.convergence.most as f64;
         let effort = (1.0 + most) / (self.convergence.iterations as f64 + most);
-        self.controller.factor(self.h.to_f64(), error, 1.0 / order, effort, &IMPLICIT)
+        self.controller.factor(self.h.to_f64(), error, 1.0 / order, effort)
     }
 
     /// The error is too large.
@@ -235,7 +235,7 @@ impl<T: Real> Walk<T> {
         }
         let next_h = T::from_f64(self.direction * next);
         // What rounding leaves of the interval is no step.
-        let slack = 16.0 * T::EPSILON.to_f64() * end.abs().max(self.span.end.abs()).to_f64();
+        let slack = 16.0 * T::EPSILON * end.abs().max(self.span.end.abs()).to_f64();
         self.need = if fast { Need::Factors } else { Need::Jacobian };
         if self.beyond(next_h) >= -slack {
             (self.h, self.last) = (self.span.end - end, true);

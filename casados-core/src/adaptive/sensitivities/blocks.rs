@@ -56,12 +56,6 @@ pub(in crate::adaptive) fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl F
     }
 }
 
-/// # Errors
-/// [`Error::Overflow`]
-pub(super) fn finite<T: Real>(values: &[T]) -> Result<(), Error> {
-    not_finite(values).map_or(Ok(()), |(index, _)| Err(Error::Overflow { step: 0, index }))
-}
-
 /// An error of a step is one of the run.
 pub(super) fn in_step(mut error: Error, number: usize) -> Error {
     match &mut error {

@@ -2,12 +2,12 @@
 
 use super::{Divided, HessianMemory, Integrator, blocks, dynamic};
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, check_output};
+use crate::finite::{check_forward, check_gradient, check_named, check_second};
 use crate::linalg::axpy;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::quadrature::{Along, Backwards, begin, finish};
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
 use crate::statistics::Statistics;
@@ -64,7 +64,9 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         begin(&mut along);
         self.sweep(x0, u, h, false, &mut along, |_, _, _| Ok(()))?;
         finish(&mut along)?;
-        Ok(&I::Memory::forward(&mut self.forward)?.result)
+        let result = &I::Memory::forward(&mut self.forward)?.result;
+        check_forward(result, 0)?;
+        Ok(result)
     }
 
     fn adjoint_along(
@@ -78,7 +80,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
     where
         I::Memory: WithAdjoint<1>,
     {
-        check_input(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         self.begin(h)?;
         begin(&mut along);
         self.nominal(x0, u, h, &mut along)?;
@@ -104,9 +106,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         let result = I::Memory::adjoint(&mut self.adjoint)?;
         result.nominal = I::Memory::nominal(&mut self.nominal)?.result;
         result.grad_x0.as_mut_slice().copy_from_slice(now.as_slice());
-        check_output(now.as_slice(), 0)?;
-        check_output(result.grad_u.as_slice(), 0)?;
-        check_output(result.grad_p.as_slice(), 0)?;
+        check_gradient(result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice())?;
         Ok(result)
     }
 
@@ -121,7 +121,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
     where
         I::Memory: WithHessian,
     {
-        check_input(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         self.begin(h)?;
         begin(&mut along);
         self.sweep(x0, u, h, true, &mut along, |this, k, x| {
@@ -164,10 +164,10 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
             }
         }
         blocks::split(sum, result);
-        for row in sum.as_ref() {
-            check_output(row.as_ref(), 0)?;
-        }
-        check_output(now.as_slice(), 0)?;
+        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &result.first;
+        check_forward(forward, 0)?;
+        check_gradient(grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice())?;
+        check_second(result)?;
         Ok(result)
     }
 }

@@ -1,32 +1,12 @@
-//! The gradient that forward sensitivities have in them, and finite checks of these.
+//! The gradient that forward sensitivities have in them.
 
 use crate::error::Error;
-use crate::finite::check_output;
+use crate::finite::check_gradient;
 use crate::linalg::kernels;
 use crate::model::Dae;
-use crate::result::{Forward, ForwardAdjoint};
+use crate::result::ForwardAdjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::Matrix;
-
-/// # Errors
-/// [`Error::Overflow`] of the first derivative that is not finite.
-#[cfg_attr(feature = "std", inline(never))]
-pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
-    for values in [
-        result.dx_dx0.as_slice(),
-        result.dx_du.as_slice(),
-        result.dx_dp.as_slice(),
-        result.dz_dx0.as_slice(),
-        result.dz_du.as_slice(),
-        result.dz_dp.as_slice(),
-        result.dz0_dx0.as_slice(),
-        result.dz0_du.as_slice(),
-        result.dz0_dp.as_slice(),
-    ] {
-        check_output(values, step)?;
-    }
-    Ok(())
-}
 
 /// `∇(λᵀx)` from the derivatives of `x`.
 pub(crate) fn multiply<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lambda: &[E]) {
@@ -49,9 +29,7 @@ pub(crate) fn gradient<M: Dae, T: Real>(
     lambda: &[T],
 ) -> Result<(), Error> {
     multiply(result, lambda);
-    check_output(result.grad_x0.as_slice(), 0)?;
-    check_output(result.grad_u.as_slice(), 0)?;
-    check_output(result.grad_p.as_slice(), 0)
+    check_gradient(result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice())
 }
 
 kernels! {

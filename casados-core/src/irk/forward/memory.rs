@@ -1,6 +1,5 @@
 //! The forward pass in all directions `w = (x₀, u, p)` side by side, and its memory.
 
-use super::gradient::check_result;
 use super::matrices::Split;
 use super::sweep::{Linearized, Outputs, Sweep};
 use crate::error::Error;
@@ -152,7 +151,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
         // Only where one is not finite it is looked for.
-        if self.end(nominal, to).is_finite() { Ok(()) } else { check_result(to, step) }
+        if self.end(nominal, to).is_finite() { Ok(()) } else { crate::finite::check_forward(to, step) }
     }
 }
 

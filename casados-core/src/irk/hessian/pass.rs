@@ -13,7 +13,7 @@ use super::matrix_adjoint::{MatrixAdjoint, is_worth};
 use super::output::Triangle;
 use super::products::{COLUMNS, Subtract};
 use crate::error::{Error, Place, Quantity};
-use crate::finite::{check_output, not_finite};
+use crate::finite::{check_gradient, check_second, not_finite};
 use crate::irk::adjoint::Backward;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::ArrayC;
@@ -247,23 +247,8 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     ) -> Result<(), Error> {
         let finite = self.collect(more, result).is_finite();
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
-        for values in [grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice()] {
-            check_output(values, 0)?;
-        }
-        if finite {
-            return Ok(());
-        }
-        // Where one is not finite it is looked for.
-        for values in [
-            result.h_xx.as_slice(),
-            result.h_xu.as_slice(),
-            result.h_uu.as_slice(),
-            result.h_xp.as_slice(),
-            result.h_up.as_slice(),
-            result.h_pp.as_slice(),
-        ] {
-            check_output(values, 0)?;
-        }
-        Ok(())
+        check_gradient(grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice())?;
+        // Only where one is not finite it is looked for.
+        if finite { Ok(()) } else { check_second(result) }
     }
 }

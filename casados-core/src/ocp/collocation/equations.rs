@@ -3,7 +3,7 @@
 use crate::irk::{Coefficients, dot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorX, VectorZ};
 use crate::ocp::dynamics::Interval;
-use crate::qp::assign;
+use crate::qp::{assign, larger};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -63,8 +63,7 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
                 for &f in f.as_ref() {
                     let size = (self.h * f).abs();
                     sum = sum + size;
-                    // What is not a number stays.
-                    largest = if size <= largest { largest } else { size };
+                    largest = larger(largest, size);
                 }
             }
             if n == 0 {

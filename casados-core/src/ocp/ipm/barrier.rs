@@ -1,8 +1,8 @@
 //! How the barrier parameter changes.
 
-use crate::qp::Residuals;
 use crate::qp::element::set;
 use crate::qp::interior::Sides;
+use crate::qp::{Residuals, larger};
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.
@@ -140,11 +140,6 @@ pub(super) fn residuals<T: Real>(sides: &Sides<'_, T>, mu: f64) -> (f64, f64) {
     let all = sides.residual.iter().chain(&*sides.equation_residual);
     let largest = all.fold(0.0, |m, residual| larger(m, residual.abs().to_f64()));
     (largest, farthest(sides.slack, sides.multiplier, mu))
-}
-
-/// The larger one; NaN stays.
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
 }
 
 /// The next `μ` where the error is small enough for it.

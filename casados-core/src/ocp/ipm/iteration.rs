@@ -13,7 +13,7 @@ use super::work::Work;
 use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::curvature::{Exact, Slopes};
-use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction, larger};
+use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
@@ -22,7 +22,7 @@ use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
 use crate::ocp::units::of_tolerance;
 use crate::ocp::watch::Watch;
-use crate::qp::{QpError, StageDims, Store};
+use crate::qp::{QpError, StageDims, Store, larger};
 use crate::scalar::Real;
 
 /// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
@@ -171,7 +171,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.judge(error, others, &self.options);
         state.gaps = barrier.0.dynamics;
-        state.violation = state.gaps.max(barrier.0.inequalities);
+        state.violation = larger(state.gaps, barrier.0.inequalities);
         let is_alone = state.lengths.alone;
         if is_alone {
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
@@ -181,8 +181,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let worst = elastic::worst(ocp, state, (work.penalties, work.units));
         let violation = worst.map_or(0.0, |worst| worst.violation);
-        let size = state.error.max(violation);
-        if !is_alone && size < state.best_residual || row.iteration == 0 {
+        let size = larger(state.error, violation);
+        let is_best = size < state.best_residual || state.best_residual.is_nan();
+        if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
             state.best_violation = state.violation;
             self.best.copy_from(&ocp.iterate);

@@ -30,9 +30,11 @@ pub struct IpmOptions {
     /// tolerance is not reached, as is the best one where no more steps are gone. Default
     /// 1e-6; of single precision 1e-2.
     pub acceptable_tolerance: f64,
-    /// Default 15.
+    /// See [`acceptable_tolerance`](Self::acceptable_tolerance); zero is as one. Default 15.
     pub acceptable_iterations: usize,
-    /// Default 500: from starts far away a few hundred are taken.
+    /// After so many iterations a run ends with
+    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations). With zero the start is judged
+    /// alone. Default 500: from starts far away a few hundred are taken.
     pub max_iterations: usize,
     /// The first barrier parameter `μ`, in units of forces. Default 0.1.
     pub start_mu: f64,
@@ -59,7 +61,8 @@ pub struct IpmOptions {
     pub scaling: bool,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,
-    /// The same distance where the start is warm. Default 1e-6.
+    /// As [`bound_push`](Self::bound_push), where the start is warm
+    /// ([`warm_start`](Self::warm_start)). Default 1e-6.
     pub warm_push: f64,
     /// Whether violations of bounds of states and constraints alone are made small where no step
     /// makes progress, and then get penalties beside the objective. Default true.

@@ -8,7 +8,7 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
 use crate::ocp::outcome::Status;
 use crate::ocp::problem::Formulation;
-use crate::qp::{StageDims, Store};
+use crate::qp::{StageDims, Store, larger};
 use crate::scalar::Real;
 
 /// Variables that are larger have no end.
@@ -46,7 +46,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
         }
-        let is_feasible = row.residuals.dynamics.max(row.residuals.inequalities) <= self.options.tolerance;
+        let violation = larger(row.residuals.dynamics, row.residuals.inequalities);
+        let is_feasible = violation <= self.options.tolerance;
         let (v, _) = ocp.iterate.vectors();
         if is_feasible && state.elastic.is_none() && v.iter().any(|v| v.abs().to_f64() > UNBOUNDED) {
             return Next::End(Status::Unbounded);

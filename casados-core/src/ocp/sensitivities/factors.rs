@@ -258,7 +258,7 @@ impl<T: Real> SolutionFactors<T> {
                 if values.len() != expected {
                     return Err(OcpError::Length { part, stage, expected, found: values.len() });
                 }
-                if let Some((index, value)) = crate::irk::not_finite(values) {
+                if let Some((index, value)) = crate::finite::not_finite(values) {
                     return Err(OcpError::InvalidValue { part, stage, name: "seed", index, value });
                 }
             }

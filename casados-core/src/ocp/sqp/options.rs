@@ -49,7 +49,9 @@ pub struct SqpOptions {
     /// units are above 100 it is this times a hundredth of them, where they are below 0.01 it is
     /// this times the unit ([`scaling`](Self::scaling)). Default 1e-6; of single precision 1e-3.
     pub tolerance: f64,
-    /// Default 200.
+    /// After so many iterations a run ends with
+    /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations) and the best iterate. With zero
+    /// the start is judged alone. Default 200.
     pub max_iterations: usize,
     /// Default [`Globalisation::Merit`].
     pub globalisation: Globalisation,

@@ -229,7 +229,8 @@ impl<T: Real> Trajectory<T> {
     /// The times of the values of a series.
     #[must_use]
     pub fn times_of(&self, series: &Series<T>) -> &[T] {
-        self.times.get(series.first..series.first + series.values.len()).unwrap_or_default()
+        let times = self.times.get(series.first..).unwrap_or_default();
+        times.get(..series.values.len()).unwrap_or_default()
     }
 
     /// A quantity by its name. That of several (`x` of `x[0]` and `x[1]`) is enough where there is

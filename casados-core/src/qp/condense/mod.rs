@@ -91,8 +91,9 @@ impl<T: Real, S> Condensing<T, S> {
         self.rows.clear();
         // As much as there can be, so that no later call needs more.
         let stages = self.dims.try_reserve(qp.dims.len());
-        let most = qp.dims.iter().map(|d| d.nx + d.ng).sum();
-        stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes: most })?;
+        let most = qp.dims.iter().map(|d| d.nx + d.ng).sum::<usize>();
+        let bytes = size_of_val(qp.dims).saturating_add(most.saturating_mul(size_of::<Origin>()));
+        stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes })?;
         let mut places = Places::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
@@ -168,7 +169,8 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + room;
         reserve(work, length)?;
         origins.clear();
-        origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes: largest.rows })?;
+        let bytes = largest.rows.saturating_mul(size_of::<Origin>());
+        origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes })?;
         let target = condensed.data_mut();
         let matrices = Work::new(&largest, work);
         T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });

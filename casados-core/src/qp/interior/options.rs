@@ -35,7 +35,9 @@ pub struct InteriorPointOptions {
     /// one of this and `tolerance`. Default 0, absolute; of single precision, where terms have no
     /// more than seven digits, 1e-5.
     pub relative_tolerance: f64,
-    /// Default 50.
+    /// After so many iterations, attempts at a warm start among them, there is no solution:
+    /// [`QpError::MaxIterations`](crate::qp::QpError::MaxIterations). With zero the start has to be
+    /// one. Default 50.
     pub max_iterations: usize,
     /// Where the products of slacks and multipliers begin. Default 1.
     pub start_mu: f64,

@@ -185,9 +185,9 @@ pub struct Sides<'a, T> {
     pub slack_step: &'a mut [T],
     /// Changes of multipliers.
     pub multiplier_step: &'a mut [T],
-    /// `1 / s`
+    /// `1 / (s + δ λ)`, with `δ` zero of violations.
     pub inverse: &'a mut [T],
-    /// What `s Δλ + λ Δs` is to be, over `s`.
+    /// What `s Δλ + λ Δs` is to be, over `s + δ λ`.
     pub target: &'a mut [T],
     /// Room for something.
     pub scratch: &'a mut [T],
