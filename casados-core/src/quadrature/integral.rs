@@ -136,10 +136,6 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
         self.dq.as_ref()
     }
 
-    fn matrix(&self) -> Option<&[ArrayW<F, T>]> {
-        None
-    }
-
     fn next(&mut self) {
         for row in self.dq.as_mut() {
             row.as_mut().fill(T::ZERO);
