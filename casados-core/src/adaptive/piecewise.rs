@@ -19,9 +19,10 @@ use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, add, dense, filled, refill};
-use super::sensitivities::{Memory, chain, dynamic, fill, place};
+use super::sensitivities::{chain, dynamic};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
+use crate::integrator::blocks::{element, fill};
 use crate::irk::{check, check_named};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
@@ -293,14 +294,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let (mut frozen, state, memory, v) = segment.open(integrator)?;
             let mut part = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
-            let Memory { hessian, step, .. } = memory;
+            let hessian = &memory.hessian;
             adjoint.grad_x0 = hessian.first.grad_x0;
             if let Some(grad_u) = adjoint.grad_u.get_mut(k) {
                 *grad_u = hessian.first.grad_u;
             }
             axpy(T::ONE, hessian.first.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
-            place(hessian, step);
-            at.project(k, step.as_ref(), v, product, sum);
+            at.project(k, |r, c| element(hessian, r, c), v, product, sum);
             segment.history = history;
         }
         let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(sum)?;

@@ -1,5 +1,6 @@
 //! What integrators have in common: the calls of one interval.
 
+pub(crate) mod blocks;
 mod divided;
 mod with;
 

@@ -1,6 +1,7 @@
 //! Derivatives over the parts between events, forwards.
 
 use super::*;
+use crate::integrator::blocks::{advance, fill, identity};
 use crate::result::Forward;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -21,10 +22,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             Some(there) => there,
             None => [zeroed()?, zeroed()?],
         };
-        for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(T::ZERO);
-            row[x] = T::ONE;
-        }
+        identity::<M, T>(&mut v);
         let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
         moments.clear();
         let mut x = *x0;
@@ -95,22 +93,6 @@ fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
     gradient.u.as_mut_slice().copy_from_slice(&row[nx..nx + nu]);
     gradient.p.as_mut_slice().copy_from_slice(&row[nx + nu..]);
     gradient
-}
-
-/// `V⁺ = ∂x⁺/∂x V + ∂x⁺/∂w` over a segment.
-fn advance<M: Dae, T: Real>(local: &Forward<M, T>, v: &Rows<M, T>, next: &mut Rows<M, T>) {
-    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-    for (r, row) in next.as_mut().iter_mut().enumerate() {
-        let row = row.as_mut();
-        row.fill(T::ZERO);
-        for (c, v) in v.as_ref().iter().enumerate() {
-            axpy(local.dx_dx0[(r, c)], v.as_ref(), row);
-        }
-        for (c, element) in row[nx..].iter_mut().enumerate() {
-            let part = if c < nu { local.dx_du[(r, c)] } else { local.dx_dp[(r, c - nu)] };
-            *element = *element + part;
-        }
-    }
 }
 
 /// The derivatives over a segment alone, row by row.

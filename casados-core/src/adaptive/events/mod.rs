@@ -30,9 +30,10 @@ use super::integrator::Integrator;
 use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, dense, refill};
-use super::sensitivities::{chain, dynamic, fill};
+use super::sensitivities::{chain, dynamic};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
+use crate::integrator::blocks::Rows;
 use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
@@ -106,8 +107,6 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     second: Option<Box<second::Second<M, T>>>,
 }
 
-/// A row for each state, with a column for each direction.
-type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
 /// The events of a call that happened, in order.
 type Moments<M, T> = Vec<(Event<M, T>, Moment<M, T>)>;
 

@@ -152,7 +152,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let mut part = chain(&mut along, None, second);
             frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
             if let (Some(sums), Some(integrand)) = (&mut sums, &mut along) {
-                sums.add(k, &mut **integrand, v, &mut memory.step);
+                sums.add(k, &mut **integrand, v);
             }
             let local = &memory.hessian.first.forward;
             x = local.nominal.x;

@@ -1,6 +1,7 @@
 //! The calls of an integrator whose intervals are divided.
 
-use super::{Divided, HessianMemory, Integrator, blocks, dynamic};
+use super::super::blocks;
+use super::{Divided, HessianMemory, Integrator, dynamic};
 use crate::error::{Argument, Error};
 use crate::finite::{check_input, check_output};
 use crate::linalg::axpy;
@@ -9,7 +10,7 @@ use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::quadrature::{Along, Backwards, begin, finish};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::Matrix;
+use crate::shape::{Array, Matrix};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
@@ -150,7 +151,8 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
                 now = part.first.grad_x0;
                 axpy(T::ONE, part.first.grad_u.as_slice(), result.first.grad_u.as_mut_slice());
                 axpy(T::ONE, part.first.grad_p.as_slice(), result.first.grad_p.as_mut_slice());
-                blocks::add(part, &history[k], [product, sum]);
+                let v = ArrayW::<M, T>::flat(history[k].as_ref());
+                blocks::add::<M, T>(|r, c| blocks::element(part, r, c), v, [product, sum]);
                 Ok(())
             });
             self.count();
