@@ -25,7 +25,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("linalg", "shape tableau memory scalar model"),
     ("result", "shape model"),
     ("finite", "error scalar model linalg"),
-    ("quadrature", "error shape scalar function model linalg result finite"),
+    ("quadrature", "error shape memory scalar function model linalg result finite"),
     ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (
         "constrained",

@@ -23,13 +23,13 @@ use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::memory::allocate;
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
 use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
 use points::{combine, evaluate_polynomial, last_stage};
@@ -69,11 +69,9 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new(tableau: Tableau<S>) -> Result<Self, Error> {
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, G>>() };
-        let Ok(memory) = try_zeroed_box() else { return Err(out_of_memory) };
         // Gauss and Radau IIA methods have one: tests construct all.
-        let Some(scheme) = Scheme::new(tableau) else { return Err(out_of_memory) };
-        Ok(Self { scheme, memory })
+        let scheme = Scheme::new(tableau).ok_or(Error::OutOfMemory { bytes: 0 })?;
+        Ok(Self { scheme, memory: allocate()? })
     }
 }
 

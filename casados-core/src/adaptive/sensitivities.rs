@@ -23,11 +23,12 @@ use crate::error::Error;
 use crate::integrator::blocks::{Rows, Square, add, advance, algebraic, element, identity, split, states};
 use crate::irk::{check_result, not_finite};
 use crate::linalg::axpy;
+use crate::memory::extend;
 use crate::model::{ArrayK, ArrayW, Dae, VectorX, VectorZ};
 use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
 use crate::result::{Adjoint, Hessian};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Array, Matrix, Plain, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
@@ -156,18 +157,13 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ) -> Result<(), Error> {
         begin(&mut along);
         let second = history.is_some();
-        let nx = M::Shape::NX;
         let Memory { v: [v, next], hessian, .. } = memory;
         let result = &mut hessian.first.forward;
         identity::<M, T>(v);
         let count = self.tape.entries().len();
         self.steps::<B>(state, x0, |replays, taken, step| {
             if let Some(history) = &mut history {
-                let bytes = history.len().saturating_mul(size_of::<T>());
-                history.try_reserve(nx * M::Shape::NW).map_err(|_| Error::OutOfMemory { bytes })?;
-                for row in v.as_ref() {
-                    history.extend_from_slice(row.as_ref());
-                }
+                extend(history, ArrayW::<M, T>::flat(v.as_ref()))?;
             }
             let mut chained = chain(&mut along, Some(v), second);
             let forward = replays.forward(taken, dynamic(&mut chained))?;

@@ -10,6 +10,7 @@ use super::pattern::Origin;
 use super::single::{names, origin};
 use crate::batch::{BatchError, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::qp::room;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -147,8 +148,7 @@ fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -
 /// An empty list with room for so many.
 fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
-    let bytes = length.saturating_mul(size_of::<V>());
-    list.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })
+    Ok(room(list, length)?)
 }
 
 fn failed(error: BatchError) -> OcpError {

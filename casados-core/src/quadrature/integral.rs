@@ -82,7 +82,7 @@ impl<F: Function, T: Plain> Quadrature<F, T> {
     /// [`Error::OutOfMemory`]
     #[cfg(feature = "alloc")]
     pub fn boxed() -> Result<alloc::boxed::Box<Self>, Error> {
-        bytemuck::allocation::try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<Self>() })
+        crate::memory::allocate()
     }
 }
 

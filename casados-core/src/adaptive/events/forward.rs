@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::integrator::blocks::{advance, fill, identity};
+use crate::memory::allocate;
 use crate::result::Forward;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -16,11 +17,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
         begin(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-        let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
-        let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
         let [mut v, mut next] = match self.sensitivities.take() {
             Some(there) => there,
-            None => [zeroed()?, zeroed()?],
+            None => [allocate()?, allocate()?],
         };
         identity::<M, T>(&mut v);
         let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
@@ -55,12 +54,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     integrand.prolong(sign, &time, at)
                 })?;
             }
-            let gradient = time_gradient(time.as_ref());
-            times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
-            times.push(gradient);
-            let moment = (event, moment);
-            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
-            moments.push(moment);
+            push(&mut times, time_gradient(time.as_ref()))?;
+            push(&mut moments, (event, moment))?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();

@@ -36,6 +36,7 @@ use crate::error::{Argument, Error, Place};
 use crate::integrator::blocks::Rows;
 use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
+use crate::memory::{allocate, push};
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
@@ -46,7 +47,6 @@ use crate::shape::{Array, Matrix, Shape, listed, plain};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 
 /// An adaptive integrator with events.
 ///
@@ -127,7 +127,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new(integrator: Integrator<M, B, T>, events: &[Event<M, T>]) -> Result<Self, Error> {
-        let bytes = size_of::<ArrayV<M, T>>();
         let solution =
             Solution { nominal: Nominal::zeroed(), t: T::ZERO, terminal: false, occurrences: Vec::new() };
         Ok(Self {
@@ -140,7 +139,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             frozen: None,
             statistics: AdaptiveStatistics::default(),
             solution,
-            v: try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+            v: allocate()?,
             signs: Vec::new(),
             moments: Vec::new(),
             sensitivities: None,
@@ -257,8 +256,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 solution.nominal.z0 = integrator.base.result.z0;
             }
             let Some(moment) = self.moment(k)? else { break };
-            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
-            moments.push(moment);
+            push(&mut moments, moment)?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();

@@ -20,6 +20,7 @@ use crate::integrator::blocks::{Rows, Square, add, element, fill, identity};
 use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
+use crate::memory::allocate;
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
     VectorX,
 };
@@ -27,7 +28,6 @@ use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Plain, Shape, listed};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
 ///
@@ -112,10 +112,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.trace(x0, u, h)?;
         let (forward, moments) = self.sweep(x0, true, None)?;
-        let bytes = size_of::<Second<M, T>>();
         let mut second: Box<Second<M, T>> = match self.second.take() {
             Some(there) => there,
-            None => try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+            None => allocate()?,
         };
         for row in second.h.as_mut() {
             row.as_mut().fill(T::ZERO);

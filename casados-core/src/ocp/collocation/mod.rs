@@ -20,7 +20,7 @@
 
 mod equations;
 
-use super::begin::Begin;
+use super::begin::{Begin, at};
 use super::dynamics::{
     Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step, vector,
 };
@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, VectorU, VectorX};
-use crate::qp::{assign, part};
+use crate::qp::{assign, part, room};
 use crate::result::Seeds;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -140,8 +140,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         let count = nodes.len().saturating_mul(steps);
         for list in [&mut self.stages, &mut self.increments, &mut self.change, &mut self.best] {
             list.clear();
-            let bytes = count.saturating_mul(size_of::<ArrayK<M, [T; S]>>());
-            list.try_reserve_exact(count).map_err(|_| OcpError::OutOfMemory { bytes })?;
+            room(list, count)?;
             list.resize(count, Zeroable::zeroed());
         }
         self.from.clear();
@@ -194,10 +193,10 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             assign(seeds.x0.as_mut_slice(), step.x);
             assign(seeds.u.as_mut_slice(), step.u);
             let (x, u) = (vector(interval.x), vector(interval.u));
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(self.stages.get(places).unwrap_or_default()).map_err(failed(k))?;
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(self.stages.get(places).unwrap_or_default()))?;
             let arguments = Arguments { x0: &x, u: &u, h: interval.h };
-            self.at.add_stage_derivatives(&arguments, &seeds, change).map_err(failed(k))?;
+            at(k, self.at.add_stage_derivatives(&arguments, &seeds, change))?;
         }
         Ok(())
     }
@@ -226,20 +225,20 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let increments = self.increments.get_mut(places).unwrap_or_default();
             let residual =
                 Point::<M, T, S>::at(&interval, &self.coefficients, count).follow(stages, &[], T::ZERO).1;
-            self.newton.begin(&interval).map_err(failed(k))?;
-            self.newton.set_record(stages).map_err(failed(k))?;
+            at(k, self.newton.begin(&interval))?;
+            at(k, self.newton.set_record(stages))?;
             let (x, u) = (vector(interval.x), vector(interval.u));
-            let after = *self.newton.forward(&x, &u, interval.h).map_err(failed(k))?;
-            self.newton.record(increments).map_err(failed(k))?;
+            let after = *at(k, self.newton.forward(&x, &u, interval.h))?;
+            at(k, self.newton.record(increments))?;
             for (increment, y) in increments.iter_mut().zip(stages) {
                 let increment = increment.as_mut().as_flattened_mut().iter_mut();
                 for (increment, &y) in increment.zip(y.as_ref().as_flattened()) {
                     *increment = *increment - y;
                 }
             }
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(stages).map_err(failed(k))?;
-            let step = run(&mut self.at, &interval).map_err(failed(k))?;
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(stages))?;
+            let step = at(k, run(&mut self.at, &interval))?;
             let (mut of_x, mut of_u) = (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed());
             let mut cost = IntegralTerms::default();
             if second {
@@ -282,10 +281,6 @@ fn add_change<T: Real>(weights: &[T], before: &[T], after: &[T], to: &mut [T]) {
             *to = *to + weight * (after - before);
         }
     }
-}
-
-fn failed(interval: usize) -> impl Fn(Error) -> OcpError {
-    move |error| OcpError::Integration { interval, error }
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T> {
@@ -332,11 +327,11 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
                 [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
             let mut stages = stages.to_vec();
             go::<M, S, T>(&mut stages, change, along);
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(&stages).map_err(failed(k))?;
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(&stages))?;
             let visit =
                 &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
-            self.at.at_parts(&interval, parts, visit).map_err(failed(k))?;
+            at(k, self.at.at_parts(&interval, parts, visit))?;
         }
         Ok(true)
     }

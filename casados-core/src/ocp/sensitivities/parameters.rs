@@ -1,6 +1,5 @@
 //! What parameters change of the conditions of optimality.
 
-use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
@@ -12,7 +11,7 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::point::{Cross, read};
 use crate::ocp::problem::{Formulation, Problem};
 use crate::ocp::transfer::dot;
-use crate::qp::{SolutionStage, StageDims, assign, part, part_mut};
+use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;

@@ -18,7 +18,7 @@ mod plan;
 
 use super::error::QpError;
 use super::layout::{Places, StageDims, pad, part};
-use super::memory::reserve;
+use super::memory::{reserve, room};
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
 use super::solver::{QpSolver, QpStart};
@@ -90,9 +90,8 @@ impl<T: Real, S> Condensing<T, S> {
         self.dims.clear();
         self.rows.clear();
         // As much as there can be, so that no later call needs more.
-        let stages = self.dims.try_reserve(qp.dims.len());
-        let most = qp.dims.iter().map(|d| d.nx + d.ng).sum();
-        stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes: most })?;
+        room(&mut self.dims, qp.dims.len())?;
+        room(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
         let mut places = Places::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
@@ -164,11 +163,10 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         };
         let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
         let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
-        let room = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
-        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + room;
-        reserve(work, length)?;
+        let others = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
+        reserve(work, Work::<T>::lengths(&largest).iter().sum::<usize>() + others)?;
         origins.clear();
-        origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes: largest.rows })?;
+        room(origins, largest.rows)?;
         let target = condensed.data_mut();
         let matrices = Work::new(&largest, work);
         T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });
