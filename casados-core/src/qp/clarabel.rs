@@ -239,11 +239,12 @@ impl QpSolver<f64> for Clarabel {
         self.needed = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
     }
 
-    fn solve(
+    fn solve_until(
         &mut self,
         qp: QpView<'_, f64>,
         _: QpStart,
         solution: SolutionView<'_, f64>,
+        _: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError> {
         check(qp)?;
         solution.fits(qp)?;

@@ -77,7 +77,9 @@ pub trait QpSolver<T> {
         qp: QpView<'_, T>,
         start: QpStart,
         solution: SolutionView<'_, T>,
-    ) -> Result<QpStatistics, QpError>;
+    ) -> Result<QpStatistics, QpError> {
+        self.solve_until(qp, start, solution, &mut || false)
+    }
 
     /// As [`QpSolver::solve`], until the time is over: `over`, a clock or a counter of cycles, is
     /// asked before each iteration of an interior point. A solver that cannot make use of it takes
@@ -114,10 +116,7 @@ pub trait QpSolver<T> {
         start: QpStart,
         solution: SolutionView<'_, T>,
         over: &mut dyn FnMut() -> bool,
-    ) -> Result<QpStatistics, QpError> {
-        let _ = over;
-        self.solve(qp, start, solution)
-    }
+    ) -> Result<QpStatistics, QpError>;
 
     /// Asks for residuals below a tolerance for now, but not for less than its options say. A
     /// solver that cannot make use of it solves as well as always.

@@ -127,15 +127,6 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         self.solver.refine(tolerance);
     }
 
-    fn solve(
-        &mut self,
-        qp: QpView<'_, T>,
-        start: QpStart,
-        solution: SolutionView<'_, T>,
-    ) -> Result<QpStatistics, QpError> {
-        self.solve_until(qp, start, solution, &mut || false)
-    }
-
     fn solve_until(
         &mut self,
         qp: QpView<'_, T>,
