@@ -130,14 +130,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 
     /// After a part.
     fn count(&mut self) {
-        let part = self.integrator.statistics();
-        let sum = &mut self.statistics;
-        sum.steps += part.steps;
-        sum.iterations += part.iterations;
-        sum.residuals += part.residuals;
-        sum.jacobians += part.jacobians;
-        sum.factorizations += part.factorizations;
-        sum.dense += part.dense;
+        self.statistics.add(&self.integrator.statistics());
     }
 
     /// The solution, with the states where parts start.
