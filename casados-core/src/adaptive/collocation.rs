@@ -18,12 +18,13 @@ use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
+use super::point::variable;
 use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::memory::allocate;
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
 use crate::tableau::Tableau;
@@ -110,7 +111,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         let to = middle.as_mut();
         for (index, y) in self.memory.y.as_ref().iter().enumerate() {
             let y = y.as_flattened();
-            to[if index < nx { index } else { index + nx }] = y[stage];
+            to[variable::<M>(index)] = y[stage];
             if index < nx {
                 let terms = self.scheme.tableau.a()[stage].iter().zip(y);
                 let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);

@@ -330,12 +330,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let t_end = self.end(h)?;
         let span = self.begin(x0, u, t_end)?;
         let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
-        let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
-        for (t, expected) in [(span.start, frozen.start), (span.end, frozen.end)] {
-            if t != expected {
-                return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
-            }
-        }
+        frozen.check_is(span.start, span.end)?;
         // Dense output of explicit methods takes steps again.
         let Base { point, u, parameters, .. } = &mut *self.base;
         place_inputs::<M, T>(point.as_mut(), u, parameters);

@@ -14,13 +14,14 @@
 
 use super::super::point::At;
 use super::super::sealed::Engine;
+use super::evaluate::dot;
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::error::{Argument, Error};
 use crate::integrator::blocks::{Rows, Square, add, element, fill, identity};
 use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
-use crate::model::{
 use crate::memory::allocate;
+use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
     VectorX,
 };
@@ -86,10 +87,6 @@ pub(super) struct Second<M: Dae, T: Plain> {
     e: ArrayV<M, ArrayW<M, T>>,
     /// Derivatives of `ẋ`, a row for each direction.
     slopes: ArrayW<M, ArrayX<M, T>>,
-}
-
-fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b)
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {

@@ -80,12 +80,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let segments = self.segments.get_mut(..self.count).unwrap_or_default();
         let mut before = start;
         for (segment, end) in segments.iter().zip(ends) {
-            for (t, expected) in [(before, segment.span.start), (*end, segment.span.end)] {
-                if t != expected {
-                    let (start, end) = (segment.span.start.to_f64(), segment.span.end.to_f64());
-                    return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
-                }
-            }
+            segment.span.check_is(before, *end)?;
             before = *end;
         }
         if segments.len() != ends.len() {
