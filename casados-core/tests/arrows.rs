@@ -29,7 +29,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (
         "constrained",
-        "error shape statistics memory scalar function model result finite quadrature integrator",
+        "error shape statistics structure memory scalar function model result finite quadrature integrator",
     ),
     (
         "erk",

@@ -137,8 +137,6 @@ mod watch;
 mod weights;
 mod wrapped;
 
-#[cfg(feature = "plot")]
-pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};

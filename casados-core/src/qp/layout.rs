@@ -142,24 +142,15 @@ impl Place {
     }
     /// The place behind this one, of a stage that is empty: its begins are lengths.
     const fn end(&self) -> Self {
-        Self {
-            stage: 0,
-            nx: 0,
-            nu: 0,
-            ng: 0,
-            next: 0,
-            n: 0,
-            ld: 0,
-            ld_next: 0,
-            rows: 0,
-            pivots: 0,
-            data: 0,
-            v: 0,
-            dynamics: 0,
-            row: 0,
-            factor: 0,
-        }
-        .after(self)
+        Self::new::<u8>(0, StageDims::new(0, 0, 0), 0).after(self)
+    }
+}
+
+/// How many states there are at the start.
+pub(crate) const fn first_nx(dims: &[StageDims]) -> usize {
+    match dims.first() {
+        Some(first) => first.nx,
+        None => 0,
     }
 }
 

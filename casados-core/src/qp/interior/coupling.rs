@@ -7,7 +7,7 @@ use super::kernels::MORE;
 use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
 use crate::qp::element::set;
-use crate::qp::layout::{Place, Places, pad, take_mut};
+use crate::qp::layout::{Place, Places, first_nx, pad, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
 
@@ -180,13 +180,6 @@ impl<'a, T: Real> Coupling<'a, T> {
                 join(first.nx + j, row + nx + j);
             }
         }
-    }
-}
-
-const fn first_nx(dims: &[StageDims]) -> usize {
-    match dims.first() {
-        Some(first) => first.nx,
-        None => 0,
     }
 }
 

@@ -7,7 +7,8 @@ use super::riccati::{Extent, First, Riccati};
 use super::sides::{Counts, Sides};
 use super::terms::Terms;
 use super::vector::larger;
-use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
+use crate::qp::element::get;
+use crate::qp::layout::{Place, Places, StageDims, assign, end, first_nx, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -84,13 +85,6 @@ impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
         if let Some((multipliers, objective)) = self.multipliers {
             *objective = self.iterate.gradient::<E>(multipliers, self.costates);
         }
-    }
-}
-
-const fn first_nx(dims: &[StageDims]) -> usize {
-    match dims.first() {
-        Some(first) => first.nx,
-        None => 0,
     }
 }
 
@@ -368,7 +362,7 @@ pub fn in_units<T: Real>(proximal: T, units: &[T], row: usize) -> T {
 /// An element; zero if there is none.
 #[inline(always)]
 pub fn at<T: Real>(slice: &[T], index: u32) -> T {
-    slice.get(index as usize).copied().unwrap_or(T::ZERO)
+    get(slice, index as usize)
 }
 
 /// Changes rows by values that belong to them.
