@@ -118,16 +118,16 @@ pub trait QpSolver<T> {
         over: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError>;
 
-    /// Asks for residuals below a tolerance for now, but not for less than its options say. A
+    /// Permits residuals up to a tolerance for now, or what its options say if that is more. A
     /// solver that cannot make use of it solves as well as always.
-    fn relax(&mut self, tolerance: f64) {
+    fn permit(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 
-    /// Asks for solutions that are good enough for residuals below a tolerance in the problem whose
+    /// Requires solutions that are good enough for residuals below a tolerance in the problem whose
     /// steps they are, which may be less than options say. A solver whose solutions are always
     /// good enough, or as good as they get, does nothing.
-    fn refine(&mut self, tolerance: f64) {
+    fn require(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 }

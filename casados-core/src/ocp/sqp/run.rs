@@ -111,7 +111,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         ocp.fits(self.solution.dims())?;
         self.options.check()?;
-        self.qp_solver.refine(self.options.tolerance);
+        self.qp_solver.require(self.options.tolerance);
         let mut state = State { over: Some(over), ..State::new() };
         if C::KEEPS {
             ocp.check_without_algebraic()?;

@@ -120,11 +120,11 @@ impl<T: Real, S> Condensing<T, S> {
 }
 
 impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
-    fn relax(&mut self, tolerance: f64) {
-        self.solver.relax(tolerance);
+    fn permit(&mut self, tolerance: f64) {
+        self.solver.permit(tolerance);
     }
-    fn refine(&mut self, tolerance: f64) {
-        self.solver.refine(tolerance);
+    fn require(&mut self, tolerance: f64) {
+        self.solver.require(tolerance);
     }
 
     fn solve_until(

@@ -312,7 +312,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         }
     }
 
-    fn relax(&mut self, tolerance: f64) {
+    fn permit(&mut self, tolerance: f64) {
         self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }
