@@ -3,11 +3,11 @@
 use super::lengths::Lengths;
 use super::measure;
 use super::newton::{attach, attach_to_new, evaluate_values};
-use super::state::State;
+use super::state::{GAMMA_PHI, State};
 use super::work::Work;
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
-use crate::ocp::filter::{Filter, MARGIN, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
+use crate::ocp::filter::{Filter, GAMMA_THETA, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::Iterate;
@@ -48,9 +48,9 @@ impl Expected {
     /// The shortest step that can be accepted (equation (23)).
     fn shortest(&self) -> f64 {
         let Measure { violation, .. } = self.here;
-        let mut least: f64 = MARGIN;
+        let mut least: f64 = GAMMA_THETA;
         if self.slope < 0.0 {
-            least = least.min(super::state::MARGIN * violation / -self.slope);
+            least = least.min(GAMMA_PHI * violation / -self.slope);
             if violation <= self.small_violation {
                 let powers =
                     (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
