@@ -1,7 +1,7 @@
 //! What an integrator of single intervals is told before each, and what it says of one without a
 //! result.
 
-use super::dynamics::{Interval, Nodes, Sink, Step, vector};
+use super::dynamics::{Interval, IntervalResult, Nodes, Sink, vector};
 use super::error::OcpError;
 use crate::error::Error;
 use crate::integrator::Integrator;
@@ -36,7 +36,7 @@ pub(super) fn each<M: Dae, T: Real, D>(
         &Interval<'_, T>,
         &VectorX<M, T>,
         &VectorU<M, T>,
-    ) -> Result<Step<'r, T>, Error>,
+    ) -> Result<IntervalResult<'r, T>, Error>,
 ) -> Result<(), OcpError> {
     for (k, interval) in nodes.iter().enumerate() {
         let step = call(dynamics, &interval, &vector(interval.x), &vector(interval.u));

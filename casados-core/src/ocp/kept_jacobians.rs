@@ -7,7 +7,7 @@
 use super::begin::{Begin, each};
 use super::convexify::Convexification;
 use super::curvature::{Curvature, GaussNewton};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntegralTerms, IntervalResult, Nodes, Sink, vector};
 use super::error::OcpError;
 use crate::memory::{WithAdjoint, WithForward};
 use crate::model::{Dae, Ode};
@@ -30,9 +30,9 @@ pub trait Adjoints<T: Real>: Dynamics<T> {
 }
 
 /// What a sink is given: an end and the gradients of `πᵀφ`.
-pub(super) fn step<'a, T: Real>(x: &'a [T], [of_x, of_u]: [&'a [T]; 2]) -> Step<'a, T> {
+pub(super) fn step<'a, T: Real>(x: &'a [T], [of_x, of_u]: [&'a [T]; 2]) -> IntervalResult<'a, T> {
     let cost = IntegralTerms { x: of_x, u: of_u, ..IntegralTerms::default() };
-    Step { x, cost, ..Step::default() }
+    IntervalResult { x, cost, ..IntervalResult::default() }
 }
 
 macro_rules! adjoints {

@@ -1,7 +1,7 @@
 //! A batch as dynamics: all intervals in one call.
 
 use super::begin::at;
-use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::inside::Inside;
 use super::kept_jacobians::{Adjoints, step};
@@ -208,8 +208,9 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
         for (k, interval) in nodes.iter().enumerate() {
             at(k, self.batch.start(k, &mut single))?;
             at(k, single.begin(&interval))?;
-            let visit =
-                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+            let visit = &mut |j, x: &[T], z: &[T]| {
+                sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
+            };
             at(k, single.at_parts(&interval, parts, visit))?;
         }
         Ok(true)

@@ -3,7 +3,7 @@
 
 use super::begin::{Begin, each};
 use super::cost::Show;
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntegralTerms, IntervalResult, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 #[cfg(feature = "alloc")]
 use super::inside::each_inside;
@@ -37,7 +37,7 @@ pub(super) const fn origin<M: Dae>() -> Origin {
 /// References of integrals are parameters, which every stage has for itself.
 ///
 /// ```
-/// use casados::ocp::{Along, HeapSqp, Horizon, Problem};
+/// use casados::ocp::{HeapSqp, Horizon, Problem, WithIntegral};
 /// use casados::prelude::*;
 ///
 /// #[ode]
@@ -47,20 +47,20 @@ pub(super) const fn origin<M: Dae>() -> Origin {
 /// fn price(x: [f64; 2], u: f64) -> f64 { 0.5 * (x[1] * x[1] + u * u) }
 ///
 /// let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
-/// let mut ocp = Problem::new(Along::new(irk, Quadrature::<Price>::new())).on(Horizon::uniform(10, 0.1))?;
+/// let mut ocp = Problem::new(WithIntegral::new(irk, Quadrature::<Price>::new())).on(Horizon::uniform(10, 0.1))?;
 /// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
 /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Along<I, Q> {
+pub struct WithIntegral<I, Q> {
     /// The integrator.
     pub integrator: I,
     /// The integral.
     pub integral: Q,
 }
 
-impl<I, Q> Along<I, Q> {
+impl<I, Q> WithIntegral<I, Q> {
     /// Both together.
     pub fn new(integrator: I, integral: Q) -> Self {
         Self { integrator, integral }
@@ -177,7 +177,7 @@ macro_rules! single {
         }
 
         impl<M: $model, B, const S: usize, T: Real, W: WithForward, Q: IntegralCost<M, T>> Dynamics<T>
-            for Along<$module::Integrator<M, B, S, T, W>, Q>
+            for WithIntegral<$module::Integrator<M, B, S, T, W>, Q>
         {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
@@ -195,7 +195,7 @@ macro_rules! single {
                     integral.prepare();
                     let result = integrator.with(integral).solve(x, u, at.h)?;
                     let cost = IntegralTerms { value: integral.terms().value, ..IntegralTerms::default() };
-                    Ok(Step { cost, ..result.into() })
+                    Ok(IntervalResult { cost, ..result.into() })
                 })
             }
             fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
@@ -203,7 +203,7 @@ macro_rules! single {
                     integrator.begin(at)?;
                     integral.prepare();
                     let result = integrator.with(integral).forward(x, u, at.h)?;
-                    Ok(Step { cost: integral.terms(), ..result.into() })
+                    Ok(IntervalResult { cost: integral.terms(), ..result.into() })
                 })
             }
             #[cfg(feature = "alloc")]
@@ -218,7 +218,7 @@ macro_rules! single {
         }
 
         impl<M: $model, B, const S: usize, T: Real, W: WithHessian, Q: IntegralCost<M, T>> SecondOrder<T>
-            for Along<$module::Integrator<M, B, S, T, W>, Q>
+            for WithIntegral<$module::Integrator<M, B, S, T, W>, Q>
         {
             fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 each::<M, T, _>(self, nodes, sink, |Self { integrator, integral }, at, x, u| {
@@ -229,7 +229,7 @@ macro_rules! single {
                     let result = integrator.hessian_along(x, u, at.h, &lambda, $(at.$nu,)? along)?;
                     // The Hessian is that of both together: what the integral would add is in it.
                     let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 3], ..integral.terms() };
-                    Ok(Step { cost, ..result.into() })
+                    Ok(IntervalResult { cost, ..result.into() })
                 })
             }
         }

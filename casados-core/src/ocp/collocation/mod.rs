@@ -22,7 +22,7 @@ mod equations;
 
 use super::begin::{Begin, at};
 use super::dynamics::{
-    Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step, vector,
+    Dynamics, IntegralTerms, Interval, IntervalResult, Nodes, SecondOrder, Sink, StageAction, vector,
 };
 use super::error::OcpError;
 use super::inside::Inside;
@@ -164,7 +164,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         if self.stages.len() != nodes.len() * self.steps() {
             return self.place_between(nodes);
         }
-        if nodes.along.is_none() && self.change_to(nodes)? {
+        if nodes.step_length.is_none() && self.change_to(nodes)? {
             self.go(T::ONE);
         }
         Ok(())
@@ -202,8 +202,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     }
 
     /// Stages go a part of their way.
-    fn go(&mut self, along: T) {
-        go::<M, S, T>(&mut self.stages, &self.change, along);
+    fn go(&mut self, alpha: T) {
+        go::<M, S, T>(&mut self.stages, &self.change, alpha);
     }
 
     /// All intervals at their stages: derivatives of `order` 1 or 2, and ends and algebraic states
@@ -211,7 +211,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     fn differentiate(
         &mut self,
         nodes: &Nodes<'_, T>,
-        run: impl for<'r> Fn(&'r mut Irk<M, B, S, T>, &Interval<'_, T>) -> Result<Step<'r, T>, Error>,
+        run: impl for<'r> Fn(&'r mut Irk<M, B, S, T>, &Interval<'_, T>) -> Result<IntervalResult<'r, T>, Error>,
         second: bool,
         sink: Sink<'_, T>,
     ) -> Result<(), OcpError> {
@@ -242,7 +242,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let (mut of_x, mut of_u) = (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed());
             let mut cost = IntegralTerms::default();
             if second {
-                let after = Step::from(&after);
+                let after = IntervalResult::from(&after);
                 let changes = |of: [&[T]; 2], after: [&[T]; 2], to: &mut [T]| {
                     add_change(interval.multipliers, of[0], after[0], to);
                     add_change(interval.nu, of[1], after[1], to);
@@ -252,7 +252,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
                 (cost.x, cost.u) = (of_x.as_slice(), of_u.as_slice());
             }
             let (x, z) = (after.nominal.x.as_slice(), after.nominal.z0.as_slice());
-            sink(k, &Step { x, z, cost, stages: residual, ..step });
+            sink(k, &IntervalResult { x, z, cost, stages: residual, ..step });
         }
         Ok(())
     }
@@ -262,12 +262,12 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
 fn go<M: Dae, const S: usize, T: Real>(
     stages: &mut [ArrayK<M, [T; S]>],
     change: &[ArrayK<M, [T; S]>],
-    along: T,
+    alpha: T,
 ) {
     for (y, change) in stages.iter_mut().zip(change) {
         let y = y.as_mut().as_flattened_mut().iter_mut();
         for (y, &change) in y.zip(change.as_ref().as_flattened()) {
-            *y = *y + along * change;
+            *y = *y + alpha * change;
         }
     }
 }
@@ -294,8 +294,8 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
         if self.stages.len() != nodes.len() * count {
             self.place_between(nodes)?;
         }
-        let along = match nodes.along {
-            Some(along) => along,
+        let alpha = match nodes.step_length {
+            Some(alpha) => alpha,
             None if self.change_to(nodes)? => T::ONE,
             None => T::ZERO,
         };
@@ -304,8 +304,16 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
             let [stages, change] =
                 [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
             let point = Point::<M, T, S>::at(&interval, &self.coefficients, count);
-            let (end, residual) = point.follow(stages, change, along);
-            sink(k, &Step { x: end.x.as_slice(), z: end.z0.as_slice(), stages: residual, ..Step::default() });
+            let (end, residual) = point.follow(stages, change, alpha);
+            sink(
+                k,
+                &IntervalResult {
+                    x: end.x.as_slice(),
+                    z: end.z0.as_slice(),
+                    stages: residual,
+                    ..IntervalResult::default()
+                },
+            );
         }
         Ok(())
     }
@@ -320,17 +328,18 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
         if self.stages.len() != nodes.len() * count {
             self.place_between(nodes)?;
         }
-        let along = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
+        let alpha = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
         for (k, interval) in nodes.iter().enumerate() {
             let places = k * count..(k + 1) * count;
             let [stages, change] =
                 [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
             let mut stages = stages.to_vec();
-            go::<M, S, T>(&mut stages, change, along);
+            go::<M, S, T>(&mut stages, change, alpha);
             at(k, self.at.begin(&interval))?;
             at(k, self.at.set_solution(&stages))?;
-            let visit =
-                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+            let visit = &mut |j, x: &[T], z: &[T]| {
+                sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
+            };
             at(k, self.at.at_parts(&interval, parts, visit))?;
         }
         Ok(true)
@@ -346,7 +355,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
 
     fn move_stages(&mut self, action: StageAction<T>) {
         match action {
-            StageAction::Go(along) => self.go(along),
+            StageAction::Go(alpha) => self.go(alpha),
             StageAction::Remember => self.best.copy_from_slice(&self.stages),
             StageAction::Recall => self.stages.copy_from_slice(&self.best),
         }
@@ -362,14 +371,14 @@ impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Collocation<M, B, S,
 fn forward<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
     of: &Interval<'_, T>,
-) -> Result<Step<'r, T>, Error> {
-    irk.forward(&vector(of.x), &vector(of.u), of.h).map(Step::from)
+) -> Result<IntervalResult<'r, T>, Error> {
+    irk.forward(&vector(of.x), &vector(of.u), of.h).map(IntervalResult::from)
 }
 
 fn hessian<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
     of: &Interval<'_, T>,
-) -> Result<Step<'r, T>, Error> {
+) -> Result<IntervalResult<'r, T>, Error> {
     let lambda = vector(of.multipliers);
-    irk.hessian_along(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None).map(Step::from)
+    irk.hessian_along(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None).map(IntervalResult::from)
 }

@@ -177,7 +177,7 @@ where
         alpha: f64,
     ) -> Option<Measure> {
         let part_of_step = T::from_f64(alpha);
-        ocp.along = Some(part_of_step);
+        ocp.step_length = Some(part_of_step);
         {
             let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
@@ -197,7 +197,7 @@ where
         }
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
         let objective = if self.lengths.alone { 0.0 } else { objective };
-        ocp.along = Some(T::ZERO);
+        ocp.step_length = Some(T::ZERO);
         let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
         if P::Dynamics::LIFTED {
             gaps += ocp.stages[0].to_f64();

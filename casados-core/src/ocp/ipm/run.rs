@@ -137,7 +137,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !(is_last && result.is_ok()) && state.best_residual.is_finite() {
             ocp.recall(&self.best);
         }
-        (ocp.along, ocp.has_algebraic) = (None, false);
+        (ocp.step_length, ocp.has_algebraic) = (None, false);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
         if stuck && state.best_residual <= self.options.acceptable_tolerance {

@@ -5,7 +5,7 @@ use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::cost::{At, Cost};
 use crate::ocp::data::{Node, inputs, split};
-use crate::ocp::dynamics::Step;
+use crate::ocp::dynamics::IntervalResult;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::point::{Cross, read};
@@ -107,7 +107,7 @@ impl<T: Real> Parameters<T> {
     }
 
     /// What an interval adds.
-    pub(super) fn take(&mut self, k: usize, step: &Step<'_, T>) {
+    pub(super) fn take(&mut self, k: usize, step: &IntervalResult<'_, T>) {
         let [nx, nu, np] = self.dims;
         let (size, nz) = (nx + nu, step.z.len());
         assign(part_mut(&mut self.algebraic, k * nz * np, nz * np), step.dz[2]);

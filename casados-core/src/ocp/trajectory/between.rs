@@ -3,7 +3,7 @@
 use super::{Kind, Series, Trajectory};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::data::split;
-use crate::ocp::dynamics::{Dynamics, Step};
+use crate::ocp::dynamics::{Dynamics, IntervalResult};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::{Ocp, nodes};
 use crate::ocp::point::read;
@@ -84,7 +84,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &Step<'_, T>| {
+        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &IntervalResult<'_, T>| {
             let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
             to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
         })?;
