@@ -17,7 +17,7 @@ use crate::integrator::Integrator as _;
 use crate::memory::Heap;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -64,14 +64,18 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T, S> {
-    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
         &mut self,
         step: &Taken<'_, M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
     }
@@ -80,7 +84,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
     }
@@ -89,7 +93,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }

@@ -26,7 +26,7 @@ use crate::integrator::blocks::{element, fill};
 use crate::irk::{check, check_named};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Backwards, begin, finish, reborrow};
+use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -130,7 +130,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
         ends: &[T],
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.steps(x0, controls, ends)?;
         self.replay(x0, along)?;
@@ -224,7 +224,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         controls: &[VectorU<M, T>],
         ends: &[T],
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         self.solved = false;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
@@ -278,7 +278,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         forward: PiecewiseForward<M, T>,
         lambda: &VectorX<M, T>,
         sum: &mut [T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
         let Self { integrator, segments, count, nominal, second: [_, product], .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };

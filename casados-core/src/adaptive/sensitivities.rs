@@ -25,7 +25,7 @@ use crate::irk::{check_result, not_finite};
 use crate::linalg::axpy;
 use crate::memory::extend;
 use crate::model::{ArrayK, ArrayW, Dae, VectorX, VectorZ};
-use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
+use crate::quadrature::{Backwards, Chained, Integrand, OptionalIntegrand, begin, finish};
 use crate::result::{Adjoint, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Plain, Shape};
@@ -132,7 +132,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         begin(&mut along);
         self.steps::<B>(state, x0, |replays, taken, _| {
@@ -153,7 +153,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         x0: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         mut history: Option<&mut Vec<T>>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         begin(&mut along);
         let second = history.is_some();
@@ -204,7 +204,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         state: &mut B::State,
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let Memory { lambda: now, gradient, adjoint, .. } = memory;
@@ -246,7 +246,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         history: &[T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
         let Memory { lambda: now, gradient, hessian, product, sum, .. } = memory;
@@ -294,7 +294,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
 
 /// The integrand of one step of an interval, or of one of several intervals.
 pub(super) fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut Along<'_, '_, M, T>,
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a Rows<M, T>>,
     second: bool,
 ) -> Option<Chained<'a, M, T>> {
@@ -303,7 +303,7 @@ pub(super) fn chain<'a, M: Dae, T: Real>(
 
 pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
-) -> Along<'a, 'a, M, T> {
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {
         Some(integrand) => Some(integrand),
         None => None,

@@ -18,7 +18,7 @@ use super::signature::{self, Output};
 use super::sparsity::Relation;
 use crate::batch::vector;
 use crate::model::{Dae, VectorX};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::shape::{Matrix, Shape};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -272,7 +272,7 @@ impl<M: Dae> Asked<'_, M> {
     fn of<I: Interval<Model = M>>(
         &self,
         integrator: &mut I,
-        along: Along<'_, '_, M, f64>,
+        along: OptionalIntegrand<'_, '_, M, f64>,
         answer: &mut Answer<I::Tape>,
         call: &mut dyn Call,
     ) -> Result<(), Failure> {

@@ -7,7 +7,7 @@ use crate::function::{ArrayY, Function};
 use crate::integrator::Integrator;
 use crate::memory::{Family, Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape, change, entry};
@@ -169,7 +169,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let end = *self.integrator.solve_along(x0, u, h, along)?;
         Ok(&self.project(&end, h)?.result)
@@ -180,7 +180,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         I::Memory: WithForward,
@@ -202,7 +202,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         I::Memory: WithAdjoint<1>,
@@ -234,7 +234,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         I::Memory: WithHessian,

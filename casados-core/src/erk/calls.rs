@@ -6,7 +6,7 @@ use crate::error::{Argument, Error};
 use crate::integrator::{self, With};
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Ode, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Integrand};
+use crate::quadrature::{Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -36,7 +36,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.solve(&grid, &mut along)?.1)
@@ -47,7 +47,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
@@ -62,7 +62,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         W: WithAdjoint<1>,
@@ -76,7 +76,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,

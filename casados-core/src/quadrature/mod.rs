@@ -128,20 +128,22 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
 }
 
 /// An integrand, or none.
-pub(crate) type Along<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
+pub(crate) type OptionalIntegrand<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
-pub(crate) fn begin<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) {
+pub(crate) fn begin<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) {
     if let Some(integrand) = along {
         integrand.begin();
     }
 }
 
-pub(crate) fn finish<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) -> Result<(), Error> {
+pub(crate) fn finish<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) -> Result<(), Error> {
     along.as_mut().map_or(Ok(()), |integrand| integrand.finish())
 }
 
 /// The same integrand for a while.
-pub(crate) fn reborrow<'a, M: Dae, T: Real>(along: &'a mut Along<'_, '_, M, T>) -> Along<'a, 'a, M, T> {
+pub(crate) fn reborrow<'a, M: Dae, T: Real>(
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match along {
         Some(integrand) => Some(&mut **integrand),
         None => None,

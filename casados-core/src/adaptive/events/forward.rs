@@ -13,7 +13,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         second: bool,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
         begin(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);

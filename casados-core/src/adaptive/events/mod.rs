@@ -40,7 +40,7 @@ use crate::memory::{allocate, push};
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
-use crate::quadrature::{Along, Integrand, begin, finish, reborrow};
+use crate::quadrature::{Integrand, OptionalIntegrand, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, listed, plain};
@@ -203,7 +203,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridForward<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
         let (result, moments) = self.sweep(x0, false, along)?;
@@ -231,7 +231,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Solution<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
         self.moments = self.replay(x0, along)?;
@@ -240,7 +240,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 
     /// All steps again, to rounding, and what is known about the moments of the events.
-    fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<Moments<M, T>, Error> {
+    fn replay(
+        &mut self,
+        x0: &VectorX<M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<Moments<M, T>, Error> {
         begin(&mut along);
         let mut moments = core::mem::take(&mut self.moments);
         moments.clear();
@@ -271,7 +275,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
         self.asked = None;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;

@@ -93,7 +93,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// All steps again, to rounding.
-    pub(super) fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<(), Error> {
+    pub(super) fn replay(
+        &mut self,
+        x0: &VectorX<M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<(), Error> {
         begin(&mut along);
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut x = *x0;
@@ -114,7 +118,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         second: bool,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
         mut sums: Option<&mut Sums<M, T>>,
     ) -> Result<PiecewiseForward<M, T>, Error> {
         begin(&mut along);

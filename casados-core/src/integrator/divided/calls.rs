@@ -7,7 +7,7 @@ use crate::finite::{check_input, check_output};
 use crate::linalg::axpy;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Backwards, begin, finish};
+use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix};
@@ -42,7 +42,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.begin(h)?;
         begin(&mut along);
@@ -56,7 +56,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         I::Memory: WithForward,
@@ -74,7 +74,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         I::Memory: WithAdjoint<1>,
@@ -117,7 +117,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         I::Memory: WithHessian,

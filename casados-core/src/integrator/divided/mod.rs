@@ -15,7 +15,7 @@ use crate::error::{Argument, Error};
 use crate::finite::check_input;
 use crate::memory::{Family, Memory, WithForward};
 use crate::model::{Dae, VectorX};
-use crate::quadrature::{Along, Chained, Integrand};
+use crate::quadrature::{Chained, Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::{Field, Real};
 use crate::shape::Plain;
@@ -139,7 +139,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         x0: &X<Self>,
         u: &U<Self>,
         h: I::Number,
-        along: &mut Along<'_, '_, I::Model, I::Number>,
+        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
     ) -> Result<(), Error> {
         let (mut x, mut z0) = (*x0, None);
         for k in 0..N {
@@ -165,7 +165,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         u: &U<Self>,
         h: I::Number,
         second: bool,
-        along: &mut Along<'_, '_, I::Model, I::Number>,
+        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
         mut keep: impl FnMut(&mut Self, usize, &X<Self>) -> Result<(), Error>,
     ) -> Result<(), Error>
     where
@@ -206,7 +206,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 
 /// The integrand of a part.
 fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut Along<'_, '_, M, T>,
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a Rows<M, T>>,
     second: bool,
 ) -> Option<Chained<'a, M, T>> {
@@ -215,7 +215,7 @@ fn chain<'a, M: Dae, T: Real>(
 
 fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
-) -> Along<'a, 'a, M, T> {
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {
         Some(integrand) => Some(integrand),
         None => None,
