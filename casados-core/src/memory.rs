@@ -34,6 +34,8 @@ pub mod mode;
 pub use fallback::{Fallback, Kept};
 #[cfg(feature = "alloc")]
 pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
+#[cfg(feature = "alloc")]
+pub(crate) use heap::{allocate, extend, push};
 
 use crate::error::Error;
 use bytemuck::Zeroable;

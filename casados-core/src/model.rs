@@ -259,9 +259,8 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
-    /// How many conditions the residual depends on that may change within an interval (those of
-    /// `if`, `min`, `max`, `clamp`, `abs`, `signum`), and how many tables. Zero too where they are
-    /// not known.
+    /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual depends on that may
+    /// change within an interval; zero too where they are not known.
     const BRANCHES: usize = 0;
 
     /// The residual `f(v)`.
@@ -316,9 +315,8 @@ pub trait Dae: 'static {
         hessian: &mut Self::Hessian<S::Cell>,
     );
 
-    /// Which of its [`BRANCHES`](Self::BRANCHES) the residual takes: a number that changes where a
-    /// condition does or a linear table has a point, and one that changes at the points of splines.
-    /// Steps with a change inside are not smooth.
+    /// Which of them the residual takes: a number that changes where a condition does or a linear
+    /// table has a point, and one that changes at the points of splines.
     fn branches<S: Lanes>(_v: &ArrayV<Self, S::Cell>, _branches: &mut [S::Cell; 2]) {}
 
     /// What is known about the model, to be printed: `println!("{}", Pendulum::describe())`.

@@ -7,7 +7,7 @@ use crate::model::{
     Dae, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX, MatrixZC,
     MatrixZP, MatrixZU, MatrixZX, VectorP, VectorU, VectorX, VectorZ,
 };
-use crate::shape::{Array, Matrix, Plain, plain};
+use crate::shape::{Array, Matrix, Plain, change, plain};
 use bytemuck::Zeroable;
 use core::ops::Deref;
 
@@ -376,7 +376,7 @@ pub(crate) fn split<T: Plain>(
 fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
     for column in 0..A::COLUMNS {
         if let Some(value) = values.next() {
-            to[(r, column)] = *value;
+            change(to, r, column, |_| *value);
         }
     }
 }

@@ -35,3 +35,15 @@ pub struct Statistics {
     /// was pivoted.
     pub dense: usize,
 }
+
+impl Statistics {
+    /// What another call did.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.steps += other.steps;
+        self.iterations += other.iterations;
+        self.residuals += other.residuals;
+        self.jacobians += other.jacobians;
+        self.factorizations += other.factorizations;
+        self.dense += other.dense;
+    }
+}

@@ -25,11 +25,11 @@ const ARROWS: &[(&str, &str)] = &[
     ("linalg", "shape tableau memory scalar model"),
     ("result", "shape model"),
     ("finite", "error shape scalar model linalg result"),
-    ("quadrature", "error shape scalar function model linalg result finite"),
+    ("quadrature", "error shape memory scalar function model linalg result finite"),
     ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (
         "constrained",
-        "error shape statistics memory scalar function model result finite quadrature integrator",
+        "error shape statistics structure memory scalar function model result finite quadrature integrator",
     ),
     (
         "erk",

@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Along, Collocation, Constraint, ConvexCost, GeneralCost, HeapIpm, HeapSqp, Horizon, Huber,
-    LeastSquaresCost, Problem, Shooting,
+    Collocation, Constraint, ConvexCost, GeneralCost, HeapIpm, HeapSqp, Horizon, Huber, LeastSquaresCost,
+    Problem, Shooting, WithIntegral,
 };
 use casados::prelude::*;
 
@@ -36,17 +36,18 @@ fn corners(x: [f64; 2], _u: [f64; 2], _p: f64) -> [f64; 2] {
 fn everything_that_can_be_said() -> Test {
     let infinity = f64::INFINITY;
     let integral = casados::LeastSquares::<Effort>::new(&nalgebra::matrix![1.0, 0.0; 0.0, 1.0]);
-    let mut ocp = Problem::new(Along::new(Irk::<Slider, Gauss<2>>::new(Options::default())?, integral))
-        .running_cost((
-            GeneralCost::<Heat>::new(),
-            ConvexCost::<Place, _>::new(Huber { weights: [1.0], delta: [1.0] }),
-        ))
-        .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[2.0]))
-        .path_constraints((
-            Constraint::<Corners>::new([-infinity, -1.5], [2.0, infinity]).soft(10.0, 3.0),
-            Constraint::<Place>::new([0.0], [4.0]),
-        ))
-        .on(Horizon::uniform(6, 0.25))?;
+    let mut ocp =
+        Problem::new(WithIntegral::new(Irk::<Slider, Gauss<2>>::new(Options::default())?, integral))
+            .running_cost((
+                GeneralCost::<Heat>::new(),
+                ConvexCost::<Place, _>::new(Huber { weights: [1.0], delta: [1.0] }),
+            ))
+            .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[2.0]))
+            .path_constraints((
+                Constraint::<Corners>::new([-infinity, -1.5], [2.0, infinity]).soft(10.0, 3.0),
+                Constraint::<Place>::new([0.0], [4.0]),
+            ))
+            .on(Horizon::uniform(6, 0.25))?;
     ocp.bound("u[0]", .., -1.0, 2.0)?.soften_upper("u", 2..4, 0.0, 8.0)?;
     for k in 0..6 {
         ocp.bound("x[1]", k + 1..=k + 1, -infinity, 2.0 + k as f64)?;

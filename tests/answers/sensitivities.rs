@@ -5,8 +5,8 @@ use crate::Test;
 use crate::mass::{Both, Push};
 use casados::LeastSquares;
 use casados::ocp::{
-    Along, Constraint, Convexification, Exact, GaussNewton, GeneralCost, HeapSqp, Horizon, LeastSquaresCost,
-    Map, OcpError, Problem, Sensitivities,
+    Constraint, Convexification, Exact, GaussNewton, GeneralCost, HeapSqp, Horizon, LeastSquaresCost, Map,
+    OcpError, Problem, Sensitivities, WithIntegral,
 };
 use casados::prelude::*;
 
@@ -238,7 +238,7 @@ fn parameters_as_states() -> Test {
     }
     macro_rules! integral {
         ($module:ident) => {
-            Along::new(
+            WithIntegral::new(
                 integrator!($module),
                 LeastSquares::<$module::Tracking>::new(&nalgebra::Matrix3::identity()),
             )

@@ -4,8 +4,8 @@
 use crate::Test;
 use crate::mass::{Both, Push};
 use casados::ocp::{
-    Along, Constraint, Convexification, Exact, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp,
-    HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SecondOrder, Shooting, SolutionFactors,
+    Constraint, Convexification, Exact, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp, HeapSqp,
+    Horizon, LeastSquaresCost, Map, Problem, SecondOrder, Shooting, SolutionFactors, WithIntegral,
 };
 use casados::prelude::*;
 use casados::qp::HeapSolution;
@@ -280,13 +280,13 @@ fn values_and_adjoints_are_differences_of_solutions() -> Test {
 fn integral_costs_have_derivatives_by_parameters() -> Test {
     let squares = |at: &[f64]| {
         let irk = Irk::<Pendulum, Gauss<2>>::new(Options::default())?;
-        let along = Along::new(irk, LeastSquares::<Tracking>::new(&Matrix3::identity()));
+        let along = WithIntegral::new(irk, LeastSquares::<Tracking>::new(&Matrix3::identity()));
         solved(bounded!(along, at), By::Sqp)
     };
     check_by_differences(&AT, By::Sqp, squares, TOLERANCE)?;
     let general = |at: &[f64]| {
         let irk = Irk::<Pendulum, Gauss<2>>::new(Options::default())?;
-        solved(bounded!(Along::new(irk, Quadrature::<Work>::new()), at), By::Sqp)
+        solved(bounded!(WithIntegral::new(irk, Quadrature::<Work>::new()), at), By::Sqp)
     };
     check_by_differences(&AT, By::Sqp, general, TOLERANCE)
 }

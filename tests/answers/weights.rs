@@ -2,7 +2,7 @@
 
 use crate::Test;
 use casados::LeastSquares;
-use casados::ocp::{Along, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem};
+use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem, WithIntegral};
 use casados::prelude::*;
 use nalgebra::SMatrix;
 
@@ -78,7 +78,7 @@ fn weights() -> Test {
 fn weights_of_integrals() -> Test {
     let problem = |weights| {
         let irk = Irk::<Mass, Gauss<2>>::new(Options::default())?;
-        let along = Along::new(irk, LeastSquares::<Output>::new(&weights));
+        let along = WithIntegral::new(irk, LeastSquares::<Output>::new(&weights));
         let ocp = Problem::new(along).on(Horizon::uniform(3, 0.1))?;
         Ok::<_, Box<dyn std::error::Error>>(ocp)
     };

@@ -21,9 +21,10 @@ names! {
     Adaptive AdaptiveOptions Crossing Event Hybrid Piecewise Radau Batch BatchError Intervals Heap Jacobian
     Newton Options Start LeastSquares Quadrature Seeds Butcher6 Custom DormandPrince5 DormandPrince8 Euler
     Gauss Heun Midpoint RadauIIA Rk4 Tableau Dae Erk Error Function Inline Irk Ode dae function ode
-    Along Collocation Constraint ConvexCost Exact Formulation GaussNewton GeneralCost Globalisation HeapIpm
+    Collocation Constraint ConvexCost Exact Formulation GaussNewton GeneralCost Globalisation HeapIpm
     HeapOcp HeapRealTime HeapSqp Horizon Huber IpmOptions Iteration LeastSquaresCost Log Map OcpError Outcome
     Problem RealTime Sensitivities Shooting SolutionFactors SqpOptions Status Trajectory Update
+    WithIntegral
     Block Bounds Condensing QpField HeapInteriorPoint HeapQp HeapSolution InteriorPoint InteriorPointOptions Qp
     QpError QpSolver QpStart QpStatistics QpView Residuals Side Solution Stage StageDims
     Kind Series Cell Colour Curve Figure Panel Space Sparsity

@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Along, Convexification, Exact, GaussNewton, GeneralCost, Globalisation, HeapSqp, Horizon,
-    LeastSquaresCost, Map, Problem,
+    Convexification, Exact, GaussNewton, GeneralCost, Globalisation, HeapSqp, Horizon, LeastSquaresCost, Map,
+    Problem, WithIntegral,
 };
 use casados::prelude::*;
 use nalgebra::{Matrix2, Matrix2x1, RowVector2, SMatrix, Vector2};
@@ -158,14 +158,14 @@ fn integral_costs() -> Test {
     let x0 = [1.0, 0.5];
 
     let squares = LeastSquares::<Deviation>::new(&Matrix2::identity());
-    let mut ocp = Problem::new(Along::new(irk()?, squares)).on(Horizon::uniform(n, h))?;
+    let mut ocp = Problem::new(WithIntegral::new(irk()?, squares)).on(Horizon::uniform(n, h))?;
     ocp.fix_initial_state(&x0)?.guess(&x0, &[0.0])?;
     let first = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     // It is a QP.
     assert!(first.is_converged() && first.iterations == 1);
 
     let mut general =
-        Problem::new(Along::new(irk()?, Quadrature::<Effort>::new())).on(Horizon::uniform(n, h))?;
+        Problem::new(WithIntegral::new(irk()?, Quadrature::<Effort>::new())).on(Horizon::uniform(n, h))?;
     general.fix_initial_state(&x0)?.guess(&x0, &[0.0])?;
     // Semidefinite Hessians of stages are to stay as they are.
     let exact = Exact { convexification: Convexification::None };

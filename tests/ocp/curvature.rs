@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Along, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapOcp, HeapSqp, Horizon,
-    LeastSquaresCost, Map, Problem, SecondOrder, Shooting,
+    Constraint, Convexification, Exact, Formulation, GeneralCost, HeapOcp, HeapSqp, Horizon,
+    LeastSquaresCost, Map, Problem, SecondOrder, Shooting, WithIntegral,
 };
 use casados::prelude::*;
 
@@ -185,11 +185,12 @@ fn hessians_of_the_lagrangian() -> Test {
         Problem::new(Map::<SwingMap, f64>::new()).stage_cost(cost()).on(Horizon::uniform(3, 0.1))?;
     check(&mut ocp)?;
     let irk = Irk::<Swing, RadauIIA<2>>::new(Options::default())?;
-    let mut ocp = Problem::new(Along::new(irk, Quadrature::<Energy>::new())).on(Horizon::uniform(3, 0.1))?;
+    let mut ocp =
+        Problem::new(WithIntegral::new(irk, Quadrature::<Energy>::new())).on(Horizon::uniform(3, 0.1))?;
     check(&mut ocp)?;
     let irk = Irk::<Swing, RadauIIA<2>>::new(Options::default())?;
-    let mut ocp =
-        Problem::new(Along::new(irk, LeastSquares::<Tip>::new(&weights))).on(Horizon::uniform(3, 0.1))?;
+    let mut ocp = Problem::new(WithIntegral::new(irk, LeastSquares::<Tip>::new(&weights)))
+        .on(Horizon::uniform(3, 0.1))?;
     check(&mut ocp)
 }
 
@@ -211,7 +212,7 @@ fn hessians_with_algebraic_states() -> Test {
     check!(Irk::<Motor, RadauIIA<2>>::new(options(1))?);
     check!(Shooting::new(Batch::<Motor, Gauss<2>>::new(options(1))?));
     check!(Shooting::new(Batch::<Motor, RadauIIA<3>>::new(options(3))?));
-    check!(Along::new(Irk::<Motor, Gauss<2>>::new(options(2))?, Quadrature::<Heat>::new()));
+    check!(WithIntegral::new(Irk::<Motor, Gauss<2>>::new(options(2))?, Quadrature::<Heat>::new()));
     // A cost alone, a constraint alone.
     let irk = || Irk::<Motor, Gauss<2>>::new(options(1));
     let problem = Problem::new(irk()?).stage_cost(GeneralCost::<Heat>::new());

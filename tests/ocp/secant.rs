@@ -3,8 +3,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Along, Constraint, Formulation, GaussNewton, GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Outcome,
-    Problem, SecondOrder, Update,
+    Constraint, Formulation, GaussNewton, GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Outcome, Problem,
+    SecondOrder, Update, WithIntegral,
 };
 use casados::prelude::*;
 use casados::qp::{HeapInteriorPoint, residuals};
@@ -169,7 +169,7 @@ fn costs_that_are_integrals() -> Test {
     agrees(
         || {
             let cost = Quadrature::<Effort, f64>::new();
-            let mut ocp = Problem::new(Along::new(erk()?, cost)).on(Horizon::uniform(20, 0.05))?;
+            let mut ocp = Problem::new(WithIntegral::new(erk()?, cost)).on(Horizon::uniform(20, 0.05))?;
             ocp.fix_initial_state(&[0.8, 0.0])?.bound("u", .., -15.0, 15.0)?.guess(&[0.0, 0.0], &[0.0])?;
             Ok(ocp)
         },

@@ -19,11 +19,13 @@ use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
+use super::point::variable;
 use super::stages::{Convergence, Failure, FilteredDefect, Look, MOST, Stages, Start};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
+use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
@@ -31,7 +33,6 @@ use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
 use points::{combine, evaluate_polynomial, last_stage, take};
@@ -71,11 +72,9 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new(tableau: Tableau<S>) -> Result<Self, Error> {
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, G>>() };
-        let Ok(memory) = try_zeroed_box() else { return Err(out_of_memory) };
         // Gauss and Radau IIA methods have one: tests construct all.
-        let Some(scheme) = Scheme::new(tableau) else { return Err(out_of_memory) };
-        Ok(Self { scheme, memory })
+        let scheme = Scheme::new(tableau).ok_or(Error::OutOfMemory { bytes: 0 })?;
+        Ok(Self { scheme, memory: allocate()? })
     }
 }
 
@@ -112,7 +111,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         let to = middle.as_mut();
         for (index, y) in self.memory.y.as_ref().iter().enumerate() {
             let y = y.as_flattened();
-            to[if index < nx { index } else { index + nx }] = y[stage];
+            to[variable::<M>(index)] = y[stage];
             if index < nx {
                 let terms = self.scheme.tableau.a()[stage].iter().zip(y);
                 let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);

@@ -62,10 +62,10 @@ impl<M: Dae> Columns<M> {
     }
 
     /// `sum += Dᵀ H D`, the product `H D` first.
-    pub fn project<T: Real, R: AsRef<[T]>>(
+    pub fn project<T: Real>(
         &self,
         k: usize,
-        h: &[R],
+        h: impl Fn(usize, usize) -> T,
         v: &[T],
         product: &mut [T],
         sum: &mut [T],
@@ -73,14 +73,13 @@ impl<M: Dae> Columns<M> {
         let (nx, nu, width) = (M::Shape::NX, M::Shape::NU, self.all());
         // Where a local direction other than a state is.
         let global = |w: usize| if w < nx + nu { self.u(k) + w - nx } else { self.p() + w - nx - nu };
-        for (row, h) in product.chunks_exact_mut(width).zip(h) {
+        for (r, row) in product.chunks_exact_mut(width).enumerate().take(M::Shape::NW) {
             row.fill(T::ZERO);
-            let (states, others) = h.as_ref().split_at(nx);
-            for (h, v) in states.iter().zip(v.chunks_exact(width)) {
-                axpy(*h, v, row);
+            for (c, v) in v.chunks_exact(width).enumerate() {
+                axpy(h(r, c), v, row);
             }
-            for (w, h) in others.iter().enumerate() {
-                row[global(nx + w)] = row[global(nx + w)] + *h;
+            for c in nx..M::Shape::NW {
+                row[global(c)] = row[global(c)] + h(r, c);
             }
         }
         for (w, row) in product.chunks_exact(width).enumerate() {

@@ -1,7 +1,7 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::control::{Proportional, power};
+use super::control::Proportional;
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
@@ -9,7 +9,7 @@ use super::point::At;
 use super::replay::{Replay, Taken};
 use super::run::{Accepted, After, Base, Run, Span};
 use super::sealed::{Engine, Kind};
-use super::start::a_length;
+use super::start::first_length;
 use super::tape::Entry;
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
@@ -17,7 +17,7 @@ use crate::integrator::Integrator as _;
 use crate::memory::Heap;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -64,14 +64,18 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T, S> {
-    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
         &mut self,
         step: &Taken<'_, M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
     }
@@ -80,7 +84,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
     }
@@ -89,7 +93,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
@@ -245,8 +249,7 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
 }
 
-/// As long as an explicit Euler step changes the solution, and its derivative, by a hundredth of
-/// their size.
+/// The length of the first step.
 fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
@@ -267,30 +270,25 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
     let scale = scale.as_slice();
     let (size, speed) = (norm(x.as_slice(), scale), norm(slope.as_slice(), scale));
-    let guess = if size < 1e-5 || speed < 1e-5 { 1e-6 } else { 0.01 * size / speed };
-    let guess = guess.min(longest);
-    let h = T::from_f64(direction * guess);
-    let mut other = *x;
-    for (other, slope) in other.as_mut_slice().iter_mut().zip(slope.as_slice()) {
-        *other = *other + h * *slope;
-    }
-    step.go(run.base.point.as_ref(), other.as_slice());
-    let mut sum = 0.0;
-    if let Ok(second) = step.slope(t + h) {
-        for ((second, slope), scale) in second.iter().zip(slope.as_slice()).zip(scale) {
-            let change = ((*second - *slope) * *scale).to_f64();
-            sum += change * change;
+    let length = first_length([size, speed], longest, 1.0 / B::CONTROL.order, |length| {
+        let h = T::from_f64(direction * length);
+        let mut other = *x;
+        for (other, slope) in other.as_mut_slice().iter_mut().zip(slope.as_slice()) {
+            *other = *other + h * *slope;
         }
-    }
+        step.go(run.base.point.as_ref(), other.as_slice());
+        let mut sum = 0.0;
+        if let Ok(second) = step.slope(t + h) {
+            for ((second, slope), scale) in second.iter().zip(slope.as_slice()).zip(scale) {
+                let change = ((*second - *slope) * *scale).to_f64();
+                sum += change * change;
+            }
+        }
+        mean(sum, scale.len())
+    });
     step.go(run.base.point.as_ref(), x.as_slice());
     step.slope(t)?;
-    let largest = speed.max(mean(sum, scale.len()) / guess);
-    let second = if largest <= 1e-15 {
-        (guess * 1e-3).max(1e-6)
-    } else {
-        power(0.01 / largest, 1.0 / B::CONTROL.order)
-    };
-    Ok(a_length((100.0 * guess).min(second), longest))
+    Ok(length)
 }
 
 macro_rules! explicit {

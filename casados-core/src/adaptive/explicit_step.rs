@@ -5,13 +5,13 @@ use super::pairs::Pair;
 use crate::erk::{Grid, Point, Record, Scheme};
 use crate::error::{Error, Place};
 use crate::finite::check_output;
+use crate::memory::allocate;
 use crate::model::{ArrayX, Dae, Ode};
 use crate::result::Dense;
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
 /// Memory of a step.
@@ -80,9 +80,7 @@ pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     pub fn new() -> Result<Self, Error> {
-        let bytes = size_of::<Memory<M, T, S>>();
-        let memory = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
-        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, at_bound: 0, method: PhantomData })
+        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory: allocate()?, at_bound: 0, method: PhantomData })
     }
 
     /// The derivative at a state.

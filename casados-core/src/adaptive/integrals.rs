@@ -9,9 +9,9 @@
 
 use super::columns::Columns;
 use super::segment::filled;
-use super::sensitivities::fill;
 use crate::error::Error;
 use crate::function::{Function, MatrixYP, MatrixYU, MatrixYX};
+use crate::integrator::blocks::fill;
 use crate::model::{
     ArrayW, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
@@ -240,27 +240,16 @@ impl<M: Dae, T: Real> Sums<M, T> {
     }
 
     /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets
-    /// it. `full` is memory.
-    pub(super) fn add(
-        &mut self,
-        k: usize,
-        integrand: &mut dyn Integrand<M, T>,
-        v: &[T],
-        full: &mut ArrayW<M, ArrayW<M, T>>,
-    ) {
+    /// it.
+    pub(super) fn add(&mut self, k: usize, integrand: &mut dyn Integrand<M, T>, v: &[T]) {
         let Self { at, gradients, matrix, second, product } = self;
         for (row, sum) in integrand.gradients().iter().zip(gradients.chunks_exact_mut(at.all().max(1))) {
             at.add(k, row.as_ref(), v, sum);
         }
         let mut project = |lower: &[ArrayW<M, T>], sums: [&mut [T]; 2]| {
-            for r in 0..M::Shape::NW {
-                for c in 0..M::Shape::NW {
-                    full[r][c] = lower[r.max(c)][r.min(c)];
-                }
-            }
             for sum in sums {
                 if !sum.is_empty() {
-                    at.project(k, full.as_ref(), v, product, sum);
+                    at.project(k, |r, c| lower[r.max(c)][r.min(c)], v, product, sum);
                 }
             }
         };

@@ -16,13 +16,13 @@ use super::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
 use crate::finite::{check_input, check_named};
 use crate::integrator::{self, Integrator as _};
+use crate::memory::allocate;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
-use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
 /// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
@@ -93,8 +93,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
         options.check::<T>()?;
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Base<M, T>>() };
-        let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
+        let mut base: Box<Base<M, T>> = allocate()?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
         base.atol.as_mut().fill(T::from_f64(options.atol));
         for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
@@ -306,8 +305,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// Memory of derivatives.
     pub(super) fn reserve(&mut self) -> Result<(), Error> {
         if self.memory.is_none() {
-            let bytes = size_of::<Memory<M, T>>();
-            self.memory = Some(try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?);
+            self.memory = Some(allocate()?);
         }
         Ok(())
     }
@@ -332,12 +330,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let t_end = self.end(h)?;
         let span = self.begin(x0, u, t_end)?;
         let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
-        let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
-        for (t, expected) in [(span.start, frozen.start), (span.end, frozen.end)] {
-            if t != expected {
-                return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
-            }
-        }
+        frozen.check_is(span.start, span.end)?;
         // Dense output of explicit methods takes steps again.
         let Base { point, u, parameters, .. } = &mut *self.base;
         place_inputs::<M, T>(point.as_mut(), u, parameters);

@@ -19,13 +19,14 @@ use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, add, dense, filled, refill};
-use super::sensitivities::{Memory, chain, dynamic, fill, place};
+use super::sensitivities::{chain, dynamic};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
 use crate::finite::{check_input, check_named, check_output};
+use crate::integrator::blocks::{element, fill};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Backwards, begin, finish, reborrow};
+use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -129,7 +130,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
         ends: &[T],
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.steps(x0, controls, ends)?;
         self.replay(x0, along)?;
@@ -223,7 +224,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         controls: &[VectorU<M, T>],
         ends: &[T],
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         self.solved = false;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
@@ -279,7 +280,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         forward: PiecewiseForward<M, T>,
         lambda: &VectorX<M, T>,
         sum: &mut [T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
         let Self { integrator, segments, count, nominal, second: [_, product], .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
@@ -295,14 +296,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let (mut frozen, state, memory, v) = segment.open(integrator)?;
             let mut part = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
-            let Memory { hessian, step, .. } = memory;
+            let hessian = &memory.hessian;
             adjoint.grad_x0 = hessian.first.grad_x0;
             if let Some(grad_u) = adjoint.grad_u.get_mut(k) {
                 *grad_u = hessian.first.grad_u;
             }
             axpy(T::ONE, hessian.first.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
-            place(hessian, step);
-            at.project(k, step.as_ref(), v, product, sum);
+            at.project(k, |r, c| element(hessian, r, c), v, product, sum);
             segment.history = history;
         }
         check_output(adjoint.grad_p.as_slice(), 0)?;

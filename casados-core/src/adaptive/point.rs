@@ -12,6 +12,11 @@ pub struct At<'a, M: Dae, T: Real> {
     pub t: T,
 }
 
+/// Where an unknown of `(ẋ, z)` lies among the variables `(ẋ, x, z, u, p, t)`.
+pub(super) const fn variable<M: Dae>(unknown: usize) -> usize {
+    if unknown < M::Shape::NX { unknown } else { unknown + M::Shape::NX }
+}
+
 /// Writes `u` and `p` to where they lie in the variables of a model: after `(ẋ, x, z)`.
 pub(super) fn place_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
     let begin = 2 * M::Shape::NX + M::Shape::NZ;

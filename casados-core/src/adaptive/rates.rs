@@ -3,12 +3,12 @@
 
 use super::point::{At, place_inputs};
 use crate::error::{Error, Place, Quantity};
+use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 
 /// Memory of an evaluation.
 #[derive(Zeroable)]
@@ -24,8 +24,7 @@ impl<M: Dae, T: Real> Rates<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Box<Self>, Error> {
-        let bytes = size_of::<Self>();
-        let mut rates: Box<Self> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        let mut rates: Box<Self> = allocate()?;
         M::jacobian_constants::<T>(&mut rates.jacobian);
         Ok(rates)
     }

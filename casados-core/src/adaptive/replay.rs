@@ -12,7 +12,7 @@ use crate::memory::Heap;
 use crate::memory::fallback::OneStep;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX};
 use crate::options::{Options, Start};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -40,7 +40,11 @@ pub trait Replay<M: Dae, T: Real> {
     ///
     /// # Errors
     /// Those of Newton's method.
-    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error>;
+    fn solve(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error>;
     /// The same with derivatives.
     ///
     /// # Errors
@@ -48,7 +52,7 @@ pub trait Replay<M: Dae, T: Real> {
     fn forward(
         &mut self,
         step: &Taken<'_, M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
     /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for
     /// each direction.
@@ -69,7 +73,7 @@ pub trait Replay<M: Dae, T: Real> {
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
     /// The gradient of `λᵀx` at its end.
     ///
@@ -79,7 +83,7 @@ pub trait Replay<M: Dae, T: Real> {
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>;
     /// The unknowns of the stages that a method of the family found last.
     ///
@@ -121,14 +125,18 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
 }
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B, T, S> {
-    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
         &mut self,
         step: &Taken<'_, M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.go(step)?.forward_refined(step.at.x, step.at.u, step.h, along)
     }
@@ -137,7 +145,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, &[], along)
     }
@@ -146,7 +154,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
@@ -176,14 +184,18 @@ macro_rules! of_level {
 }
 
 impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<M, T> for Three<A, B, C> {
-    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         of_level!(self, step.level, solve(step, along))
     }
 
     fn forward(
         &mut self,
         step: &Taken<'_, M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         of_level!(self, step.level, forward(step, along))
     }
@@ -192,7 +204,7 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         of_level!(self, step.level, hessian(step, lambda, along))
     }
@@ -201,7 +213,7 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
         &mut self,
         step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         of_level!(self, step.level, adjoint(step, lambda, along))
     }

@@ -73,6 +73,19 @@ pub struct Span<T> {
     pub end: T,
 }
 
+impl<T: Real> Span<T> {
+    /// # Errors
+    /// [`Error::OutsideInterval`] if another interval is asked for than this one.
+    pub fn check_is(&self, start: T, end: T) -> Result<(), Error> {
+        let other = if start == self.start { end } else { start };
+        if start == self.start && end == self.end {
+            return Ok(());
+        }
+        let [t, start, end] = [other, self.start, self.end].map(Real::to_f64);
+        Err(Error::OutsideInterval { t, start, end })
+    }
+}
+
 /// What a run works with.
 pub struct Run<'a, M: Dae, T: Real> {
     pub options: &'a AdaptiveOptions,

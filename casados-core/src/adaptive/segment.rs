@@ -8,6 +8,7 @@ use super::sensitivities::{Frozen, Memory};
 use super::tape::Tape;
 use crate::error::{Argument, Error};
 use crate::finite::check_input;
+use crate::memory::push;
 use crate::model::{ArrayK, Dae, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
@@ -69,10 +70,7 @@ impl<M: Dae, T: Real> Segment<M, T> {
 /// # Errors
 /// [`Error::OutOfMemory`]
 pub(super) fn add<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -> Result<(), Error> {
-    let bytes = size_of::<Segment<M, T>>();
-    segments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes })?;
-    segments.push(Segment::default());
-    Ok(())
+    push(segments, Segment::default())
 }
 
 /// The solution at a time inside the intervals; where two of them meet, that of the first.

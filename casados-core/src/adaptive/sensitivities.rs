@@ -11,8 +11,7 @@
 
 mod blocks;
 
-use blocks::{algebraic, in_step};
-pub(super) use blocks::{fill, place};
+use blocks::in_step;
 
 use super::consistent::Consistent;
 use super::point::At;
@@ -22,12 +21,14 @@ use super::sealed::Engine;
 use super::tape::Tape;
 use crate::error::Error;
 use crate::finite::{check_forward, check_output};
+use crate::integrator::blocks::{Rows, Square, add, advance, algebraic, element, identity, split, states};
 use crate::linalg::axpy;
-use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorX, VectorZ};
-use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
-use crate::result::{Adjoint, Forward, Hessian, split};
+use crate::memory::extend;
+use crate::model::{ArrayK, ArrayW, Dae, VectorX, VectorZ};
+use crate::quadrature::{Backwards, Chained, Integrand, OptionalIntegrand, begin, finish};
+use crate::result::{Adjoint, Hessian};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Array, Matrix, Plain, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
@@ -38,15 +39,13 @@ pub struct Memory<M: Dae, T: Plain> {
     pub hessian: Hessian<M, T>,
     pub adjoint: Adjoint<M, T>,
     /// `V_n`, and `V_{n+1}`.
-    v: [ArrayX<M, ArrayW<M, T>>; 2],
+    v: [Rows<M, T>; 2],
     lambda: VectorX<M, T>,
     /// The gradient of all steps.
     gradient: ArrayW<M, T>,
-    /// The Hessian of one step, its product with `D`, and the sum of all.
-    pub(super) step: ArrayW<M, ArrayW<M, T>>,
-    product: ArrayW<M, ArrayW<M, T>>,
-    sum: ArrayW<M, ArrayW<M, T>>,
-    row: ArrayW<M, T>,
+    /// The Hessian of one step times `D`, and the sum of all.
+    product: Square<M, T>,
+    sum: Square<M, T>,
 }
 
 /// What derivatives are taken of.
@@ -133,7 +132,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         begin(&mut along);
         self.steps::<B>(state, x0, |replays, taken, _| {
@@ -154,64 +153,33 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         x0: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         mut history: Option<&mut Vec<T>>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         begin(&mut along);
         let second = history.is_some();
-        let nx = M::Shape::NX;
-        let Memory { v: [v, next], hessian, row, .. } = memory;
+        let Memory { v: [v, next], hessian, .. } = memory;
         let result = &mut hessian.first.forward;
-        for (index, row) in v.as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(T::ZERO);
-            row.as_mut()[index] = T::ONE;
-        }
+        identity::<M, T>(v);
         let count = self.tape.entries().len();
         self.steps::<B>(state, x0, |replays, taken, step| {
             if let Some(history) = &mut history {
-                let more = nx * M::Shape::NW;
-                let bytes = history.len().saturating_add(more).saturating_mul(size_of::<T>());
-                history.try_reserve(more).map_err(|_| Error::OutOfMemory { bytes })?;
-                for row in v.as_ref() {
-                    history.extend_from_slice(row.as_ref());
-                }
+                extend(history, ArrayW::<M, T>::flat(v.as_ref()))?;
             }
             let mut chained = chain(&mut along, Some(v), second);
             let forward = replays.forward(taken, dynamic(&mut chained))?;
-            let at = |i: usize, w: usize| {
-                if w < nx {
-                    T::ZERO
-                } else if w < nx + M::Shape::NU {
-                    forward.dx_du[(i, w - nx)]
-                } else {
-                    forward.dx_dp[(i, w - nx - M::Shape::NU)]
-                }
-            };
-            for (i, row) in next.as_mut().iter_mut().enumerate() {
-                for (w, element) in row.as_mut().iter_mut().enumerate() {
-                    *element = at(i, w);
-                }
-                for (j, v) in v.as_ref().iter().enumerate() {
-                    axpy(forward.dx_dx0[(i, j)], v.as_ref(), row.as_mut());
-                }
-            }
+            advance(forward, v, next);
             if step + 1 == count && B::ENDS_ON_STAGE {
-                algebraic(forward, v, row, |row, i| {
-                    split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
-                });
+                algebraic(forward, v, result);
             }
             *v = *next;
             Ok((forward.nominal.x, forward.nominal.z))
         })?;
-        for (i, row) in v.as_ref().iter().enumerate() {
-            split(row.as_ref(), i, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
-        }
+        states(v, result);
         if const { !B::ENDS_ON_STAGE && M::Shape::NZ > 0 } {
             let y = self.end()?;
             let (x, Base { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
             let at = At { x: &x, u, p: parameters, t: self.span.end };
-            algebraic(self.consistent.forward(&at, &y)?, v, row, |row, i| {
-                split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
-            });
+            algebraic(self.consistent.forward(&at, &y)?, v, result);
         }
         if const { M::Shape::NZ > 0 } {
             let Base { u, parameters, start, .. } = &mut *self.base;
@@ -236,7 +204,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         state: &mut B::State,
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let Memory { lambda: now, gradient, adjoint, .. } = memory;
@@ -278,10 +246,10 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         history: &[T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
-        let Memory { lambda: now, gradient, hessian, step: local, product, sum, .. } = memory;
+        let Memory { lambda: now, gradient, hessian, product, sum, .. } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
         for row in sum.as_mut() {
@@ -302,47 +270,22 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
                 *sum = *sum + *part;
             }
-            place(second, local);
-            // G = H D, then sum += Dᵀ G.
             let v = history.get(step * nx * nw..).unwrap_or_default();
-            for (to, from) in product.as_mut().iter_mut().zip(local.as_ref()) {
-                to.as_mut().fill(T::ZERO);
-                to.as_mut()[nx..].copy_from_slice(&from.as_ref()[nx..]);
-                for (v, factor) in v.chunks_exact(nw.max(1)).zip(&from.as_ref()[..nx]) {
-                    axpy(*factor, v, to.as_mut());
-                }
-            }
-            let (product_x, product_w) = product.as_ref().split_at(nx);
-            for (v, row) in v.chunks_exact(nw.max(1)).zip(product_x) {
-                for (sum, factor) in sum.as_mut().iter_mut().zip(v) {
-                    axpy(*factor, row.as_ref(), sum.as_mut());
-                }
-            }
-            for (sum, row) in sum.as_mut()[nx..].iter_mut().zip(product_w) {
-                axpy(T::ONE, row.as_ref(), sum.as_mut());
-            }
+            add::<M, T>(|r, c| element(second, r, c), v, [product, sum]);
         }
         if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
             for (sum, second) in sum.as_mut().iter_mut().zip(second) {
                 axpy(T::ONE, second.as_ref(), sum.as_mut());
             }
         }
-        let sum = sum.as_ref();
-        // To the last bit symmetric: of the two that differ by rounding the lower one.
-        let at = |r: usize, c: usize| if r >= c { sum[r].as_ref()[c] } else { sum[c].as_ref()[r] };
-        fill(&mut hessian.h_xx, at);
-        fill(&mut hessian.h_xu, |r, c| at(r, nx + c));
-        fill(&mut hessian.h_uu, |r, c| at(nx + r, nx + c));
-        fill(&mut hessian.h_xp, |r, c| at(r, nx + nu + c));
-        fill(&mut hessian.h_up, |r, c| at(nx + r, nx + nu + c));
-        fill(&mut hessian.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
+        split(sum, hessian);
         let others = &gradient.as_ref()[nx..];
         hessian.first.grad_x0 = *now;
         hessian.first.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
         hessian.first.grad_p.as_mut_slice().copy_from_slice(&others[nu..nu + np]);
         check_output(now.as_slice(), 0)?;
         check_output(others, 0)?;
-        for row in sum {
+        for row in sum.as_ref() {
             check_output(row.as_ref(), 0)?;
         }
         Ok(())
@@ -351,8 +294,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
 
 /// The integrand of one step of an interval, or of one of several intervals.
 pub(super) fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut Along<'_, '_, M, T>,
-    v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+    v: Option<&'a Rows<M, T>>,
     second: bool,
 ) -> Option<Chained<'a, M, T>> {
     along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
@@ -360,7 +303,7 @@ pub(super) fn chain<'a, M: Dae, T: Real>(
 
 pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
-) -> Along<'a, 'a, M, T> {
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {
         Some(integrand) => Some(integrand),
         None => None,

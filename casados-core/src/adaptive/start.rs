@@ -1,11 +1,12 @@
 //! Where a run begins: consistent states, and the length of the first step.
 
+use super::control::power;
 use super::norm::norm;
-use super::point::{At, place_inputs};
+use super::point::{At, place_inputs, variable};
 use super::run::{Base, Run, Span};
 use crate::error::Error;
 use crate::model::{ArrayK, Dae, VectorX};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
@@ -40,7 +41,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let mut x = VectorX::<M, T>::zeroed();
         let mut y = ArrayK::<M, T>::zeroed();
         for (index, y) in y.as_mut().iter_mut().enumerate() {
-            *y = point[if index < nx { index } else { index + nx }];
+            *y = point[variable::<M>(index)];
         }
         x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
         match self.consistent.solve(&At { x: &x, u, p: parameters, t }, &mut y) {
@@ -50,7 +51,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             Err(error) => return Err(error),
         }
         for (index, y) in y.as_ref().iter().enumerate() {
-            point[if index < nx { index } else { index + nx }] = *y;
+            point[variable::<M>(index)] = *y;
         }
         Ok(())
     }
@@ -61,7 +62,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let Base { point, u, parameters, result, .. } = &mut *self.base;
         let numbers = point.as_mut();
         for (index, value) in start.as_ref().iter().enumerate() {
-            numbers[if index < nx { index } else { index + nx }] = *value;
+            numbers[variable::<M>(index)] = *value;
         }
         numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
         place_inputs::<M, T>(numbers, u, parameters);
@@ -80,9 +81,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
     }
 
-    /// The length of the first step: that in which an explicit Euler step changes the solution, and
-    /// its derivative, by a hundredth of their size (E. Hairer, S. P. Nørsett, G. Wanner, Solving
-    /// Ordinary Differential Equations I, section II.4).
+    /// The length of the first step.
     pub(super) fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
         if let Some(step) = self.options.initial_step {
             return Ok(step.min(longest));
@@ -97,35 +96,45 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let scale = &scale.as_ref()[..nx];
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let mut step = if size < 1e-5 || slope < 1e-5 { 1e-6 } else { 0.01 * size / slope };
-        step = step.min(longest);
-        // A second point, if there is a consistent one.
-        let h = T::from_f64(if span.end < span.start { -step } else { step });
-        let mut x = VectorX::<M, T>::zeroed();
-        for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {
-            *to = *x + h * *xdot;
-        }
-        let mut y = *start;
-        let at = At { x: &x, u, p: parameters, t: span.start + h };
-        let solved = self.consistent.solve(&at, &mut y);
-        self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
-        let mut curvature = 0.0;
-        if solved.is_ok() {
+        let length = first_length([size, slope], longest, 0.25, |step| {
+            // A second point, if there is a consistent one.
+            let h = T::from_f64(if span.end < span.start { -step } else { step });
+            let mut x = VectorX::<M, T>::zeroed();
+            for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {
+                *to = *x + h * *xdot;
+            }
+            let mut y = *start;
+            let at = At { x: &x, u, p: parameters, t: span.start + h };
+            let solved = self.consistent.solve(&at, &mut y);
+            self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
+            if solved.is_err() {
+                return 0.0;
+            }
             for (y, xdot) in y.as_mut().iter_mut().zip(xdot) {
                 *y = *y - *xdot;
             }
-            curvature = norm(&y.as_ref()[..nx], scale) / step;
-        }
-        let largest = slope.max(curvature);
-        let second =
-            if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { Scalar::powf(0.01 / largest, 0.25) };
+            norm(&y.as_ref()[..nx], scale)
+        });
         self.measure();
-        Ok(a_length((100.0 * step).min(second), longest))
+        Ok(length)
     }
 }
 
-/// The length of a first step, at most the longest. Where sizes overflow beside a tiny absolute
-/// tolerance nothing is foreseen: then a short one.
-pub(super) fn a_length(step: f64, longest: f64) -> f64 {
+/// The length of a first step, at most the longest: that in which an explicit Euler step changes
+/// the solution, and its derivative, by a hundredth of their size (E. Hairer, S. P. Nørsett,
+/// G. Wanner, Solving Ordinary Differential Equations I, section II.4). `change` is that of the
+/// slope over such a step. Where sizes overflow beside a tiny absolute tolerance nothing is
+/// foreseen: then a short one.
+pub(super) fn first_length(
+    [size, slope]: [f64; 2],
+    longest: f64,
+    exponent: f64,
+    change: impl FnOnce(f64) -> f64,
+) -> f64 {
+    let step = if size < 1e-5 || slope < 1e-5 { 1e-6 } else { 0.01 * size / slope };
+    let step = step.min(longest);
+    let largest = slope.max(change(step) / step);
+    let second = if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { power(0.01 / largest, exponent) };
+    let step = (100.0 * step).min(second);
     if step > 0.0 { step.min(longest) } else { 1e-8 * longest }
 }

@@ -1,6 +1,7 @@
 //! The accepted steps, as many as there are.
 
 use crate::error::Error;
+use crate::memory::{extend, push};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -48,16 +49,10 @@ impl<T: Real> Tape<T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn push(&mut self, t: T, h: T, level: usize, x: &[T], stages: &[T]) -> Result<(), Error> {
-        let length = x.len() + stages.len();
-        let bytes = (self.numbers.len() + length).saturating_mul(size_of::<T>());
-        let out_of_memory = Error::OutOfMemory { bytes };
-        self.entries.try_reserve(1).map_err(|_| out_of_memory)?;
-        self.numbers.try_reserve(length).map_err(|_| out_of_memory)?;
         let begin = self.numbers.len();
-        self.numbers.extend_from_slice(x);
-        self.numbers.extend_from_slice(stages);
-        self.entries.push(Entry { t, h, level, begin });
-        Ok(())
+        extend(&mut self.numbers, x)?;
+        extend(&mut self.numbers, stages)?;
+        push(&mut self.entries, Entry { t, h, level, begin })
     }
 
     /// The states at the start of a step, and the unknowns of its stages.
@@ -83,11 +78,8 @@ impl<T: Real> Tape<T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn keep(&mut self) -> Result<(), Error> {
-        let bytes = size_of_val(self.entries.as_slice());
         self.kept.clear();
-        self.kept.try_reserve(self.entries.len()).map_err(|_| Error::OutOfMemory { bytes })?;
-        self.kept.extend_from_slice(&self.entries);
-        Ok(())
+        extend(&mut self.kept, &self.entries)
     }
 
     /// The steps that were kept fill another interval, each its part of it; whatever they were
@@ -113,12 +105,8 @@ impl<T: Real> Tape<T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn write(&mut self, x: &[T], stages: &[T]) -> Result<(), Error> {
-        let length = x.len() + stages.len();
-        let bytes = (self.again.len() + length).saturating_mul(size_of::<T>());
-        self.again.try_reserve(length).map_err(|_| Error::OutOfMemory { bytes })?;
-        self.again.extend_from_slice(x);
-        self.again.extend_from_slice(stages);
-        Ok(())
+        extend(&mut self.again, x)?;
+        extend(&mut self.again, stages)
     }
 
     /// and then they count.

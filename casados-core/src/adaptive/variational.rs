@@ -25,6 +25,7 @@ use super::sealed::Engine;
 use super::stages::{Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::linalg::axpy;
+use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, Ode};
 use crate::result::Forward;
 use crate::scalar::Real;
@@ -32,7 +33,6 @@ use crate::shape::{Matrix, Plain, Shape};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
 /// What differentiates a step, whatever the method is: a program that does not ask for it contains
@@ -109,8 +109,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new<B: Engine<M, T>>() -> Result<Self, Error> {
-        let bytes = size_of::<Memory<M, T>>();
-        let mut memory: Box<Memory<M, T>> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        let mut memory: Box<Memory<M, T>> = allocate()?;
         M::jacobian_constants::<T>(&mut memory.jacobian);
         let (length, mut unknowns) = (M::Shape::NK * MOST, Vec::new());
         unknowns

@@ -1,6 +1,6 @@
 //! Numbers of several intervals in the lanes of registers, and back.
 
-use crate::error::Error;
+pub(super) use crate::erk::Verdict;
 use crate::linalg::{Arithmetic, Kernel, kernels};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
@@ -8,9 +8,6 @@ use bytemuck::Zeroable;
 
 /// More lanes than any register has.
 pub const MOST_LANES: usize = 16;
-
-/// The verdict on lanes, and the results of those for which it is good.
-pub type Verdict<'a, E, R> = Result<(<E as crate::scalar::Field>::Mask, &'a R), Error>;
 
 /// True in every lane.
 #[inline(always)]

@@ -29,6 +29,7 @@ mod statistics;
 mod together;
 mod work;
 
+pub(crate) use answer::Answer;
 pub use error::{BatchError, Slice};
 pub use integrator::Integrator;
 pub use intervals::Intervals;

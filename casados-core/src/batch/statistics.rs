@@ -42,16 +42,6 @@ impl BatchStatistics {
         self.alone += other.alone;
         self.redone += other.redone;
         self.failed += other.failed;
-        self.add_work(&other.work);
-    }
-
-    pub(super) fn add_work(&mut self, other: &Statistics) {
-        let work = &mut self.work;
-        work.steps += other.steps;
-        work.iterations += other.iterations;
-        work.residuals += other.residuals;
-        work.jacobians += other.jacobians;
-        work.factorizations += other.factorizations;
-        work.dense += other.dense;
+        self.work.add(&other.work);
     }
 }

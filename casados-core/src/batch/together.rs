@@ -107,7 +107,7 @@ impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for Together<'
             }
         }
         statistics.groups += 1;
-        statistics.add_work(&group.work());
+        statistics.work.add(&group.work());
         Ok(done)
     }
 }

@@ -154,10 +154,10 @@ impl<I: Single> Worker<I> {
                 let again = several && !solved[i] && !work.solved;
                 *(if again { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
                 let mut outcome = self.alone(work, interval, i, solved[i], &mut share);
-                self.statistics.add_work(&self.single.statistics());
+                self.statistics.work.add(&self.single.statistics());
                 if solved[i] && outcome.is_err() {
                     outcome = self.alone(work, interval, i, false, &mut share);
-                    self.statistics.add_work(&self.single.statistics());
+                    self.statistics.work.add(&self.single.statistics());
                 }
                 if let Some(status) = share.status.get_mut(i) {
                     *status = outcome;

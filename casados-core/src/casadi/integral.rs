@@ -1,12 +1,11 @@
 //! Integrals along the solution as a further output.
 
 use super::dependence;
-use super::interval::Along;
 use super::sparsity::Relation;
 use crate::error::Error;
 use crate::function::Function;
 use crate::model::Dae;
-use crate::quadrature::Quadrature;
+use crate::quadrature::{OptionalIntegrand, Quadrature};
 use crate::shape::{Matrix, Outputs};
 use alloc::boxed::Box;
 use core::marker::PhantomData;
@@ -25,7 +24,7 @@ pub trait Integral<M: Dae>: 'static {
     /// [`Error::OutOfMemory`]
     fn memory() -> Result<Self::Memory, Error>;
     /// What the integrator takes along, with these multipliers.
-    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> Along<'a, M>;
+    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64>;
     /// The values.
     fn value(memory: &Self::Memory) -> &[f64];
     /// The derivatives by `x₀`, `u` and `p`, each column by column.
@@ -47,7 +46,7 @@ impl<M: Dae> Integral<M> for Nothing {
     fn memory() -> Result<(), Error> {
         Ok(())
     }
-    fn along<'a>((): &'a mut (), _: &[f64]) -> Along<'a, M> {
+    fn along<'a>((): &'a mut (), _: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
         None
     }
     fn value((): &()) -> &[f64] {
@@ -74,7 +73,7 @@ where
     fn memory() -> Result<Self::Memory, Error> {
         Quadrature::boxed()
     }
-    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> Along<'a, M> {
+    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> OptionalIntegrand<'a, 'a, M, f64> {
         memory.nu.as_mut_slice().copy_from_slice(nu);
         Some(&mut **memory)
     }

@@ -12,12 +12,13 @@ use super::cache::{self, Answer, Cache, Given, Part, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
-use super::interval::{Along, Consistent, Interval, Point};
+use super::interval::{Consistent, Interval, Point};
 use super::library::{Client, Failure};
 use super::signature::{self, Output};
 use super::sparsity::Relation;
 use crate::batch::vector;
 use crate::model::{Dae, VectorX};
+use crate::quadrature::OptionalIntegrand;
 use crate::shape::{Matrix, Shape};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -150,7 +151,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     /// Parameters, and stages that are known; without any the next call is one more integration.
     fn begin(&self, integrator: &mut I, p: &[f64], tape: Option<&I::Tape>) -> Result<(), Failure> {
         if !p.is_empty() {
-            integrator.parameters(&vector(p))?;
+            integrator.set_parameters(&vector(p))?;
         }
         match tape {
             Some(tape) => Ok(integrator.restore(tape)?),
@@ -182,7 +183,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let algebraic = wanted.algebraic.contains(&true) || adjoint && nu.iter().any(|&nu| nu != 0.0);
         if algebraic && adjoint {
             // What the state is multiplied by depends on where it ends.
-            let end = integrator.value(&point, None)?.x;
+            let end = integrator.solve(&point.x0, &point.u, point.h)?.x;
             keep(integrator, &mut answer.tape)?;
             self.consistent(integrator, Point { x0: end, u: vector(u), h: 0.0 }, nu, zeta)?;
             algebraic::add_to_seed(sizes, zeta, nu, seed.as_mut_slice());
@@ -245,9 +246,9 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         zeta: &mut Consistent,
     ) -> Result<(), Failure> {
         self.integrations.fetch_add(1, Ordering::Relaxed);
-        integrator.time(self.settings.time + self.settings.interval)?;
+        integrator.set_time(self.settings.time + self.settings.interval)?;
         let outcome = integrator.consistent(&at, nu, zeta);
-        integrator.time(self.settings.time)?;
+        integrator.set_time(self.settings.time)?;
         Ok(outcome?)
     }
 }
@@ -271,15 +272,15 @@ impl<M: Dae> Asked<'_, M> {
     fn of<I: Interval<Model = M>>(
         &self,
         integrator: &mut I,
-        along: Along<'_, M>,
+        along: OptionalIntegrand<'_, '_, M, f64>,
         answer: &mut Answer<I::Tape>,
         call: &mut dyn Call,
     ) -> Result<(), Failure> {
         let Self { point, seed, wanted, copies, keeps, sizes, outputs } = *self;
-        let Sizes { nx, nw, ny, .. } = sizes;
+        let (Point { x0, u, h }, Sizes { nx, nw, ny, .. }) = (point, sizes);
         let mut numbers = Numbers::default();
         if wanted.hessian {
-            let result = integrator.curvature(point, seed, along)?;
+            let result = integrator.hessian_along(x0, u, *h, seed, along)?;
             if keeps || copies && wanted.jacobian {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
@@ -290,19 +291,19 @@ impl<M: Dae> Asked<'_, M> {
             (numbers.gradient, numbers.hessian) = (of_gradient(result), of_hessian(result));
             (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
         } else if wanted.gradient {
-            let result = integrator.gradient(point, seed, along)?;
+            let result = integrator.adjoint_along(x0, u, *h, seed, along)?;
             if copies {
                 join(&of_adjoint(result), answer.gradient.set(nw));
             }
             (numbers.value, numbers.gradient) = ([result.x.as_slice()], of_adjoint(result));
         } else if wanted.jacobian {
-            let result = integrator.jacobian(point, along)?;
+            let result = integrator.forward_along(x0, u, *h, along)?;
             if copies {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
             (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
         } else {
-            numbers.value = [integrator.value(point, along)?.x.as_slice()];
+            numbers.value = [integrator.solve_along(x0, u, *h, along)?.x.as_slice()];
         }
         answer.value.set(ny)[..nx].copy_from_slice(numbers.value[0]);
         write(&numbers, outputs, call);
@@ -331,7 +332,7 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             return Err(Failure("`algebraic` is for implicit methods with steps of equal size".into()));
         }
         let mut integrator = I::build(&self.settings.options)?;
-        integrator.time(self.settings.time)?;
+        integrator.set_time(self.settings.time)?;
         if I::CHOOSES {
             let at = self.settings.steps_at;
             if at.len() != Self::NW {
@@ -344,7 +345,7 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             let (x0, rest) = at.split_at(Self::NX);
             let (u, p) = rest.split_at(Self::NU);
             if !p.is_empty() {
-                integrator.parameters(&vector(p))?;
+                integrator.set_parameters(&vector(p))?;
             }
             integrator.choose(&Point { x0: vector(x0), u: vector(u), h: self.settings.interval })?;
         }

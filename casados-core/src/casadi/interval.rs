@@ -1,28 +1,22 @@
-//! What is asked of an integrator, whichever it is.
+//! What is asked of an integrator beside its calls, whichever it is.
 
 use crate::adaptive::{self, AdaptiveOptions};
 use crate::batch::vector;
 use crate::error::Error;
-use crate::integrator::Integrator as _;
+use crate::integrator::Integrator;
 use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, Ode, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, Dae, Ode, VectorU, VectorX};
 use crate::options::Options;
-use crate::quadrature::Integrand;
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::result::Forward;
 use crate::shape::Matrix;
 use crate::tableau::Method;
 use crate::{erk, irk};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// An integrand that is taken along, or none.
-pub type Along<'a, M> = Option<&'a mut dyn Integrand<M, f64>>;
-
 /// An integrator of one interval: `Irk`, `Erk` and `Adaptive` of `f64` on the heap.
 #[doc(hidden)]
-pub trait Interval: Sized + Send + 'static {
-    /// Its model.
-    type Model: Dae;
+pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'static {
     /// What can be chosen about it.
     type Options: Default + Clone + Send + Sync + 'static;
     /// The stages of all steps.
@@ -46,55 +40,6 @@ pub trait Interval: Sized + Send + 'static {
         let _ = at;
         Ok(())
     }
-    /// The parameters of all following calls.
-    ///
-    /// # Errors
-    /// [`Error::NonFiniteInput`]
-    fn parameters(&mut self, p: &VectorP<Self::Model, f64>) -> Result<(), Error>;
-    /// The time at the start of all following calls.
-    ///
-    /// # Errors
-    /// [`Error::NonFiniteInput`]
-    fn time(&mut self, t: f64) -> Result<(), Error>;
-    /// The solution.
-    ///
-    /// # Errors
-    /// Those of the integrator.
-    fn value(
-        &mut self,
-        point: &Point<Self::Model>,
-        along: Along<'_, Self::Model>,
-    ) -> Result<&Nominal<Self::Model>, Error>;
-    /// The solution and its derivatives.
-    ///
-    /// # Errors
-    /// Those of the integrator.
-    fn jacobian(
-        &mut self,
-        point: &Point<Self::Model>,
-        along: Along<'_, Self::Model>,
-    ) -> Result<&Forward<Self::Model>, Error>;
-    /// The solution and the gradient of `λᵀx`.
-    ///
-    /// # Errors
-    /// Those of the integrator.
-    fn gradient(
-        &mut self,
-        point: &Point<Self::Model>,
-        lambda: &VectorX<Self::Model, f64>,
-        along: Along<'_, Self::Model>,
-    ) -> Result<&Adjoint<Self::Model>, Error>;
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`.
-    ///
-    /// # Errors
-    /// Those of the integrator.
-    fn curvature(
-        &mut self,
-        point: &Point<Self::Model>,
-        lambda: &VectorX<Self::Model, f64>,
-        along: Along<'_, Self::Model>,
-    ) -> Result<&Hessian<Self::Model>, Error>;
-
     /// Whether it finds algebraic states that are consistent with a state.
     const CONSISTENT: bool = false;
     /// Algebraic states `ζ(x, u, p)` that are consistent with a state, and derivatives: of first
@@ -150,50 +95,7 @@ pub struct Point<M: Dae> {
     pub h: f64,
 }
 
-/// The calls that all integrators have, with integrands.
-macro_rules! calls {
-    ($model:ident, $($nu:expr)?) => {
-        fn parameters(&mut self, p: &VectorP<$model, f64>) -> Result<(), Error> {
-            self.set_parameters(p)
-        }
-        fn time(&mut self, t: f64) -> Result<(), Error> {
-            self.set_time(t)
-        }
-        fn value(
-            &mut self,
-            point: &Point<$model>,
-            along: Along<'_, $model>,
-        ) -> Result<&Nominal<$model>, Error> {
-            self.solve_along(&point.x0, &point.u, point.h, along)
-        }
-        fn jacobian(
-            &mut self,
-            point: &Point<$model>,
-            along: Along<'_, $model>,
-        ) -> Result<&Forward<$model>, Error> {
-            self.forward_along(&point.x0, &point.u, point.h, along)
-        }
-        fn gradient(
-            &mut self,
-            point: &Point<$model>,
-            lambda: &VectorX<$model, f64>,
-            along: Along<'_, $model>,
-        ) -> Result<&Adjoint<$model>, Error> {
-            self.adjoint_along(&point.x0, &point.u, point.h, lambda, along)
-        }
-        fn curvature(
-            &mut self,
-            point: &Point<$model>,
-            lambda: &VectorX<$model, f64>,
-            along: Along<'_, $model>,
-        ) -> Result<&Hessian<$model>, Error> {
-            self.hessian_along(&point.x0, &point.u, point.h, lambda, $($nu,)? along)
-        }
-    };
-}
-
 impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrator<M, B, S, f64, Heap> {
-    type Model = M;
     type Options = Options;
     type Tape = Vec<ArrayK<M, [f64; S]>>;
 
@@ -203,7 +105,6 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     fn depth(_: &Options) -> Option<usize> {
         None
     }
-    calls!(M, &[]);
 
     const RECORDS: bool = true;
     fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
@@ -242,7 +143,6 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
 }
 
 impl<M: Ode, B: Method<S> + 'static, const S: usize> Interval for erk::Integrator<M, B, S, f64, Heap> {
-    type Model = M;
     type Options = Options;
     type Tape = ();
 
@@ -252,7 +152,6 @@ impl<M: Ode, B: Method<S> + 'static, const S: usize> Interval for erk::Integrato
     fn depth(options: &Options) -> Option<usize> {
         Some(S.saturating_mul(options.steps))
     }
-    calls!(M,);
 }
 
 // `Engine` is sealed, and its integrators can be sent only where their states can.
@@ -260,7 +159,6 @@ impl<M: Dae, B: adaptive::Engine<M, f64> + 'static> Interval for adaptive::Integ
 where
     Self: Send,
 {
-    type Model = M;
     type Options = AdaptiveOptions;
     type Tape = ();
     const CHOOSES: bool = true;
@@ -275,5 +173,4 @@ where
         self.solve(&at.x0, &at.u, at.h)?;
         self.freeze()
     }
-    calls!(M,);
 }

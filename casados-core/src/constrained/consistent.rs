@@ -16,6 +16,7 @@ use crate::function::{ArrayV, ArrayY, Function, MatrixYX, MatrixYY};
 use crate::model::{ArrayX, Dae, VectorP, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Shape, change};
+use crate::structure::means;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -89,8 +90,7 @@ impl<M: Constrained> Consistent<M> {
     pub fn hold(mut self, name: &'static str) -> Result<Self, Inconsistent> {
         let mut found = false;
         for (held, state) in self.held.as_mut().iter_mut().zip(M::STRUCTURE.x) {
-            let rest = state.strip_prefix(name);
-            if rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.'])) {
+            if means(name, state) {
                 (*held, found) = (true, true);
             }
         }

@@ -8,7 +8,7 @@ use crate::function::{ArrayY, Function};
 use crate::integrator::Integrator;
 use crate::memory::{Family, Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape, change, entry};
@@ -137,7 +137,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&mut NominalMemory<M, T>, Error> {
         let p = self.begin()?;
         let end = *self.integrator.solve_along(x0, u, h, along)?;
@@ -197,7 +197,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         Ok(&self.project(x0, u, h, along)?.result)
     }
@@ -207,7 +207,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         I::Memory: WithForward,
@@ -232,7 +232,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         I::Memory: WithAdjoint<1>,
@@ -266,7 +266,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         I::Memory: WithHessian,

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Place};
 use crate::model::{ArrayV, ArrayW, ArrayX, Ode};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::scalar::{Lanes, Real};
 use crate::shape::Shape;
 
@@ -37,7 +37,7 @@ pub(crate) trait Beside<M: Ode, E: Lanes> {
     fn finish(&mut self) -> Result<(), Error>;
 }
 
-impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
+impl<M: Ode, T: Real> Beside<M, T> for OptionalIntegrand<'_, '_, M, T> {
     fn is_any(&self) -> bool {
         self.is_some()
     }

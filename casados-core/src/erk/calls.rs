@@ -7,7 +7,7 @@ use crate::finite::check_named;
 use crate::integrator::{self, With};
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Ode, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Integrand};
+use crate::quadrature::{Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -37,7 +37,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.solve(&grid, &mut along)?.1)
@@ -48,7 +48,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
@@ -63,7 +63,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         W: WithAdjoint<1>,
@@ -77,7 +77,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,

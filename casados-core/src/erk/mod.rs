@@ -32,7 +32,11 @@ pub(crate) use scheme::{Grid, Scheme};
 pub(crate) use step::{Point, Record};
 // What computes a batch.
 #[cfg(feature = "alloc")]
-pub(crate) use {along::Nothing, engine::Engine, panels::Panels};
+pub(crate) use {
+    along::Nothing,
+    engine::{Engine, Verdict},
+    panels::Panels,
+};
 
 use crate::memory::Memory;
 use crate::model::Ode;

@@ -14,7 +14,7 @@ use crate::memory::{Memory, WithForward, WithHessian};
 #[cfg(feature = "alloc")]
 use crate::model::ArrayW;
 use crate::model::{MatrixXC, Ode, VectorU, VectorX};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape};
@@ -118,7 +118,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let grid = self.begin(x0, u, h)?;

@@ -1,5 +1,6 @@
 //! What integrators have in common: the calls of one interval.
 
+pub(crate) mod blocks;
 mod divided;
 mod with;
 
@@ -9,7 +10,7 @@ pub use with::With;
 use crate::error::Error;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Integrand};
+use crate::quadrature::{Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::statistics::Statistics;
@@ -73,7 +74,7 @@ pub trait Integrator {
         x0: &X<Self>,
         u: &U<Self>,
         h: Self::Number,
-        along: Along<'_, '_, Self::Model, Self::Number>,
+        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error>;
     /// As [`forward`](Self::forward), with an integrand or without.
     ///
@@ -84,7 +85,7 @@ pub trait Integrator {
         x0: &X<Self>,
         u: &U<Self>,
         h: Self::Number,
-        along: Along<'_, '_, Self::Model, Self::Number>,
+        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Forward<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithForward;
@@ -98,7 +99,7 @@ pub trait Integrator {
         u: &U<Self>,
         h: Self::Number,
         lambda: &X<Self>,
-        along: Along<'_, '_, Self::Model, Self::Number>,
+        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Adjoint<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithAdjoint<1>;
@@ -112,7 +113,7 @@ pub trait Integrator {
         u: &U<Self>,
         h: Self::Number,
         lambda: &X<Self>,
-        along: Along<'_, '_, Self::Model, Self::Number>,
+        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Hessian<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithHessian;

@@ -16,7 +16,7 @@ use crate::irk::jacobian_entries::entry;
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, kernels, slot};
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Aligned, Matrix, Plain, Shape};
@@ -129,7 +129,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
         kept: &mut Option<&Linearization<M, T, S, F>>,
         n: usize,
         step: &Step<M, T, S>,
-        along: &mut Along<'_, '_, M, T>,
+        along: &mut OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let Parts { work, coefficients, statistics, .. } = parts;
         if let Some(integrand) = along {

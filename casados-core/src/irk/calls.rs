@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::integrator;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, begin, finish};
+use crate::quadrature::{OptionalIntegrand, begin, finish};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -38,7 +38,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         begin(&mut along);
         self.run.steps(&Arguments { x0, u, h }, |parts, n, step, _| match &mut along {
@@ -55,7 +55,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
@@ -70,7 +70,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         W: WithAdjoint<1>,
@@ -84,7 +84,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,

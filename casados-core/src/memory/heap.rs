@@ -7,6 +7,7 @@ use super::{
 use crate::error::Error;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use bytemuck::Zeroable;
 use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
 use core::any::Any;
 use core::marker::PhantomData;
@@ -58,8 +59,23 @@ impl<V> Default for AllocatedTape<V> {
     }
 }
 
-fn allocate<V: Stored>() -> Result<Box<V>, Error> {
+/// A value whose bytes are zero.
+pub(crate) fn allocate<V: Zeroable>() -> Result<Box<V>, Error> {
     try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<V>() })
+}
+
+/// One more element of a list.
+pub(crate) fn push<V>(list: &mut Vec<V>, value: V) -> Result<(), Error> {
+    list.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of::<V>() })?;
+    list.push(value);
+    Ok(())
+}
+
+/// More elements of a list.
+pub(crate) fn extend<V: Copy>(list: &mut Vec<V>, values: &[V]) -> Result<(), Error> {
+    list.try_reserve(values.len()).map_err(|_| Error::OutOfMemory { bytes: size_of_val(values) })?;
+    list.extend_from_slice(values);
+    Ok(())
 }
 
 impl<V: Stored> Allocated<V> {

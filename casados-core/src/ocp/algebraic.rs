@@ -13,7 +13,7 @@
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
 use super::data::{Node, inputs, is_algebraic, kept, sizes, split};
-use super::dynamics::{Dynamics, Nodes, Step};
+use super::dynamics::{Dynamics, IntervalResult, Nodes};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 #[cfg(feature = "alloc")]
@@ -27,7 +27,7 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// Keeps what an interval says about the algebraic states at its start.
-pub(super) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &Step<'_, T>) {
+pub(super) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &IntervalResult<'_, T>) {
     let [n, nz] = sizes::<S>();
     if nz == 0 {
         return;
@@ -154,7 +154,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        let nodes = Nodes { along: self.along, ..nodes };
+        let nodes = Nodes { step_length: self.step_length, ..nodes };
         if !core::mem::take(&mut self.has_algebraic) {
             dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
         }

@@ -11,12 +11,8 @@ use super::{constraint::Constraints, cost::Cost};
 use crate::qp::{BoundsMut, QpError, QpField, Side, StageDims, check};
 use crate::scalar::Real;
 use crate::shape::Shape;
+use crate::structure::means;
 use core::ops::{Range, RangeBounds};
-
-/// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
-pub(crate) fn means(name: &str, variable: &str) -> bool {
-    variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
-}
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Bounds of a general constraint of a stage, as they were given.

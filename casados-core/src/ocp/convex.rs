@@ -2,10 +2,11 @@
 
 use super::cost::{At, Cost, Show};
 use super::error::OcpError;
-use super::point::{Cross, Terms, There, finite, is_algebraic, position};
+use super::least_squares::Square;
+use super::point::{Cross, Terms, There, finite, is_algebraic};
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
+use crate::shape::{Matrix, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
 use core::fmt;
 
@@ -291,16 +292,6 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
         }
         Ok(value)
     }
-
-    /// The entries of an output, each with its variable.
-    fn row(jacobian: &F::Jacobian<T>, output: usize) -> impl Iterator<Item = (usize, T)> + Clone {
-        let begin = |output: usize| F::STRUCTURE.begins.get(output).map_or(0, |&begin| begin as usize);
-        let places = F::STRUCTURE.by_row.get(begin(output)..begin(output + 1)).unwrap_or_default();
-        places.iter().filter_map(move |&entry| {
-            let (_, variable) = F::STRUCTURE.jacobian.get(entry as usize)?;
-            Some((variable, *jacobian.as_ref().get(entry as usize)?))
-        })
-    }
 }
 
 #[diagnostic::do_not_recommend]
@@ -344,32 +335,9 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         let value = self.evaluate(reference, at.stage)?;
         let Self { mu, phi, jacobian, hessian, .. } = self;
-        let rows = |output| {
-            let entries = Self::row(jacobian, output);
-            entries.filter_map(|(variable, value)| Some((position::<F::Shape>(variable)?, value)))
-        };
         // From a point `v` on the gradient is `Jᵀ (φ′ − φ″ J v)`.
-        let moved: ArrayY<F, T> = Array::from_fn(|l| {
-            rows(l).fold(T::ZERO, |sum, (i, a)| sum + a * at.from.get(i).copied().unwrap_or(T::ZERO))
-        });
-        for k in 0..F::Outputs::NY {
-            let mut slope = mu[k];
-            for (l, &moved) in moved.as_ref().iter().enumerate() {
-                let weight = phi[(k, l)];
-                if weight == T::ZERO {
-                    continue;
-                }
-                slope = slope - weight * moved;
-                for (i, a) in rows(k) {
-                    for (j, b) in rows(l).filter(|&(j, _)| i >= j) {
-                        terms.curve(i, j, at.factor * weight * a * b);
-                    }
-                }
-            }
-            for (i, a) in rows(k) {
-                terms.slope(i, at.factor * slope * a);
-            }
-        }
+        let y = &Zeroable::zeroed();
+        Square::<F, T> { weights: phi, y, jacobian, at, terms: &mut *terms }.coupled(mu);
         if at.exact {
             terms.curvature::<F>(v, mu, at.factor, hessian);
         }

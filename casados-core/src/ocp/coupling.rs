@@ -5,13 +5,13 @@
 //! x₀[i] = x_N[i]        u_k[j] = u₀[j]
 //! ```
 
-use super::bounds::means;
 use super::dynamics::Dynamics;
 use super::error::{OcpError, Text};
 use super::instance::Ocp;
 use super::problem::Formulation;
 use crate::qp::{StageDims, marked};
 use crate::scalar::Real;
+use crate::structure::means;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,

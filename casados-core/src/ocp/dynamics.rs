@@ -48,7 +48,7 @@ pub struct Nodes<'a, T> {
     /// The part of the last step after which they are, of a solver that knows
     /// [stages](Dynamics::LIFTED): these have their memory on the heap.
     #[cfg_attr(not(feature = "alloc"), allow(dead_code))]
-    pub(super) along: Option<T>,
+    pub(super) step_length: Option<T>,
 }
 
 impl<'a, T: Real> Nodes<'a, T> {
@@ -85,7 +85,7 @@ impl<'a, T: Real> Nodes<'a, T> {
 /// is empty.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
-pub struct Step<'a, T> {
+pub struct IntervalResult<'a, T> {
     /// The state at the end, `φ(x, u, p)`.
     pub x: &'a [T],
     /// The algebraic states at the start; empty if there are none.
@@ -109,7 +109,7 @@ pub struct Step<'a, T> {
     pub stages: [T; 2],
 }
 
-impl<T: Real> Default for Step<'_, T> {
+impl<T: Real> Default for IntervalResult<'_, T> {
     fn default() -> Self {
         Self {
             x: &[],
@@ -126,13 +126,13 @@ impl<T: Real> Default for Step<'_, T> {
     }
 }
 
-impl<'a, M: Dae, T: Real> From<&'a Nominal<M, T>> for Step<'a, T> {
+impl<'a, M: Dae, T: Real> From<&'a Nominal<M, T>> for IntervalResult<'a, T> {
     fn from(result: &'a Nominal<M, T>) -> Self {
         Self { x: result.x.as_slice(), z: result.z0.as_slice(), ..Self::default() }
     }
 }
 
-impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
+impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for IntervalResult<'a, T> {
     fn from(result: &'a Forward<M, T>) -> Self {
         Self {
             dx: result.dx_dx0.as_slice(),
@@ -144,7 +144,7 @@ impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
     }
 }
 
-impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for Step<'a, T> {
+impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for IntervalResult<'a, T> {
     fn from(result: &'a Hessian<M, T>) -> Self {
         let hessian = [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()];
         let hessian_p = [result.h_xp.as_slice(), result.h_up.as_slice(), result.h_pp.as_slice()];
@@ -190,18 +190,18 @@ pub enum StageAction<T> {
 
 /// What takes the results of the intervals, in order.
 #[doc(hidden)]
-pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
+pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &IntervalResult<'_, T>);
 
 /// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
 ///
 /// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or
 /// on the heap, and those that wrap them ([`Projected`](crate::Projected),
-/// [`Divided`](crate::Divided)); [`Along`](super::Along) is one with an integral cost,
-/// [`Map`](super::Map) a function that is `φ` itself, `Shooting` a batch that takes all intervals
-/// at once, and `ReturnMap` dynamics whose last interval ends with a map.
+/// [`Divided`](crate::Divided)); [`WithIntegral`](super::WithIntegral) is one with an integral
+/// cost, [`Map`](super::Map) a function that is `φ` itself, `Shooting` a batch that takes all
+/// intervals at once, and `ReturnMap` dynamics whose last interval ends with a map.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
-    note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `Along`, `ReturnMap` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
+    note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `WithIntegral`, `ReturnMap` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
 )]
 pub trait Dynamics<T: Real> {
     /// Dimensions.

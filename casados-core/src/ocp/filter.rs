@@ -34,7 +34,7 @@ impl Measure {
     /// Whether violation or objective are smaller by a margin: `γ_θ` and `γ_φ`, parts of the
     /// violation. Differences of the objective up to `noise` are none.
     pub fn is_better(&self, other: &Self, margin: f64, noise: f64) -> bool {
-        self.violation <= (1.0 - MARGIN) * other.violation
+        self.violation <= (1.0 - GAMMA_THETA) * other.violation
             || self.objective <= other.objective - margin * other.violation + noise
     }
 }
@@ -57,7 +57,7 @@ pub(super) const POWER_OBJECTIVE: f64 = 2.3;
 /// `s_θ`
 pub(super) const POWER_VIOLATION: f64 = 1.1;
 /// `γ_θ`
-pub(super) const MARGIN: f64 = 1e-5;
+pub(super) const GAMMA_THETA: f64 = 1e-5;
 /// Entries; the oldest one is forgotten when there are more.
 const ENTRIES: usize = 64;
 

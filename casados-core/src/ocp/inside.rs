@@ -1,7 +1,7 @@
 //! Integrators of single intervals inside of these.
 
 use super::begin::{Begin, at};
-use super::dynamics::{Interval, Nodes, Sink, Step, vector};
+use super::dynamics::{Interval, IntervalResult, Nodes, Sink, vector};
 use super::error::OcpError;
 use crate::error::Error;
 use crate::memory::Memory;
@@ -76,7 +76,9 @@ pub(super) fn each_inside<T: Real>(
 ) -> Result<bool, OcpError> {
     for (k, interval) in nodes.iter().enumerate() {
         at(k, integrator.begin(&interval))?;
-        let visit = &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+        let visit = &mut |j, x: &[T], z: &[T]| {
+            sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
+        };
         at(k, integrator.at_parts(&interval, parts, visit))?;
     }
     Ok(true)

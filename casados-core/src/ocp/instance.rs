@@ -81,7 +81,7 @@ pub struct Ocp<P, T, D, M> {
     /// the largest.
     pub(super) stages: [T; 2],
     /// See [`Nodes`].
-    pub(super) along: Option<T>,
+    pub(super) step_length: Option<T>,
     /// Whether algebraic states of the last evaluation are those of the iterate.
     pub(super) has_algebraic: bool,
 }
@@ -173,7 +173,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             data,
             objective: T::ZERO,
             stages: [T::ZERO; 2],
-            along: None,
+            step_length: None,
             has_algebraic: false,
         })
     }
@@ -365,5 +365,5 @@ pub(super) fn nodes<'a, S: Shape, T: Real>(
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
     let ld = [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)];
-    Nodes { v, multipliers, weights, p, times, dims, ld, along: None }
+    Nodes { v, multipliers, weights, p, times, dims, ld, step_length: None }
 }

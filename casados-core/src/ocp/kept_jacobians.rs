@@ -4,13 +4,13 @@
 //! QP with kept [A B], and the gradient  ∇f + ([A B]_exact − [A B]_kept)ᵀ π
 //! ```
 
-use super::begin::{Begin, at};
+use super::begin::{Begin, each};
 use super::convexify::Convexification;
 use super::curvature::{Curvature, GaussNewton};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntegralTerms, IntervalResult, Nodes, Sink, vector};
 use super::error::OcpError;
 use crate::memory::{WithAdjoint, WithForward};
-use crate::model::{Dae, Ode, VectorU, VectorX};
+use crate::model::{Dae, Ode};
 use crate::scalar::Real;
 use crate::shape::Matrix;
 use crate::{erk, irk};
@@ -30,9 +30,9 @@ pub trait Adjoints<T: Real>: Dynamics<T> {
 }
 
 /// What a sink is given: an end and the gradients of `πᵀφ`.
-pub(super) fn step<'a, T: Real>(x: &'a [T], [of_x, of_u]: [&'a [T]; 2]) -> Step<'a, T> {
+pub(super) fn step<'a, T: Real>(x: &'a [T], [of_x, of_u]: [&'a [T]; 2]) -> IntervalResult<'a, T> {
     let cost = IntegralTerms { x: of_x, u: of_u, ..IntegralTerms::default() };
-    Step { x, cost, ..Step::default() }
+    IntervalResult { x, cost, ..IntervalResult::default() }
 }
 
 macro_rules! adjoints {
@@ -41,15 +41,12 @@ macro_rules! adjoints {
             for $module::Integrator<M, B, S, T, W>
         {
             fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, self.begin(&interval))?;
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let lambda: VectorX<M, T> = vector(interval.multipliers);
-                    let result = at(k, self.adjoint(&x, &u, interval.h, &lambda))?;
+                each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
+                    integrator.begin(at)?;
+                    let result = integrator.adjoint(x, u, at.h, &vector(at.multipliers))?;
                     let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
-                    sink(k, &step(result.x.as_slice(), gradients));
-                }
-                Ok(())
+                    Ok(step(result.x.as_slice(), gradients))
+                })
             }
         }
     };

@@ -169,7 +169,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
         if *coupled == 0 {
             dispatch(square);
         } else {
-            square.coupled();
+            square.coupled(&Zeroable::zeroed());
         }
         if at.exact {
             terms.curvature::<F>(v, mu, at.factor, hessian);
@@ -197,13 +197,13 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
 
 /// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or
 /// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
-struct Square<'a, 'b, F: Function, T: Plain> {
-    weights: &'a MatrixYY<F, T>,
+pub(super) struct Square<'a, 'b, F: Function, T: Plain> {
+    pub weights: &'a MatrixYY<F, T>,
     /// `y − r`
-    y: &'a ArrayY<F, T>,
-    jacobian: &'a F::Jacobian<T>,
-    at: At<'a, T>,
-    terms: &'a mut Terms<'b, T>,
+    pub y: &'a ArrayY<F, T>,
+    pub jacobian: &'a F::Jacobian<T>,
+    pub at: At<'a, T>,
+    pub terms: &'a mut Terms<'b, T>,
 }
 
 impl<F: Function, T: Real> Square<'_, '_, F, T> {
@@ -267,11 +267,11 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
         }
     }
 
-    /// With weights between outputs.
-    fn coupled(&mut self) {
+    /// With weights between outputs, and `Jᵀ μ` too.
+    pub fn coupled(&mut self, mu: &ArrayY<F, T>) {
         let moved: ArrayY<F, T> = Array::from_fn(|output| self.moved(output));
         for k in 0..F::Outputs::NY {
-            let mut slope = T::ZERO;
+            let mut slope = self.at.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
             for (l, &moved) in moved.as_ref().iter().enumerate() {
                 let weight = self.weight(k, l);
                 if weight != T::ZERO {

@@ -7,7 +7,7 @@ use super::convexify::convexify;
 use super::cost::{At, Cost};
 use super::curvature::Curvature;
 use super::data::{Node, inputs, split};
-use super::dynamics::{Dynamics, Nodes, Sink, Step, add_stages};
+use super::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, read};
@@ -57,23 +57,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut to: impl FnMut(usize, &Step<'_, T>, Arrays<'_, T>, [&[T]; 2]),
+        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, [&[T]; 2]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
         let (intervals, nx, ld) = (self.intervals(), P::Shape::NX, ld_of::<P::Shape, T>());
-        let Self { problem, qp, iterate, data, along, .. } = self;
+        let Self { problem, qp, iterate, data, step_length, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
         let (v, multipliers) = iterate.vectors();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
-        let nodes = Nodes { along: *along, ..nodes };
+        let nodes = Nodes { step_length: *step_length, ..nodes };
         let mut stages = qp.stages_mut();
         let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
         let Problem { dynamics, .. } = problem.parts();
-        curvature.run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
+        curvature.run(dynamics, &nodes, &mut |k, step: &IntervalResult<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             objective = objective + step.cost.value;
@@ -248,8 +248,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (v, multipliers) = at.vectors();
         let mut objective = arrival::cost(data.arrival, at);
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        let (nodes, mut of_stages) = (Nodes { along: self.along, ..nodes }, [T::ZERO; 2]);
-        dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
+        let (nodes, mut of_stages) = (Nodes { step_length: self.step_length, ..nodes }, [T::ZERO; 2]);
+        dynamics.simulate(&nodes, &mut |k, step: &IntervalResult<'_, T>| {
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
                 of_stages = add_stages(of_stages, step.stages);

@@ -1,10 +1,6 @@
 //! What happened, as data.
 
-#[cfg(feature = "alloc")]
-use super::error::OcpError;
 use crate::qp::Residuals;
-#[cfg(feature = "alloc")]
-use alloc::vec::Vec;
 use core::fmt;
 
 /// Seconds that an iteration took; zero without the feature `std`.
@@ -90,16 +86,6 @@ pub struct Iteration {
     pub barrier: f64,
     /// How long it took.
     pub times: Times,
-}
-
-/// Room for more rows.
-///
-/// # Errors
-/// [`OcpError::OutOfMemory`]
-#[cfg(feature = "alloc")]
-pub(super) fn reserve(log: &mut Vec<Iteration>, more: usize) -> Result<(), OcpError> {
-    let bytes = more.saturating_mul(size_of::<Iteration>());
-    log.try_reserve(more).map_err(|_| OcpError::OutOfMemory { bytes })
 }
 
 /// A row of the table that [`Log`] prints, without the end of the line: for an observer that shows

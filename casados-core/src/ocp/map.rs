@@ -1,6 +1,6 @@
 //! A function as dynamics: discrete time.
 
-use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::names::Names;
 use super::pattern::Origin;
@@ -118,7 +118,7 @@ impl<F: Function, T: Real> Map<F, T> {
             }
             let (x, dx, du, dp) =
                 (self.x.as_slice(), self.dx.as_slice(), self.du.as_slice(), self.dp.as_slice());
-            sink(k, &Step { x, dx, du, dp, hessian, hessian_p, ..Step::default() });
+            sink(k, &IntervalResult { x, dx, du, dp, hessian, hessian_p, ..IntervalResult::default() });
         }
         Ok(())
     }
@@ -143,7 +143,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
             read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
             F::value::<T>(&self.v, &mut self.y);
             finite_outputs::<F, T>(&self.y, k)?;
-            sink(k, &Step { x: self.y.as_ref(), ..Step::default() });
+            sink(k, &IntervalResult { x: self.y.as_ref(), ..IntervalResult::default() });
         }
         Ok(())
     }

@@ -10,6 +10,8 @@ use super::instance::HeapOcp;
 use super::instance::Ocp;
 use super::problem::{Formulation, Problem};
 use crate::qp::{Qp, Solution, StageDims};
+#[cfg(feature = "alloc")]
+use crate::qp::{room, zeros};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -32,18 +34,13 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     {
         let intervals = horizon.intervals();
         let mut dims = Vec::new();
-        let bytes = intervals.saturating_mul(size_of::<StageDims>());
-        dims.try_reserve_exact(intervals.saturating_add(1)).map_err(|_| OcpError::OutOfMemory { bytes })?;
+        room(&mut dims, intervals.saturating_add(1))?;
         dims.resize(intervals, data::stage::<Self, T>(false));
         dims.push(data::stage::<Self, T>(true));
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
         let length = data::length::<Self, T>(intervals);
-        let mut memory = Vec::new();
-        let bytes = length.saturating_mul(size_of::<T>());
-        memory.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
-        memory.resize(length, T::ZERO);
-        Ocp::build(self, horizon, qp, iterate, memory)
+        Ocp::build(self, horizon, qp, iterate, zeros(length)?)
     }
 
     /// The dimensions of the stages, of which there is one more than there are intervals.

@@ -8,7 +8,7 @@
 //! | | |
 //! | --- | --- |
 //! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, `Collocation`, [`Map`] |
-//! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`ConvexCost`] `φ(y − r)`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
+//! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`ConvexCost`] `φ(y − r)`, [`GeneralCost`], pairs of costs; integrals with [`WithIntegral`] |
 //! | `g` | [`Constraint`], pairs of constraints |
 //!
 //! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not
@@ -137,8 +137,6 @@ mod watch;
 mod weights;
 mod wrapped;
 
-#[cfg(feature = "plot")]
-pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};
@@ -148,7 +146,7 @@ pub use cost::{Cost, GeneralCost};
 pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
 pub use dynamics::{Dynamics, SecondOrder};
 #[doc(hidden)]
-pub use dynamics::{IntegralTerms, Interval, Nodes, Sink, StageAction, Step};
+pub use dynamics::{IntegralTerms, Interval, IntervalResult, Nodes, Sink, StageAction};
 pub use error::{ConstraintName, OcpError, Part, Text};
 #[doc(hidden)]
 pub use fits::{ConstraintsOf, CostOf};
@@ -177,7 +175,7 @@ pub use return_map::ReturnMap;
 pub use sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
-pub use single::{Along, IntegralCost};
+pub use single::{IntegralCost, WithIntegral};
 #[cfg(feature = "alloc")]
 pub use sqp::HeapSqp;
 pub use sqp::{Globalisation, Sqp, SqpOptions};

@@ -1,7 +1,7 @@
 //! The end of a period, seen from the start of the next one.
 
 use super::cost::Show;
-use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step};
+use super::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink};
 use super::error::OcpError;
 use super::names::Names;
 use super::point::{finite_outputs, read};
@@ -159,7 +159,7 @@ struct End<G: Function, T: Plain> {
     second: Vec<T>,
     /// Those of all intervals, of the last one before the map: `g′ᵀπ`.
     multipliers: Vec<T>,
-    /// Derivatives of `x_N` by `x`, `u`, `p`, and second ones, as a [`Step`] has them.
+    /// Derivatives of `x_N` by `x`, `u`, `p`, and second ones, as a [`IntervalResult`] has them.
     slopes: [Vec<T>; 3],
     curvature: [Vec<T>; 6],
 }
@@ -185,7 +185,7 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// The map at the end of a step, with so many derivatives.
-    fn evaluate(&mut self, step: &Step<'_, T>, t: T, derivatives: usize, pi: &[T]) {
+    fn evaluate(&mut self, step: &IntervalResult<'_, T>, t: T, derivatives: usize, pi: &[T]) {
         read::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
         if derivatives == 0 {
             return G::value::<T>(&self.v, &mut self.x);
@@ -210,7 +210,7 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// `g′ φ′`
-    fn slopes(&mut self, step: &Step<'_, T>) {
+    fn slopes(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
         for (slopes, of_step) in self.slopes.iter_mut().zip([step.dx, step.du, step.dp]) {
             for (to, column) in slopes.chunks_exact_mut(nx).zip(of_step.chunks_exact(nx)) {
@@ -223,7 +223,7 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// Second derivatives of `φ` along `g′ᵀπ`, and `φ′ᵀ ∇²(πᵀg) φ′`.
-    fn curvature(&mut self, step: &Step<'_, T>) {
+    fn curvature(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
         let [dx, du, dp] = [step.dx, step.du, step.dp];
         let pairs = [(dx, dx), (dx, du), (du, du), (dx, dp), (du, dp), (dp, dp)];
@@ -255,10 +255,18 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// The step with the map at its end, and with as many derivatives.
-    fn mapped<'a>(&'a self, step: &Step<'a, T>, derivatives: usize) -> Step<'a, T> {
+    fn mapped<'a>(&'a self, step: &IntervalResult<'a, T>, derivatives: usize) -> IntervalResult<'a, T> {
         let all = |there: bool, numbers: &'a Vec<T>| if there { numbers.as_slice() } else { &[] };
         let [dx, du, dp] = self.slopes.each_ref().map(|slopes| all(derivatives > 0, slopes));
         let [xx, xu, uu, xp, up, pp] = self.curvature.each_ref().map(|block| all(derivatives > 1, block));
-        Step { x: self.x.as_ref(), dx, du, dp, hessian: [xx, xu, uu], hessian_p: [xp, up, pp], ..*step }
+        IntervalResult {
+            x: self.x.as_ref(),
+            dx,
+            du,
+            dp,
+            hessian: [xx, xu, uu],
+            hessian_p: [xp, up, pp],
+            ..*step
+        }
     }
 }

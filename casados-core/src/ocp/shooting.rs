@@ -1,19 +1,21 @@
 //! A batch as dynamics: all intervals in one call.
 
 use super::begin::at;
-use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::inside::Inside;
 use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
 use super::single::{names, origin};
-use crate::batch::{BatchError, Integrator, Intervals, Single};
+use crate::batch::{Answer, BatchError, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::qp::room;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
+use bytemuck::Zeroable;
 
 /// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
 ///
@@ -127,6 +129,28 @@ impl<I: Single> Shooting<I> {
         self.batch.keep_stages(same && self.batch.options().newton.fixed_iterations.is_none());
         Ok(())
     }
+
+    /// The results of all intervals, of which a few at a time are in memory; with the multipliers
+    /// of ends and algebraic states, if these are asked for.
+    fn each<R: Answer<I::Model, I::Number> + Zeroable>(
+        &mut self,
+        nodes: &Nodes<'_, I::Number>,
+        [of_ends, of_algebraic]: [bool; 2],
+        place: fn(&mut Self) -> &mut Vec<R>,
+        sink: &mut dyn FnMut(usize, &R),
+    ) -> Result<(), OcpError> {
+        self.take(nodes, of_ends)?;
+        let mut results = core::mem::take(place(self));
+        let Self { batch, x, u, p, h, t, lambda, nu, .. } = self;
+        let intervals = Intervals { x0: x, u, p, h, t0: t };
+        let lambda = of_ends.then_some(&lambda[..]);
+        let nu = (of_algebraic && !nu.is_empty()).then_some(&nu[..]);
+        let outcome = batch.each(&intervals, (lambda, nu), &mut results, sink);
+        *place(self) = results;
+        outcome.map_err(failed)?;
+        self.solved = true;
+        Ok(())
+    }
 }
 
 /// Writes an element, or adds it at the end; whether it was there already.
@@ -147,8 +171,7 @@ fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -
 /// An empty list with room for so many.
 fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
-    let bytes = length.saturating_mul(size_of::<V>());
-    list.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })
+    Ok(room(list, length)?)
 }
 
 fn failed(error: BatchError) -> OcpError {
@@ -175,13 +198,9 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
     }
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes, false)?;
-        let Self { batch, x, u, p, h, t, nominal, .. } = self;
-        let intervals = Intervals { x0: x, u, p, h, t0: t };
-        let outcome = batch.each(&intervals, (None, None), nominal, &mut |k, result| sink(k, &result.into()));
-        outcome.map_err(failed)?;
-        self.solved = true;
-        Ok(())
+        self.each(nodes, [false; 2], |own| &mut own.nominal, &mut |k, result: &Nominal<I::Model, T>| {
+            sink(k, &result.into())
+        })
     }
 
     fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
@@ -189,48 +208,34 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
         for (k, interval) in nodes.iter().enumerate() {
             at(k, self.batch.start(k, &mut single))?;
             at(k, single.begin(&interval))?;
-            let visit =
-                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+            let visit = &mut |j, x: &[T], z: &[T]| {
+                sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
+            };
             at(k, single.at_parts(&interval, parts, visit))?;
         }
         Ok(true)
     }
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes, false)?;
-        let Self { batch, x, u, p, h, t, forward, .. } = self;
-        let intervals = Intervals { x0: x, u, p, h, t0: t };
-        let outcome = batch.each(&intervals, (None, None), forward, &mut |k, result| sink(k, &result.into()));
-        outcome.map_err(failed)?;
-        self.solved = true;
-        Ok(())
+        self.each(nodes, [false; 2], |own| &mut own.forward, &mut |k, result: &Forward<I::Model, T>| {
+            sink(k, &result.into())
+        })
     }
 }
 
 impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
     fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes, true)?;
-        let Self { batch, x, u, p, h, t, lambda, adjoint, .. } = self;
-        let intervals = Intervals { x0: x, u, p, h, t0: t };
-        let outcome = batch.each(&intervals, (Some(lambda), None), adjoint, &mut |k, result| {
+        self.each(nodes, [true, false], |own| &mut own.adjoint, &mut |k, result: &Adjoint<I::Model, T>| {
             let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
             sink(k, &step(result.x.as_slice(), gradients));
-        });
-        outcome.map_err(failed)?;
-        self.solved = true;
-        Ok(())
+        })
     }
 }
 
 impl<I: Single<Number = T> + Inside<T>, T: Real> SecondOrder<T> for Shooting<I> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes, true)?;
-        let Self { batch, x, u, p, h, t, lambda, nu, hessian, .. } = self;
-        let weights = (Some(&lambda[..]), Some(&nu[..]).filter(|nu| !nu.is_empty()));
-        let intervals = Intervals { x0: x, u, p, h, t0: t };
-        let outcome = batch.each(&intervals, weights, hessian, &mut |k, result| sink(k, &result.into()));
-        outcome.map_err(failed)?;
-        self.solved = true;
-        Ok(())
+        self.each(nodes, [true; 2], |own| &mut own.hessian, &mut |k, result: &Hessian<I::Model, T>| {
+            sink(k, &result.into())
+        })
     }
 }

@@ -1,22 +1,21 @@
 //! Integrators of single intervals as dynamics: one interval after the other, without other memory
 //! than theirs.
 
-use super::begin::{Begin, at};
+use super::begin::{Begin, each};
 use super::cost::Show;
-use super::dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntegralTerms, IntervalResult, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 #[cfg(feature = "alloc")]
 use super::inside::each_inside;
 use super::names::Names;
 use super::pattern::Origin;
-use crate::error::Error;
 use crate::function::Function;
 use crate::integrator::Integrator as _;
-use crate::memory::{Memory, WithForward, WithHessian};
-use crate::model::{Dae, Ode, VectorU, VectorX};
+use crate::memory::{WithForward, WithHessian};
+use crate::model::{Dae, Ode};
 use crate::quadrature::{Integrand, LeastSquares, Quadrature};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Matrix;
 use crate::{erk, irk};
 use core::fmt;
 
@@ -38,7 +37,7 @@ pub(super) const fn origin<M: Dae>() -> Origin {
 /// References of integrals are parameters, which every stage has for itself.
 ///
 /// ```
-/// use casados::ocp::{Along, HeapSqp, Horizon, Problem};
+/// use casados::ocp::{HeapSqp, Horizon, Problem, WithIntegral};
 /// use casados::prelude::*;
 ///
 /// #[ode]
@@ -48,20 +47,20 @@ pub(super) const fn origin<M: Dae>() -> Origin {
 /// fn price(x: [f64; 2], u: f64) -> f64 { 0.5 * (x[1] * x[1] + u * u) }
 ///
 /// let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
-/// let mut ocp = Problem::new(Along::new(irk, Quadrature::<Price>::new())).on(Horizon::uniform(10, 0.1))?;
+/// let mut ocp = Problem::new(WithIntegral::new(irk, Quadrature::<Price>::new())).on(Horizon::uniform(10, 0.1))?;
 /// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
 /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Along<I, Q> {
+pub struct WithIntegral<I, Q> {
     /// The integrator.
     pub integrator: I,
     /// The integral.
     pub integral: Q,
 }
 
-impl<I, Q> Along<I, Q> {
+impl<I, Q> WithIntegral<I, Q> {
     /// Both together.
     pub fn new(integrator: I, integral: Q) -> Self {
         Self { integrator, integral }
@@ -134,18 +133,6 @@ impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T:
 
 macro_rules! single {
     ($module:ident, $model:ident $(, $nu:ident)?) => {
-        /// Parameters and time of an interval.
-        impl<M: $model, B, const S: usize, T: Real, W: Memory> Begin<T>
-            for $module::Integrator<M, B, S, T, W>
-        {
-            fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error> {
-                if <M::Shape as Shape>::NP > 0 {
-                    self.set_parameters(&vector(interval.p))?;
-                }
-                self.set_time(interval.t)
-            }
-        }
-
         impl<M: $model, B, const S: usize, T: Real, W: WithForward> Dynamics<T>
             for $module::Integrator<M, B, S, T, W>
         {
@@ -155,22 +142,16 @@ macro_rules! single {
             const ORIGIN: Origin = origin::<M>();
 
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, self.begin(&interval))?;
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let result = at(k, self.solve(&x, &u, interval.h))?;
-                    sink(k, &result.into());
-                }
-                Ok(())
+                each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
+                    integrator.begin(at)?;
+                    Ok(integrator.solve(x, u, at.h)?.into())
+                })
             }
             fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, self.begin(&interval))?;
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let result = at(k, self.forward(&x, &u, interval.h))?;
-                    sink(k, &result.into());
-                }
-                Ok(())
+                each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
+                    integrator.begin(at)?;
+                    Ok(integrator.forward(x, u, at.h)?.into())
+                })
             }
             #[cfg(feature = "alloc")]
             fn inside(
@@ -187,20 +168,16 @@ macro_rules! single {
             for $module::Integrator<M, B, S, T, W>
         {
             fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, self.begin(&interval))?;
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let lambda: VectorX<M, T> = vector(interval.multipliers);
-                    let result = self.hessian_along(&x, &u, interval.h, &lambda, $(interval.$nu,)? None);
-                    let result = at(k, result)?;
-                    sink(k, &result.into());
-                }
-                Ok(())
+                each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
+                    integrator.begin(at)?;
+                    let lambda = vector(at.multipliers);
+                    Ok(integrator.hessian_along(x, u, at.h, &lambda, $(at.$nu,)? None)?.into())
+                })
             }
         }
 
         impl<M: $model, B, const S: usize, T: Real, W: WithForward, Q: IntegralCost<M, T>> Dynamics<T>
-            for Along<$module::Integrator<M, B, S, T, W>, Q>
+            for WithIntegral<$module::Integrator<M, B, S, T, W>, Q>
         {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
@@ -213,27 +190,21 @@ macro_rules! single {
                 self.integral.term(show)
             }
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                let Self { integrator, integral } = self;
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, integrator.begin(&interval))?;
+                each::<M, T, _>(self, nodes, sink, |Self { integrator, integral }, at, x, u| {
+                    integrator.begin(at)?;
                     integral.prepare();
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let result = at(k, integrator.with(integral).solve(&x, &u, interval.h))?;
+                    let result = integrator.with(integral).solve(x, u, at.h)?;
                     let cost = IntegralTerms { value: integral.terms().value, ..IntegralTerms::default() };
-                    sink(k, &Step { cost, ..result.into() });
-                }
-                Ok(())
+                    Ok(IntervalResult { cost, ..result.into() })
+                })
             }
             fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                let Self { integrator, integral } = self;
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, integrator.begin(&interval))?;
+                each::<M, T, _>(self, nodes, sink, |Self { integrator, integral }, at, x, u| {
+                    integrator.begin(at)?;
                     integral.prepare();
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let result = at(k, integrator.with(integral).forward(&x, &u, interval.h))?;
-                    sink(k, &Step { cost: integral.terms(), ..result.into() });
-                }
-                Ok(())
+                    let result = integrator.with(integral).forward(x, u, at.h)?;
+                    Ok(IntervalResult { cost: integral.terms(), ..result.into() })
+                })
             }
             #[cfg(feature = "alloc")]
             fn inside(
@@ -247,23 +218,19 @@ macro_rules! single {
         }
 
         impl<M: $model, B, const S: usize, T: Real, W: WithHessian, Q: IntegralCost<M, T>> SecondOrder<T>
-            for Along<$module::Integrator<M, B, S, T, W>, Q>
+            for WithIntegral<$module::Integrator<M, B, S, T, W>, Q>
         {
             fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-                let Self { integrator, integral } = self;
-                for (k, interval) in nodes.iter().enumerate() {
-                    at(k, integrator.begin(&interval))?;
+                each::<M, T, _>(self, nodes, sink, |Self { integrator, integral }, at, x, u| {
+                    integrator.begin(at)?;
                     integral.prepare();
-                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let lambda: VectorX<M, T> = vector(interval.multipliers);
+                    let lambda = vector(at.multipliers);
                     let along: Option<&mut dyn Integrand<M, T>> = Some(&mut *integral);
-                    let result = integrator.hessian_along(&x, &u, interval.h, &lambda, $(interval.$nu,)? along);
-                    let result = at(k, result)?;
+                    let result = integrator.hessian_along(x, u, at.h, &lambda, $(at.$nu,)? along)?;
                     // The Hessian is that of both together: what the integral would add is in it.
                     let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 3], ..integral.terms() };
-                    sink(k, &Step { cost, ..result.into() });
-                }
-                Ok(())
+                    Ok(IntervalResult { cost, ..result.into() })
+                })
             }
         }
     };

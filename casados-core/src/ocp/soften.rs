@@ -1,6 +1,5 @@
 //! Soft bounds of variables and constraints, by name, stage and side.
 
-use super::bounds::means;
 use super::check::{Labels, first, range};
 use super::constraint::Constraints;
 use super::data::split;
@@ -11,6 +10,7 @@ use super::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{Side, StageDims};
 use crate::scalar::Real;
+use crate::structure::means;
 use core::ops::RangeBounds;
 
 const BOTH: &[Side] = &[Side::Lower, Side::Upper];

@@ -2,7 +2,7 @@
 
 use super::curvature::Curvature;
 use super::data::inputs;
-use super::dynamics::{IntegralTerms, Step};
+use super::dynamics::{IntegralTerms, IntervalResult};
 use super::point::{Terms, add_blocks};
 use super::problem::Formulation;
 use crate::qp::{Arrays, part, part_mut, splat};
@@ -113,7 +113,7 @@ impl Left {
     /// Writes an interval to its stage.
     pub fn transfer<P: Formulation<T>, C: Curvature<P::Dynamics, T>, T: Real>(
         &mut self,
-        step: &Step<'_, T>,
+        step: &IntervalResult<'_, T>,
         Arrays { ld, matrix, hessian, gradient, offset, .. }: Arrays<'_, T>,
         [point, multipliers]: [&[T]; 2],
     ) {

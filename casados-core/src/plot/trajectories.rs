@@ -3,8 +3,9 @@
 use super::curve::Curve;
 use super::panel::Panel;
 use super::svg::Colour;
-use crate::ocp::{Kind, Trajectory, TrajectoryError, means};
+use crate::ocp::{Kind, Trajectory, TrajectoryError};
 use crate::scalar::Real;
+use crate::structure::means;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;

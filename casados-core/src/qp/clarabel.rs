@@ -21,7 +21,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 ///
 /// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
 /// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,
-/// says what it needs ([`QpSolver::refine`]): then a part of that is asked for, and what satisfies
+/// says what it needs ([`QpSolver::require`]): then a part of that is asked for, and what satisfies
 /// the settings is accepted.
 ///
 /// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
@@ -235,15 +235,16 @@ fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
 }
 
 impl QpSolver<f64> for Clarabel {
-    fn refine(&mut self, tolerance: f64) {
+    fn require(&mut self, tolerance: f64) {
         self.needed = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
     }
 
-    fn solve(
+    fn solve_until(
         &mut self,
         qp: QpView<'_, f64>,
         _: QpStart,
         solution: SolutionView<'_, f64>,
+        _: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError> {
         check(qp)?;
         solution.fits(qp)?;

@@ -47,7 +47,7 @@ pub(crate) const fn pad<T>(n: usize) -> usize {
 
 /// One stage, its dimensions, and where its parts begin in the arrays of the horizon.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Place {
+pub(crate) struct StageOffsets {
     /// The stage.
     pub stage: usize,
     /// States.
@@ -81,7 +81,7 @@ pub(crate) struct Place {
     pub factor: usize,
 }
 
-impl Place {
+impl StageOffsets {
     const fn new<T>(stage: usize, dims: StageDims, next: usize) -> Self {
         let n = dims.nx + dims.nu;
         let ld = pad::<T>(n);
@@ -142,24 +142,15 @@ impl Place {
     }
     /// The place behind this one, of a stage that is empty: its begins are lengths.
     const fn end(&self) -> Self {
-        Self {
-            stage: 0,
-            nx: 0,
-            nu: 0,
-            ng: 0,
-            next: 0,
-            n: 0,
-            ld: 0,
-            ld_next: 0,
-            rows: 0,
-            pivots: 0,
-            data: 0,
-            v: 0,
-            dynamics: 0,
-            row: 0,
-            factor: 0,
-        }
-        .after(self)
+        Self::new::<u8>(0, StageDims::new(0, 0, 0), 0).after(self)
+    }
+}
+
+/// How many states there are at the start.
+pub(crate) const fn first_nx(dims: &[StageDims]) -> usize {
+    match dims.first() {
+        Some(first) => first.nx,
+        None => 0,
     }
 }
 
@@ -172,33 +163,33 @@ pub(crate) struct Places<'a, T> {
     /// States behind the last stage that is left.
     next: usize,
     number: PhantomData<T>,
-    front: Place,
+    front: StageOffsets,
     /// Only where somebody goes backwards.
-    back: Option<Place>,
+    back: Option<StageOffsets>,
 }
 
 impl<'a, T> Places<'a, T> {
     /// Those of stages with numbers of type `T`.
     pub fn new(dims: &'a [StageDims]) -> Self {
-        Self { dims, taken: 0, next: 0, number: PhantomData, front: Place::default(), back: None }
+        Self { dims, taken: 0, next: 0, number: PhantomData, front: StageOffsets::default(), back: None }
     }
     /// The same, for whoever knows [`end`] and goes backwards.
-    pub fn ending(dims: &'a [StageDims], end: Place) -> Self {
+    pub fn ending(dims: &'a [StageDims], end: StageOffsets) -> Self {
         Self { back: Some(end), ..Self::new(dims) }
     }
 }
 
 impl<T> Iterator for Places<'_, T> {
-    type Item = Place;
+    type Item = StageOffsets;
 
     // What nobody asks of a place is not computed where the optimiser sees who asks; in firmware
     // memory is dearer.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline)]
-    fn next(&mut self) -> Option<Place> {
+    fn next(&mut self) -> Option<StageOffsets> {
         let (&first, rest) = self.dims.split_first()?;
         let next = rest.first().map_or(self.next, |dims| dims.nx);
-        let place = Place::new::<T>(self.taken, first, next).after(&self.front);
+        let place = StageOffsets::new::<T>(self.taken, first, next).after(&self.front);
         (self.dims, self.front, self.taken) = (rest, place, self.taken + 1);
         Some(place)
     }
@@ -210,13 +201,13 @@ impl<T> Iterator for Places<'_, T> {
 impl<T> DoubleEndedIterator for Places<'_, T> {
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline)]
-    fn next_back(&mut self) -> Option<Place> {
+    fn next_back(&mut self) -> Option<StageOffsets> {
         let (&last, rest) = self.dims.split_last()?;
         let back = match self.back {
             Some(back) => back,
             None => behind::<T>(self.front, self.taken, self.dims),
         };
-        let place = Place::new::<T>(self.taken + rest.len(), last, self.next).before(&back);
+        let place = StageOffsets::new::<T>(self.taken + rest.len(), last, self.next).before(&back);
         (self.dims, self.back, self.next) = (rest, Some(place), last.nx);
         Some(place)
     }
@@ -226,8 +217,8 @@ impl<T> ExactSizeIterator for Places<'_, T> {}
 impl<T> FusedIterator for Places<'_, T> {}
 
 /// The place behind the last stage: its begins are the lengths of the arrays of the horizon.
-pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
-    behind::<T>(Place::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
+pub(crate) const fn end<T>(dims: &[StageDims]) -> StageOffsets {
+    behind::<T>(StageOffsets::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
 }
 
 /// Whether lengths of such a horizon are more than there is memory, and may be more than a `usize`
@@ -252,14 +243,14 @@ pub(crate) const fn is_absurd(dims: &[StageDims]) -> bool {
 }
 
 /// The place behind stages that follow a place, from that one on whose number is given.
-const fn behind<T>(mut place: Place, mut stage: usize, dims: &[StageDims]) -> Place {
+const fn behind<T>(mut place: StageOffsets, mut stage: usize, dims: &[StageDims]) -> StageOffsets {
     let mut rest = dims;
     while let Some((&first, after)) = rest.split_first() {
         let next = match after.first() {
             Some(dims) => dims.nx,
             None => 0,
         };
-        place = Place::new::<T>(stage, first, next).after(&place);
+        place = StageOffsets::new::<T>(stage, first, next).after(&place);
         stage += 1;
         rest = after;
     }
@@ -312,7 +303,7 @@ mod tests {
     #[test]
     fn backwards_is_forwards_reversed() {
         let dims = [(3, 2, 0), (9, 1, 4), (2, 12, 1), (5, 0, 2)].map(|(x, u, g)| StageDims::new(x, u, g));
-        let parts = |p: Place| [p.stage, p.n, p.next, p.data, p.v, p.dynamics, p.row, p.factor];
+        let parts = |p: StageOffsets| [p.stage, p.n, p.next, p.data, p.v, p.dynamics, p.row, p.factor];
         let forwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).map(parts).collect();
         let mut backwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).rev().map(parts).collect();
         backwards.reverse();

@@ -13,16 +13,20 @@ pub fn zeros<T: Copy + Default>(length: usize) -> Result<Vec<T>, QpError> {
 /// A copy.
 pub fn copy<T: Copy>(slice: &[T]) -> Result<Vec<T>, QpError> {
     let mut memory = Vec::new();
-    memory.try_reserve_exact(slice.len()).map_err(|_| QpError::OutOfMemory { bytes: size_of_val(slice) })?;
+    room(&mut memory, slice.len())?;
     memory.extend_from_slice(slice);
     Ok(memory)
+}
+
+/// Room for more elements.
+pub fn room<T>(list: &mut Vec<T>, more: usize) -> Result<(), QpError> {
+    list.try_reserve(more).map_err(|_| QpError::OutOfMemory { bytes: more.saturating_mul(size_of::<T>()) })
 }
 
 /// At least as many elements; what is new is a default.
 pub fn reserve<T: Copy + Default>(memory: &mut Vec<T>, length: usize) -> Result<(), QpError> {
     if memory.len() < length {
-        let bytes = length.saturating_mul(size_of::<T>());
-        memory.try_reserve_exact(length - memory.len()).map_err(|_| QpError::OutOfMemory { bytes })?;
+        room(memory, length - memory.len())?;
         memory.resize(length, T::default());
     }
     Ok(())

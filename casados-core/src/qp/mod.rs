@@ -104,6 +104,8 @@ pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
 pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
+#[cfg(feature = "alloc")]
+pub(crate) use memory::{room, zeros};
 pub(crate) use residuals::bounds as bound_residuals;
 pub(crate) use stage::Arrays;
 pub(crate) use statistics::larger;

@@ -1,7 +1,9 @@
 //! Solutions: variables and multipliers.
 
 use super::error::{QpError, QpField};
-use super::layout::{Place, Places, StageDims, end, is_absurd, move_forward, part, part_mut, take_mut};
+use super::layout::{
+    Places, StageDims, StageOffsets, end, is_absurd, move_forward, part, part_mut, take_mut,
+};
 use super::problem::QpView;
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -236,7 +238,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             return Err(QpError::Dimension { field: QpField::Solution, stage: 0, expected, found });
         }
         memory.as_mut().fill(T::ZERO);
-        let Place { v, dynamics, row, .. } = end::<T>(dims.as_ref());
+        let StageOffsets { v, dynamics, row, .. } = end::<T>(dims.as_ref());
         Ok(Self { dims, memory, lengths: [v, dynamics, row], number: PhantomData })
     }
     /// The dimensions of the stages.
@@ -321,7 +323,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
 }
 
 impl<'a, T> SolutionView<'a, T> {
-    fn into_stage(self, p: Place) -> SolutionStageMut<'a, T> {
+    fn into_stage(self, p: StageOffsets) -> SolutionStageMut<'a, T> {
         let mut v = part_mut(self.v, p.v, p.n);
         let mut lower = part_mut(self.lower, p.row, p.rows);
         let mut upper = part_mut(self.upper, p.row, p.rows);

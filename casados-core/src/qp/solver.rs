@@ -77,7 +77,9 @@ pub trait QpSolver<T> {
         qp: QpView<'_, T>,
         start: QpStart,
         solution: SolutionView<'_, T>,
-    ) -> Result<QpStatistics, QpError>;
+    ) -> Result<QpStatistics, QpError> {
+        self.solve_until(qp, start, solution, &mut || false)
+    }
 
     /// As [`QpSolver::solve`], until the time is over: `over`, a clock or a counter of cycles, is
     /// asked before each iteration of an interior point. A solver that cannot make use of it takes
@@ -114,21 +116,18 @@ pub trait QpSolver<T> {
         start: QpStart,
         solution: SolutionView<'_, T>,
         over: &mut dyn FnMut() -> bool,
-    ) -> Result<QpStatistics, QpError> {
-        let _ = over;
-        self.solve(qp, start, solution)
-    }
+    ) -> Result<QpStatistics, QpError>;
 
-    /// Asks for residuals below a tolerance for now, but not for less than its options say. A
+    /// Permits residuals up to a tolerance for now, or what its options say if that is more. A
     /// solver that cannot make use of it solves as well as always.
-    fn relax(&mut self, tolerance: f64) {
+    fn permit(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 
-    /// Asks for solutions that are good enough for residuals below a tolerance in the problem whose
+    /// Requires solutions that are good enough for residuals below a tolerance in the problem whose
     /// steps they are, which may be less than options say. A solver whose solutions are always
     /// good enough, or as good as they get, does nothing.
-    fn refine(&mut self, tolerance: f64) {
+    fn require(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
 }

@@ -3,7 +3,7 @@
 use super::block::{Block, BlockMut, Shape};
 use super::bounds::{Bounds, BoundsMut};
 use super::error::QpField;
-use super::layout::{Place, StageDims, part, part_mut, take_mut};
+use super::layout::{StageDims, StageOffsets, part, part_mut, take_mut};
 use crate::scalar::Real;
 
 /// The data of one stage.
@@ -30,7 +30,7 @@ use crate::scalar::Real;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Stage<'a, T> {
-    pub(super) place: Place,
+    pub(super) place: StageOffsets,
     pub(super) data: &'a [T],
 }
 
@@ -58,7 +58,7 @@ pub struct Stage<'a, T> {
 /// ```
 #[derive(Debug)]
 pub struct StageMut<'a, T> {
-    pub(super) place: Place,
+    pub(super) place: StageOffsets,
     pub(super) data: &'a mut [T],
 }
 
@@ -73,7 +73,7 @@ pub(super) enum Row {
     UpperQuadratic,
 }
 
-impl Place {
+impl StageOffsets {
     /// Begin of the gradient in the data of the stage.
     pub(super) const fn gradient(&self) -> usize {
         self.matrix() + self.hessian()

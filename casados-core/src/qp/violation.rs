@@ -1,7 +1,7 @@
 //! What a point violates.
 
 use super::error::{QpError, QpField, Side};
-use super::layout::{Place, Places, part};
+use super::layout::{Places, StageOffsets, part};
 use super::problem::QpView;
 use super::stage::Row;
 use crate::scalar::Real;
@@ -30,7 +30,7 @@ pub(crate) fn worst<T: Real>(
     qp: QpView<'_, T>,
     v: &[T],
     units: &[T],
-    mut penalties: impl FnMut(&Place, usize) -> [T; 2],
+    mut penalties: impl FnMut(&StageOffsets, usize) -> [T; 2],
 ) -> (Option<Violation>, f64) {
     let (mut worst, mut most, mut sum): (Option<Violation>, f64, f64) = (None, 0.0, 0.0);
     for place in Places::<T>::new(qp.dims) {
@@ -65,7 +65,7 @@ pub(crate) fn worst<T: Real>(
 }
 
 /// The linear penalties of a row.
-pub(crate) fn linear_penalties<T: Real>(qp: QpView<'_, T>, place: &Place, row: usize) -> [T; 2] {
+pub(crate) fn linear_penalties<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, row: usize) -> [T; 2] {
     let data = part(qp.data, place.data, place.data_len());
     [Row::LowerLinear, Row::UpperLinear]
         .map(|of| data.get(place.row_data(of) + row).copied().unwrap_or(T::ZERO))

@@ -82,7 +82,7 @@ impl<F: Function, T: Plain> Quadrature<F, T> {
     /// [`Error::OutOfMemory`]
     #[cfg(feature = "alloc")]
     pub fn boxed() -> Result<alloc::boxed::Box<Self>, Error> {
-        bytemuck::allocation::try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<Self>() })
+        crate::memory::allocate()
     }
 }
 
@@ -134,10 +134,6 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
 
     fn gradients(&self) -> &[ArrayW<F, T>] {
         self.dq.as_ref()
-    }
-
-    fn matrix(&self) -> Option<&[ArrayW<F, T>]> {
-        None
     }
 
     fn next(&mut self) {

@@ -100,9 +100,7 @@ impl<F: Function, T: Real> LeastSquares<F, T> {
     /// [`Error::OutOfMemory`]
     #[cfg(feature = "alloc")]
     pub fn boxed(weights: &MatrixYY<F, T>) -> Result<alloc::boxed::Box<Self>, Error> {
-        let zeroed = bytemuck::allocation::try_zeroed_box();
-        let mut boxed: alloc::boxed::Box<Self> =
-            zeroed.map_err(|()| Error::OutOfMemory { bytes: size_of::<Self>() })?;
+        let mut boxed: alloc::boxed::Box<Self> = crate::memory::allocate()?;
         boxed.weights = *weights;
         Ok(boxed)
     }

@@ -43,7 +43,8 @@ pub(crate) mod sealed {
 
 /// What an integrator can take along: [`Quadrature`] and [`LeastSquares`].
 ///
-/// Its methods are for integrators.
+/// Its methods are for integrators. Those with a body are called on what a user has given alone,
+/// not on what stands for it in one step of many.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an integrand for the model `{M}` with numbers `{T}`",
     note = "`Quadrature<F, T>` and `LeastSquares<F, T>` are, of a `#[function]` `F` whose arguments have the dimensions of those \
@@ -52,7 +53,7 @@ pub(crate) mod sealed {
 pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// Forgets the last interval.
     #[doc(hidden)]
-    fn begin(&mut self);
+    fn begin(&mut self) {}
     /// The variables that it depends on.
     #[doc(hidden)]
     fn variables(&self) -> &'static [u32];
@@ -81,52 +82,68 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error>;
     /// The lower triangle of the sum of `Dᵀ ∇² D`, if there is one.
     #[doc(hidden)]
-    fn second(&self) -> Option<&[ArrayW<M, T>]>;
+    fn second(&self) -> Option<&[ArrayW<M, T>]> {
+        None
+    }
     /// The gradients that were added up, a row for each output.
     #[doc(hidden)]
-    fn gradients(&self) -> &[ArrayW<M, T>];
+    fn gradients(&self) -> &[ArrayW<M, T>] {
+        &[]
+    }
     /// The lower triangle of the matrix of Gauss and Newton that was added up, if there is one.
     #[doc(hidden)]
-    fn matrix(&self) -> Option<&[ArrayW<M, T>]>;
+    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
+        None
+    }
     /// Forgets derivatives, but no values.
     #[doc(hidden)]
-    fn next(&mut self);
+    fn next(&mut self) {}
     /// What is integrated at the point, times multipliers.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn density(&mut self, at: Place) -> Result<T, Error>;
+    fn density(&mut self, at: Place) -> Result<T, Error> {
+        let _ = at;
+        Ok(T::ZERO)
+    }
     /// The interval ends `dt = weight · time` later: adds what is integrated at the point times
     /// `dt` to the gradients.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error>;
+    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
+        let _ = (weight, time, at);
+        Ok(())
+    }
     /// Writes the results.
     ///
     /// # Errors
     /// [`Error::Overflow`]
     #[doc(hidden)]
-    fn finish(&mut self) -> Result<(), Error>;
+    fn finish(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
 }
 
 /// An integrand, or none.
-pub(crate) type Along<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
+pub(crate) type OptionalIntegrand<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
-pub(crate) fn begin<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) {
+pub(crate) fn begin<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) {
     if let Some(integrand) = along {
         integrand.begin();
     }
 }
 
-pub(crate) fn finish<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) -> Result<(), Error> {
+pub(crate) fn finish<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) -> Result<(), Error> {
     along.as_mut().map_or(Ok(()), |integrand| integrand.finish())
 }
 
 /// The same integrand for a while.
-pub(crate) fn reborrow<'a, M: Dae, T: Real>(along: &'a mut Along<'_, '_, M, T>) -> Along<'a, 'a, M, T> {
+pub(crate) fn reborrow<'a, M: Dae, T: Real>(
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match along {
         Some(integrand) => Some(&mut **integrand),
         None => None,

@@ -19,8 +19,6 @@ pub(crate) struct Chained<'a, M: Dae, T: Real> {
 impl<M: Dae, T: Real> sealed::Sealed for Chained<'_, M, T> {}
 
 impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
-    fn begin(&mut self) {}
-
     fn variables(&self) -> &'static [u32] {
         self.inner.variables()
     }
@@ -54,32 +52,6 @@ impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
     fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
         self.inner.adjoint(weight, at)
     }
-
-    fn second(&self) -> Option<&[ArrayW<M, T>]> {
-        None
-    }
-
-    fn gradients(&self) -> &[ArrayW<M, T>] {
-        self.inner.gradients()
-    }
-
-    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
-        self.inner.matrix()
-    }
-
-    fn next(&mut self) {}
-
-    fn density(&mut self, at: Place) -> Result<T, Error> {
-        self.inner.density(at)
-    }
-
-    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
-        self.inner.prolong(weight, time, at)
-    }
-
-    fn finish(&mut self) -> Result<(), Error> {
-        Ok(())
-    }
 }
 
 /// Takes part in adjoints alone: all else was done on the way forth.
@@ -88,8 +60,6 @@ pub(crate) struct Backwards<'a, M: Dae, T: Real>(pub &'a mut dyn Integrand<M, T>
 impl<M: Dae, T: Real> sealed::Sealed for Backwards<'_, M, T> {}
 
 impl<M: Dae, T: Real> Integrand<M, T> for Backwards<'_, M, T> {
-    fn begin(&mut self) {}
-
     fn variables(&self) -> &'static [u32] {
         &[]
     }
@@ -108,31 +78,5 @@ impl<M: Dae, T: Real> Integrand<M, T> for Backwards<'_, M, T> {
 
     fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
         self.0.adjoint(weight, at)
-    }
-
-    fn second(&self) -> Option<&[ArrayW<M, T>]> {
-        None
-    }
-
-    fn gradients(&self) -> &[ArrayW<M, T>] {
-        self.0.gradients()
-    }
-
-    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
-        self.0.matrix()
-    }
-
-    fn next(&mut self) {}
-
-    fn density(&mut self, at: Place) -> Result<T, Error> {
-        self.0.density(at)
-    }
-
-    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
-        self.0.prolong(weight, time, at)
-    }
-
-    fn finish(&mut self) -> Result<(), Error> {
-        Ok(())
     }
 }

@@ -13,6 +13,11 @@ pub use curvature::{Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row,
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 pub use reduction::Reduction;
 
+/// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
+pub(crate) fn means(name: &str, variable: &str) -> bool {
+    variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
+}
+
 /// What is known about a model before it runs.
 ///
 /// ```

@@ -1,6 +1,6 @@
 //! Derivatives of every operation.
 
-use super::{Binary, Graph, Node, Op, Unary};
+use super::{Binary, Graph, Node, Op, Unary, tangent};
 use std::f64::consts::{LN_2, LOG2_E, LOG10_E};
 
 /// Operands and what belongs to each; an operand occurs once.
@@ -301,7 +301,9 @@ impl Graph {
                 else {
                     continue;
                 };
-                let second = scratch.tangent(partial, places[k]);
+                let one = scratch.constant(1.0);
+                let rate = |index| (index as usize == k).then_some(one);
+                let second = tangent(&mut scratch, &[partial], rate)[0];
                 if scratch.is_zero(second) {
                     continue;
                 }
@@ -319,43 +321,13 @@ impl Graph {
         arcs
     }
 
-    /// The derivative of a small expression with respect to a variable.
-    fn tangent(&mut self, of: Node, variable: Node) -> Node {
-        let zero = self.constant(0.0);
-        let one = self.constant(1.0);
-        let mut tangents = vec![zero; of.at() + 1];
-        for node in self.reachable(&[of]) {
-            if node == variable {
-                tangents[node.at()] = one;
-                continue;
-            }
-            let parts = self.partials(node, |operand| tangents[operand.at()] != zero);
-            for (operand, partial) in parts.into_iter().flatten() {
-                let product = self.times(partial, tangents[operand.at()]);
-                tangents[node.at()] = self.plus(tangents[node.at()], product);
-            }
-        }
-        tangents[of.at()]
-    }
-
     /// An expression of another graph, with other nodes for its variables.
     fn graft(&mut self, from: &Graph, node: Node, variables: &[Node]) -> Node {
         let mut image = vec![node; node.at() + 1];
         for node in from.reachable(&[node]) {
-            let at = |node: Node| image[node.at()];
             image[node.at()] = match from.op(node) {
-                Op::Constant(bits) => self.constant(f64::from_bits(bits)),
                 Op::Variable(index) => variables[index as usize],
-                Op::Opaque(index) => self.opaque(index),
-                Op::Seed(index) => self.seed(index),
-                Op::Unary(function, a) => self.unary(function, at(a)),
-                Op::Binary(function, a, b) => self.binary(function, at(a), at(b)),
-                Op::Powi(a, n) => self.powi(at(a), n),
-                Op::Select(condition, a, b) => self.select(at(condition), at(a), at(b)),
-                Op::Compare(comparison, a, b) => self.compare(comparison, at(a), at(b)),
-                Op::And(a, b) => self.and(at(a), at(b)),
-                Op::Or(a, b) => self.or(at(a), at(b)),
-                Op::Not(a) => self.not(at(a)),
+                op => self.rebuild(op, |operand| image[operand.at()]),
             };
         }
         image[node.at()]

@@ -1,4 +1,4 @@
-//! Where a model is not smooth: numbers that change where a condition does, or the piece of a table.
+//! Where a model is not smooth: numbers that change where a condition or the piece of a table does.
 
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 

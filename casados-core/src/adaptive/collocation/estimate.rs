@@ -65,7 +65,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let Memory { point, y, .. } = &mut *self.memory;
         combine(&self.scheme.lagrange, y.as_ref(), changes.as_mut());
         for (index, change) in changes.as_mut().iter_mut().enumerate() {
-            let old = &mut point[if index < nx { index } else { index + nx }];
+            let old = &mut point[variable::<M>(index)];
             let slope = *change;
             *change = slope - *old;
             *old = slope;

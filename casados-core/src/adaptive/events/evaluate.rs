@@ -3,7 +3,7 @@
 use super::Event;
 use crate::error::{Error, Place};
 use crate::finite::not_finite;
-use crate::model::{ArrayV, Dae, VectorX};
+use crate::model::{ArrayK, ArrayV, Dae, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
@@ -29,6 +29,17 @@ pub(super) fn evaluate<M: Dae, T: Real>(
     let value = event.guard.first(v);
     finite(event.guard.name, &[value], k)?;
     Ok(value.to_f64())
+}
+
+/// `ġ = ∂g/∂t + g_x ẋ`, with the gradient over all variables.
+pub(super) fn slope<M: Dae, T: Real>(gradient: &ArrayV<M, T>, by_t: T, xdot: &ArrayK<M, T>) -> T {
+    let nx = M::Shape::NX;
+    let products = gradient.as_ref()[nx..2 * nx].iter().zip(xdot.as_ref());
+    products.fold(by_t, |sum, (g, f)| sum + *g * *f)
+}
+
+pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b)
 }
 
 /// # Errors

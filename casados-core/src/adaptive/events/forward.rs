@@ -1,6 +1,8 @@
 //! Derivatives over the parts between events, forwards.
 
 use super::*;
+use crate::integrator::blocks::{advance, fill, identity};
+use crate::memory::allocate;
 use crate::result::Forward;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -11,20 +13,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         second: bool,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
         begin(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-        let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
-        let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
         let [mut v, mut next] = match self.sensitivities.take() {
             Some(there) => there,
-            None => [zeroed()?, zeroed()?],
+            None => [allocate()?, allocate()?],
         };
-        for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(T::ZERO);
-            row[x] = T::ONE;
-        }
+        identity::<M, T>(&mut v);
         let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
         moments.clear();
         let mut x = *x0;
@@ -57,12 +54,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     integrand.prolong(sign, &time, at)
                 })?;
             }
-            let gradient = time_gradient(time.as_ref());
-            times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
-            times.push(gradient);
-            let moment = (event, moment);
-            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
-            moments.push(moment);
+            push(&mut times, time_gradient(time.as_ref()))?;
+            push(&mut moments, (event, moment))?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
@@ -95,22 +88,6 @@ fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
     gradient.u.as_mut_slice().copy_from_slice(&row[nx..nx + nu]);
     gradient.p.as_mut_slice().copy_from_slice(&row[nx + nu..]);
     gradient
-}
-
-/// `V⁺ = ∂x⁺/∂x V + ∂x⁺/∂w` over a segment.
-fn advance<M: Dae, T: Real>(local: &Forward<M, T>, v: &Rows<M, T>, next: &mut Rows<M, T>) {
-    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-    for (r, row) in next.as_mut().iter_mut().enumerate() {
-        let row = row.as_mut();
-        row.fill(T::ZERO);
-        for (c, v) in v.as_ref().iter().enumerate() {
-            axpy(local.dx_dx0[(r, c)], v.as_ref(), row);
-        }
-        for (c, element) in row[nx..].iter_mut().enumerate() {
-            let part = if c < nu { local.dx_du[(r, c)] } else { local.dx_dp[(r, c - nu)] };
-            *element = *element + part;
-        }
-    }
 }
 
 /// The derivatives over a segment alone, row by row.

@@ -3,7 +3,7 @@
 
 use super::super::run::Span;
 use super::super::sealed::Engine;
-use super::evaluate::{evaluate, finite};
+use super::evaluate::{evaluate, finite, slope};
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
@@ -56,12 +56,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         frozen: Span<T>,
     ) -> Result<(), Error> {
         check_named::<M, T>(Argument::U, u.as_slice())?;
-        for (t, expected) in [(self.integrator.start, frozen.start), (t_end, frozen.end)] {
-            if t != expected {
-                let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
-                return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
-            }
-        }
+        frozen.check_is(self.integrator.start, t_end)?;
         let (mut x, mut start) = (*x0, frozen.start);
         for k in 0..self.count {
             let Some(segment) = self.segments.get_mut(k) else { break };
@@ -118,7 +113,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// The time of the event that ends a part: by Newton's method for its length, from the one that
     /// is kept.
     fn arrive(&mut self, k: usize, event: &Event<M, T>, start: T) -> Result<T, Error> {
-        let nx = M::Shape::NX;
         let Some((kept, u)) = self.segments.get(k).map(|segment| (segment.kept, segment.u)) else {
             return Err(Error::NoResult);
         };
@@ -132,8 +126,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             self.go(k);
             let value = T::from_f64(evaluate(event, &mut self.v, &x, t, k)?);
             let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
-            let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
-            let change = -value / products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            let change = -value / slope::<M, T>(&gradient, rate, &y);
             let resolution = T::from_f64(T::EPSILON) * t.abs().max(whole.abs());
             if change.abs() <= resolution
                 || (iteration > 3 && change.abs() >= last && last <= T::from_f64(64.0) * resolution)

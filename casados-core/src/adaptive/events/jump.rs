@@ -1,5 +1,6 @@
 //! Derivatives over an event, forwards and backwards.
 
+use super::evaluate::dot;
 use super::*;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -75,7 +76,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         result: &mut HybridAdjoint<M, T>,
     ) -> T {
         let (nx, nz, nu) = (M::Shape::NX, M::Shape::NZ, M::Shape::NU);
-        let dot = |a: &[T], b: &[T]| a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b);
         let inputs = 2 * nx + nz;
         let sigma = match event.jump {
             None => dot(result.grad_x0.as_slice(), moment.before.as_ref()),

@@ -30,22 +30,23 @@ use super::integrator::Integrator;
 use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, dense, refill};
-use super::sensitivities::{chain, dynamic, fill};
+use super::sensitivities::{chain, dynamic};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
 use crate::finite::{check_named, not_finite};
+use crate::integrator::blocks::Rows;
 use crate::linalg::axpy;
+use crate::memory::{allocate, push};
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
-use crate::quadrature::{Along, Integrand, begin, finish, reborrow};
+use crate::quadrature::{Integrand, OptionalIntegrand, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, listed, plain};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 
 /// An adaptive integrator with events.
 ///
@@ -106,8 +107,6 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     second: Option<Box<second::Second<M, T>>>,
 }
 
-/// A row for each state, with a column for each direction.
-type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
 /// The events of a call that happened, in order.
 type Moments<M, T> = Vec<(Event<M, T>, Moment<M, T>)>;
 
@@ -128,7 +127,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new(integrator: Integrator<M, B, T>, events: &[Event<M, T>]) -> Result<Self, Error> {
-        let bytes = size_of::<ArrayV<M, T>>();
         let solution =
             Solution { nominal: Nominal::zeroed(), t: T::ZERO, terminal: false, occurrences: Vec::new() };
         Ok(Self {
@@ -141,7 +139,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             frozen: None,
             statistics: AdaptiveStatistics::default(),
             solution,
-            v: try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+            v: allocate()?,
             signs: Vec::new(),
             moments: Vec::new(),
             sensitivities: None,
@@ -205,7 +203,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridForward<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
         let (result, moments) = self.sweep(x0, false, along)?;
@@ -233,7 +231,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Solution<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
         self.moments = self.replay(x0, along)?;
@@ -242,7 +240,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 
     /// All steps again, to rounding, and what is known about the moments of the events.
-    fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<Moments<M, T>, Error> {
+    fn replay(
+        &mut self,
+        x0: &VectorX<M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<Moments<M, T>, Error> {
         begin(&mut along);
         let mut moments = core::mem::take(&mut self.moments);
         moments.clear();
@@ -258,8 +260,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 solution.nominal.z0 = integrator.base.result.z0;
             }
             let Some(moment) = self.moment(k)? else { break };
-            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
-            moments.push(moment);
+            push(&mut moments, moment)?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
@@ -274,7 +275,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
         self.asked = None;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;

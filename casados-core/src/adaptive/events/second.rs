@@ -12,14 +12,15 @@
 //!
 //! Here nothing depends on the time: neither models nor functions have second derivatives by it.
 
-use super::super::columns::Columns;
 use super::super::point::At;
 use super::super::sealed::Engine;
-use super::super::sensitivities::{fill, place};
+use super::evaluate::dot;
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::error::{Argument, Error};
 use crate::finite::{check_named, not_finite};
+use crate::integrator::blocks::{Rows, Square, add, element, fill, identity};
 use crate::linalg::axpy;
+use crate::memory::allocate;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
     VectorX,
@@ -28,8 +29,6 @@ use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Plain, Shape, listed};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
-use core::marker::PhantomData;
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
 ///
@@ -80,18 +79,14 @@ listed!([M: Dae, T: Real] HybridHessian<M, T> { forward, adjoint, h_xx, h_xu, h_
 #[zeroable(bound = "T: Zeroable")]
 pub(super) struct Second<M: Dae, T: Plain> {
     /// The Hessian over the state that was reached, `u` and `p`, and one in the making.
-    h: ArrayW<M, ArrayW<M, T>>,
-    sum: ArrayW<M, ArrayW<M, T>>,
-    product: ArrayW<M, ArrayW<M, T>>,
+    h: Square<M, T>,
+    sum: Square<M, T>,
+    product: Square<M, T>,
     /// `S'`, and `E` of all variables.
-    s: [ArrayX<M, ArrayW<M, T>>; 2],
+    s: [Rows<M, T>; 2],
     e: ArrayV<M, ArrayW<M, T>>,
     /// Derivatives of `ẋ`, a row for each direction.
     slopes: ArrayW<M, ArrayX<M, T>>,
-}
-
-fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b)
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -114,10 +109,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.trace(x0, u, h)?;
         let (forward, moments) = self.sweep(x0, true, None)?;
-        let bytes = size_of::<Second<M, T>>();
         let mut second: Box<Second<M, T>> = match self.second.take() {
             Some(there) => there,
-            None => try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+            None => allocate()?,
         };
         for row in second.h.as_mut() {
             row.as_mut().fill(T::ZERO);
@@ -128,7 +122,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             grad_u: Zeroable::zeroed(),
             grad_p: Zeroable::zeroed(),
         };
-        let columns = Columns::<M> { intervals: 1, model: PhantomData };
         for k in (0..self.count).rev() {
             if let Some((event, moment)) = moments.get(k) {
                 let after = adjoint.grad_x0;
@@ -142,10 +135,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let result = frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, None);
             if result.is_ok() {
                 let Second { h, sum, product, .. } = &mut *second;
-                place(&memory.hessian, sum);
-                let [product, total] =
-                    [product, &mut *sum].map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
-                columns.project(0, h.as_ref(), v, product, total);
+                for (r, row) in sum.as_mut().iter_mut().enumerate() {
+                    *row = ArrayW::<M, T>::from_fn(|c| element(&memory.hessian, r, c));
+                }
+                add::<M, T>(|r, c| h[r][c], v, [product, &mut *sum]);
                 h.as_mut().copy_from_slice(sum.as_ref());
                 let gradient = &memory.hessian.first;
                 adjoint.grad_x0 = gradient.grad_x0;
@@ -197,21 +190,14 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (nx, nz, nw) = (M::Shape::NX, M::Shape::NZ, M::Shape::NW);
         let Second { h, sum, product, s, e, slopes } = second;
         // S' and τ' from the identity.
-        for rows in s.iter_mut() {
-            for (x, row) in rows.as_mut().iter_mut().enumerate() {
-                row.as_mut().fill(T::ZERO);
-                row[x] = T::ONE;
-            }
-        }
+        s.iter_mut().for_each(identity::<M, T>);
         let [v, next] = s.each_mut().map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
         let time = self.forward_jump(event, moment, v, next)?;
         // Dᵀ H⁺ D
         for row in sum.as_mut() {
             row.as_mut().fill(T::ZERO);
         }
-        let columns = Columns::<M> { intervals: 1, model: PhantomData };
-        let [product, total] = [product, &mut *sum].map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
-        columns.project(0, h.as_ref(), v, product, total);
+        add::<M, T>(|r, c| h[r][c], v, [product, &mut *sum]);
         // Eᵀ ∇² E
         for row in e.as_mut() {
             row.as_mut().fill(T::ZERO);

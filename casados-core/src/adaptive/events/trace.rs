@@ -6,10 +6,11 @@ use super::super::run::Span;
 use super::super::sealed::Engine;
 use super::super::segment::add;
 use super::super::statistics::AdaptiveStatistics;
-use super::evaluate::{evaluate, finite, place};
+use super::evaluate::{evaluate, finite, place, slope};
 use super::{Event, Hybrid, Moment, Occurrence};
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
+use crate::memory::push;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -80,9 +81,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             if occurrences.len() >= self.most {
                 return Err(Error::TooManyEvents { t: t.to_f64(), events: occurrences.len() });
             }
-            let bytes = size_of::<Occurrence<M, T>>();
-            occurrences.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes })?;
-            occurrences.push(Occurrence { event: index, t, before, after: before });
+            push(occurrences, Occurrence { event: index, t, before, after: before })?;
             let Some(jump) = event.jump else {
                 // Where the state is, `z` is that of the equations there.
                 let y = self.slope(&before, u, t)?;
@@ -173,16 +172,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// On which side of zero each function begins. Where it is zero to rounding, it is on the side
     /// that it goes to.
     fn find_signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
-        let (nx, start) = (M::Shape::NX, self.integrator.start);
+        let start = self.integrator.start;
         let forward = if t_end < start { -1.0 } else { 1.0 };
         let parameters = self.integrator.base.parameters;
         place_inputs::<M, T>(self.v.as_mut().as_mut(), u, &parameters);
         let count = self.events.len();
         self.signs.clear();
-        self.signs
-            .try_reserve(count)
-            .map_err(|_| Error::OutOfMemory { bytes: count.saturating_mul(size_of::<f64>()) })?;
-        let mut slope = None;
+        let mut there = None;
         for index in 0..count {
             let Some(event) = self.events.get(index).copied() else { break };
             let value = evaluate(&event, &mut self.v, x, start, k)?;
@@ -195,27 +191,25 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             // A segment after an event begins where a function is zero but for the rounding of the
             // time, which counts by the slope.
             if k == 0 && is_apart(size) {
-                self.signs.push(value);
+                push(&mut self.signs, value)?;
                 continue;
             }
-            let y = match slope {
+            let y = match there {
                 Some(y) => y,
-                None => *slope.insert(self.slope_from(self.integrator.base.given, x, u, start)?),
+                None => *there.insert(self.slope_from(self.integrator.base.given, x, u, start)?),
             };
-            let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
-            let total = products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            let total = slope::<M, T>(&gradient, rate, &y);
             if is_apart(size + (total * start).to_f64().abs()) {
-                self.signs.push(value);
+                push(&mut self.signs, value)?;
                 continue;
             }
-            self.signs.push(forward * total.to_f64());
+            push(&mut self.signs, forward * total.to_f64())?;
         }
         Ok(())
     }
 
     /// The last step of a segment is made to end where the event is: its time.
     fn shorten(&mut self, k: usize, event: &Event<M, T>, t: T) -> Result<T, Error> {
-        let nx = M::Shape::NX;
         let Some(step) = self.segments.get(k).and_then(|segment| segment.tape.entries().len().checked_sub(1))
         else {
             return Ok(t);
@@ -232,8 +226,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let y = self.slope(&x, &u, time)?;
             let value = T::from_f64(evaluate(event, &mut self.v, &x, time, k)?);
             let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
-            let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
-            let change = -value / products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            let change = -value / slope::<M, T>(&gradient, rate, &y);
             let next = h + change;
             // Within the step, as far as the polynomial was right; a crossing without slope stays
             // where it was found.
@@ -253,7 +246,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let end = entry.t + h;
         if let Some(segment) = self.segments.get_mut(k) {
             let stages = B::replays(&mut self.integrator.state).stages(entry.level)?;
-            segment.tape.set_last(h, nx, stages);
+            segment.tape.set_last(h, M::Shape::NX, stages);
             segment.span.end = end;
         }
         self.integrator.base.result.x = x;
@@ -321,7 +314,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// [`Error::Grazing`]; no consistent derivative; a jump that is not finite.
     #[allow(clippy::type_complexity)]
     pub(super) fn moment(&mut self, k: usize) -> Result<Option<(Event<M, T>, Moment<M, T>)>, Error> {
-        let nx = M::Shape::NX;
         let (Some(at), Some(segment)) = (self.solution.occurrences.get_mut(k), self.segments.get(k)) else {
             return Ok(None);
         };
@@ -329,14 +321,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         at.after = at.before;
         let (index, t, u, before) = (at.event, at.t, segment.u, at.before);
         let Some(event) = self.events.get(index).copied() else { return Ok(None) };
-        let slope = self.slope(&before, &u, t)?;
+        let xdot = self.slope(&before, &u, t)?;
         self.go(k);
-        let (guard, mut rate) = event.guard.gradient(&self.v, &[T::ONE]);
-        for (g, f) in guard.as_ref()[nx..2 * nx].iter().zip(slope.as_ref()) {
-            rate = rate + *g * *f;
-        }
+        let (guard, by_t) = event.guard.gradient(&self.v, &[T::ONE]);
+        let rate = slope::<M, T>(&guard, by_t, &xdot);
         self.check_slope(k, &event, index, rate)?;
-        let mut moment = Moment { guard, rate, before: slope, after: ArrayK::<M, T>::zeroed() };
+        let mut moment = Moment { guard, rate, before: xdot, after: ArrayK::<M, T>::zeroed() };
         if let Some(jump) = event.jump {
             let mut after = VectorX::<M, T>::zeroed();
             after.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());

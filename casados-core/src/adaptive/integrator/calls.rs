@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::memory::Heap;
-use crate::quadrature::{Along, reborrow};
+use crate::quadrature::{OptionalIntegrand, reborrow};
 use crate::statistics::Statistics;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, B, T> {
@@ -31,7 +31,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let span = self.steps(x0, u, h)?;
         let (mut frozen, state, ..) = self.parts(span)?;
@@ -45,7 +45,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         let span = self.steps(x0, u, h)?;
         let (mut frozen, state, memory, _) = self.parts(span)?;
@@ -59,7 +59,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         self.last = None;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
@@ -76,7 +76,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.last = None;
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;

@@ -80,12 +80,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let segments = self.segments.get_mut(..self.count).unwrap_or_default();
         let mut before = start;
         for (segment, end) in segments.iter().zip(ends) {
-            for (t, expected) in [(before, segment.span.start), (*end, segment.span.end)] {
-                if t != expected {
-                    let (start, end) = (segment.span.start.to_f64(), segment.span.end.to_f64());
-                    return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
-                }
-            }
+            segment.span.check_is(before, *end)?;
             before = *end;
         }
         if segments.len() != ends.len() {
@@ -98,7 +93,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// All steps again, to rounding.
-    pub(super) fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<(), Error> {
+    pub(super) fn replay(
+        &mut self,
+        x0: &VectorX<M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<(), Error> {
         begin(&mut along);
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut x = *x0;
@@ -119,7 +118,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         second: bool,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
         mut sums: Option<&mut Sums<M, T>>,
     ) -> Result<PiecewiseForward<M, T>, Error> {
         begin(&mut along);
@@ -152,7 +151,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let mut part = chain(&mut along, None, second);
             frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
             if let (Some(sums), Some(integrand)) = (&mut sums, &mut along) {
-                sums.add(k, &mut **integrand, v, &mut memory.step);
+                sums.add(k, &mut **integrand, v);
             }
             let local = &memory.hessian.first.forward;
             x = local.nominal.x;

@@ -1,15 +1,16 @@
 //! The calls of an integrator whose intervals are divided.
 
-use super::{Divided, HessianMemory, Integrator, blocks, dynamic};
+use super::super::blocks;
+use super::{Divided, HessianMemory, Integrator, dynamic};
 use crate::error::{Argument, Error};
 use crate::finite::{check_forward, check_gradient, check_named, check_second};
 use crate::linalg::axpy;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{Along, Backwards, begin, finish};
+use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::Matrix;
+use crate::shape::{Array, Matrix};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
@@ -41,7 +42,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.begin(h)?;
         begin(&mut along);
@@ -55,7 +56,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         I::Memory: WithForward,
@@ -75,7 +76,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         I::Memory: WithAdjoint<1>,
@@ -116,7 +117,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         I::Memory: WithHessian,
@@ -150,7 +151,8 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
                 now = part.first.grad_x0;
                 axpy(T::ONE, part.first.grad_u.as_slice(), result.first.grad_u.as_mut_slice());
                 axpy(T::ONE, part.first.grad_p.as_slice(), result.first.grad_p.as_mut_slice());
-                blocks::add(part, &history[k], [product, sum]);
+                let v = ArrayW::<M, T>::flat(history[k].as_ref());
+                blocks::add::<M, T>(|r, c| blocks::element(part, r, c), v, [product, sum]);
                 Ok(())
             });
             self.count();

@@ -7,20 +7,19 @@
 //! V_{k+1} = A V_k + (0, B)        λ_k = Aᵀ λ_{k+1}        d²(λᵀx_N)/dw² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ x_{k+1}) D_k
 //! ```
 
-mod blocks;
 mod calls;
 
+use super::blocks::{Rows, Square, advance, algebraic, identity, states};
 use super::{Integrator, U, X};
 use crate::error::{Argument, Error};
 use crate::finite::check_input;
 use crate::memory::{Family, Memory, WithForward};
-use crate::model::{ArrayW, ArrayX, Dae, VectorX};
-use crate::quadrature::{Along, Chained, Integrand};
+use crate::model::{Dae, VectorX};
+use crate::quadrature::{Chained, Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::{Field, Real};
-use crate::shape::{Array, Plain};
+use crate::shape::Plain;
 use crate::statistics::Statistics;
-use blocks::{advance, of_end};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -61,8 +60,6 @@ pub struct Divided<I: Integrator, const N: usize> {
 }
 
 type Place<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
-/// `dx/dw`, row by row.
-type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
 
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
@@ -94,8 +91,8 @@ struct HessianMemory<M: Dae, T: Real, const N: usize> {
     /// `V` at the start of each part.
     history: [Rows<M, T>; N],
     /// `∇²(λᵀx)` of a part times `D`, and the sum of all parts.
-    product: ArrayW<M, ArrayW<M, T>>,
-    sum: ArrayW<M, ArrayW<M, T>>,
+    product: Square<M, T>,
+    sum: Square<M, T>,
 }
 
 impl<I: Integrator, const N: usize> Divided<I, N> {
@@ -133,14 +130,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 
     /// After a part.
     fn count(&mut self) {
-        let part = self.integrator.statistics();
-        let sum = &mut self.statistics;
-        sum.steps += part.steps;
-        sum.iterations += part.iterations;
-        sum.residuals += part.residuals;
-        sum.jacobians += part.jacobians;
-        sum.factorizations += part.factorizations;
-        sum.dense += part.dense;
+        self.statistics.add(&self.integrator.statistics());
     }
 
     /// The solution, with the states where parts start.
@@ -149,7 +139,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         x0: &X<Self>,
         u: &U<Self>,
         h: I::Number,
-        along: &mut Along<'_, '_, I::Model, I::Number>,
+        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
     ) -> Result<(), Error> {
         let (mut x, mut z0) = (*x0, None);
         for k in 0..N {
@@ -175,7 +165,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         u: &U<Self>,
         h: I::Number,
         second: bool,
-        along: &mut Along<'_, '_, I::Model, I::Number>,
+        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
         mut keep: impl FnMut(&mut Self, usize, &X<Self>) -> Result<(), Error>,
     ) -> Result<(), Error>
     where
@@ -183,11 +173,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     {
         let mut x = *x0;
         let ForwardMemory { v: [now, _], .. } = I::Memory::forward(&mut self.forward)?;
-        for (row, v) in now.as_mut().iter_mut().enumerate() {
-            *v = ArrayW::<I::Model, I::Number>::from_fn(|w| {
-                if w == row { I::Number::ONE } else { I::Number::ZERO }
-            });
-        }
+        identity::<I::Model, _>(now);
         for k in 0..N {
             keep(self, k, &x)?;
             let length = self.part(k, h)?;
@@ -205,7 +191,8 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
                     (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp) = first;
                 }
                 if k + 1 == N {
-                    of_end(part, now, next, result);
+                    states(next, result);
+                    algebraic(part, now, result);
                 }
                 core::mem::swap(now, next);
                 x = part.nominal.x;
@@ -219,7 +206,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 
 /// The integrand of a part.
 fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut Along<'_, '_, M, T>,
+    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a Rows<M, T>>,
     second: bool,
 ) -> Option<Chained<'a, M, T>> {
@@ -228,7 +215,7 @@ fn chain<'a, M: Dae, T: Real>(
 
 fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
-) -> Along<'a, 'a, M, T> {
+) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {
         Some(integrand) => Some(integrand),
         None => None,

@@ -23,7 +23,7 @@ use crate::irk::workspace::{Linearization, Step, Work};
 use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
-use crate::quadrature::Along;
+use crate::quadrature::OptionalIntegrand;
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
 use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
@@ -104,7 +104,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
         kept: &[HessianStep<M, T, S, F>],
         [lambda, nu]: [&[T]; 2],
         ahead: &[T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
         let steps = parts.steps;

@@ -6,7 +6,7 @@ use crate::irk::driver::Arguments;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithAdjoint};
 use crate::model::{Dae, MatrixXC, VectorU, VectorX};
-use crate::quadrature::{Along, begin, finish};
+use crate::quadrature::{OptionalIntegrand, begin, finish};
 use crate::result::Adjoint;
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -63,7 +63,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         &mut self,
         arguments: &Arguments<'_, M, T>,
         seeds: &[T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T, C>, Error>
     where
         W: WithAdjoint<C>,

@@ -9,7 +9,7 @@ use crate::irk::forward::memory::{ForwardMemory, StepOf};
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithDirectional, WithForward};
 use crate::model::{Dae, VectorU, VectorX};
-use crate::quadrature::{Along, begin, finish};
+use crate::quadrature::{OptionalIntegrand, begin, finish};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -62,7 +62,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
@@ -117,7 +117,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     pub(in crate::irk) fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
         to: Option<&mut Forward<M, T>>,
     ) -> Result<(), Error>
     where

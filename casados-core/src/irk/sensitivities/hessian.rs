@@ -8,7 +8,7 @@ use crate::irk::hessian::pass::HessianMemory;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithHessian};
 use crate::model::{Dae, VectorU, VectorX, VectorZ};
-use crate::quadrature::{Along, begin, finish, reborrow};
+use crate::quadrature::{OptionalIntegrand, begin, finish, reborrow};
 use crate::result::Hessian;
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -86,7 +86,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
         nu: &[T],
-        along: Along<'_, '_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,
@@ -102,7 +102,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         arguments: &Arguments<'_, M, T>,
         lambda: &[T],
         nu: &[T],
-        mut along: Along<'_, '_, M, T>,
+        mut along: OptionalIntegrand<'_, '_, M, T>,
         to: Option<&mut Hessian<M, T>>,
     ) -> Result<(), Error>
     where

@@ -45,17 +45,17 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
         mut self,
         stages: &[ArrayK<M, [T; S]>],
         change: &[ArrayK<M, [T; S]>],
-        along: T,
+        alpha: T,
     ) -> (End<M, T>, [T; 2]) {
         let mut end = End::<M, T> { x: VectorX::<M, T>::zeroed(), z0: VectorZ::<M, T>::zeroed() };
         let (mut sum, mut largest) = (T::ZERO, T::ZERO);
         for (n, y) in stages.iter().enumerate() {
             let mut y = *y;
-            if let Some(change) = change.get(n).filter(|_| along != T::ZERO) {
+            if let Some(change) = change.get(n).filter(|_| alpha != T::ZERO) {
                 for (y, &change) in
                     y.as_mut().as_flattened_mut().iter_mut().zip(change.as_ref().as_flattened())
                 {
-                    *y = *y + along * change;
+                    *y = *y + alpha * change;
                 }
             }
             for i in 0..S {

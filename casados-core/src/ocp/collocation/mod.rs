@@ -20,9 +20,9 @@
 
 mod equations;
 
-use super::begin::Begin;
+use super::begin::{Begin, at};
 use super::dynamics::{
-    Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step, vector,
+    Dynamics, IntegralTerms, Interval, IntervalResult, Nodes, SecondOrder, Sink, StageAction, vector,
 };
 use super::error::OcpError;
 use super::inside::Inside;
@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, VectorU, VectorX};
-use crate::qp::{assign, part};
+use crate::qp::{assign, part, room};
 use crate::result::Seeds;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -140,8 +140,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         let count = nodes.len().saturating_mul(steps);
         for list in [&mut self.stages, &mut self.increments, &mut self.change, &mut self.best] {
             list.clear();
-            let bytes = count.saturating_mul(size_of::<ArrayK<M, [T; S]>>());
-            list.try_reserve_exact(count).map_err(|_| OcpError::OutOfMemory { bytes })?;
+            room(list, count)?;
             list.resize(count, Zeroable::zeroed());
         }
         self.from.clear();
@@ -165,7 +164,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         if self.stages.len() != nodes.len() * self.steps() {
             return self.place_between(nodes);
         }
-        if nodes.along.is_none() && self.change_to(nodes)? {
+        if nodes.step_length.is_none() && self.change_to(nodes)? {
             self.go(T::ONE);
         }
         Ok(())
@@ -194,17 +193,17 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             assign(seeds.x0.as_mut_slice(), step.x);
             assign(seeds.u.as_mut_slice(), step.u);
             let (x, u) = (vector(interval.x), vector(interval.u));
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(self.stages.get(places).unwrap_or_default()).map_err(failed(k))?;
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(self.stages.get(places).unwrap_or_default()))?;
             let arguments = Arguments { x0: &x, u: &u, h: interval.h };
-            self.at.add_stage_derivatives(&arguments, &seeds, change).map_err(failed(k))?;
+            at(k, self.at.add_stage_derivatives(&arguments, &seeds, change))?;
         }
         Ok(())
     }
 
     /// Stages go a part of their way.
-    fn go(&mut self, along: T) {
-        go::<M, S, T>(&mut self.stages, &self.change, along);
+    fn go(&mut self, alpha: T) {
+        go::<M, S, T>(&mut self.stages, &self.change, alpha);
     }
 
     /// All intervals at their stages: derivatives of `order` 1 or 2, and ends and algebraic states
@@ -212,7 +211,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     fn differentiate(
         &mut self,
         nodes: &Nodes<'_, T>,
-        run: impl for<'r> Fn(&'r mut Irk<M, B, S, T>, &Interval<'_, T>) -> Result<Step<'r, T>, Error>,
+        run: impl for<'r> Fn(&'r mut Irk<M, B, S, T>, &Interval<'_, T>) -> Result<IntervalResult<'r, T>, Error>,
         second: bool,
         sink: Sink<'_, T>,
     ) -> Result<(), OcpError> {
@@ -226,24 +225,24 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let increments = self.increments.get_mut(places).unwrap_or_default();
             let residual =
                 Point::<M, T, S>::at(&interval, &self.coefficients, count).follow(stages, &[], T::ZERO).1;
-            self.newton.begin(&interval).map_err(failed(k))?;
-            self.newton.run.set_stages_of_steps(stages).map_err(failed(k))?;
+            at(k, self.newton.begin(&interval))?;
+            at(k, self.newton.run.set_stages_of_steps(stages))?;
             let (x, u) = (vector(interval.x), vector(interval.u));
-            let after = *self.newton.forward(&x, &u, interval.h).map_err(failed(k))?;
-            self.newton.copy_stages(increments).map_err(failed(k))?;
+            let after = *at(k, self.newton.forward(&x, &u, interval.h))?;
+            at(k, self.newton.copy_stages(increments))?;
             for (increment, y) in increments.iter_mut().zip(stages) {
                 let increment = increment.as_mut().as_flattened_mut().iter_mut();
                 for (increment, &y) in increment.zip(y.as_ref().as_flattened()) {
                     *increment = *increment - y;
                 }
             }
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(stages).map_err(failed(k))?;
-            let step = run(&mut self.at, &interval).map_err(failed(k))?;
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(stages))?;
+            let step = at(k, run(&mut self.at, &interval))?;
             let (mut of_x, mut of_u) = (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed());
             let mut cost = IntegralTerms::default();
             if second {
-                let after = Step::from(&after);
+                let after = IntervalResult::from(&after);
                 let changes = |of: [&[T]; 2], after: [&[T]; 2], to: &mut [T]| {
                     add_change(interval.multipliers, of[0], after[0], to);
                     add_change(interval.nu, of[1], after[1], to);
@@ -253,7 +252,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
                 (cost.x, cost.u) = (of_x.as_slice(), of_u.as_slice());
             }
             let (x, z) = (after.nominal.x.as_slice(), after.nominal.z0.as_slice());
-            sink(k, &Step { x, z, cost, stages: residual, ..step });
+            sink(k, &IntervalResult { x, z, cost, stages: residual, ..step });
         }
         Ok(())
     }
@@ -263,12 +262,12 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
 fn go<M: Dae, const S: usize, T: Real>(
     stages: &mut [ArrayK<M, [T; S]>],
     change: &[ArrayK<M, [T; S]>],
-    along: T,
+    alpha: T,
 ) {
     for (y, change) in stages.iter_mut().zip(change) {
         let y = y.as_mut().as_flattened_mut().iter_mut();
         for (y, &change) in y.zip(change.as_ref().as_flattened()) {
-            *y = *y + along * change;
+            *y = *y + alpha * change;
         }
     }
 }
@@ -284,10 +283,6 @@ fn add_change<T: Real>(weights: &[T], before: &[T], after: &[T], to: &mut [T]) {
     }
 }
 
-fn failed(interval: usize) -> impl Fn(Error) -> OcpError {
-    move |error| OcpError::Integration { interval, error }
-}
-
 impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T> {
     type Shape = M::Shape;
     const NAMES: Names = names::<M>();
@@ -299,8 +294,8 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
         if self.stages.len() != nodes.len() * count {
             self.place_between(nodes)?;
         }
-        let along = match nodes.along {
-            Some(along) => along,
+        let alpha = match nodes.step_length {
+            Some(alpha) => alpha,
             None if self.change_to(nodes)? => T::ONE,
             None => T::ZERO,
         };
@@ -309,8 +304,16 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
             let [stages, change] =
                 [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
             let point = Point::<M, T, S>::at(&interval, &self.coefficients, count);
-            let (end, residual) = point.follow(stages, change, along);
-            sink(k, &Step { x: end.x.as_slice(), z: end.z0.as_slice(), stages: residual, ..Step::default() });
+            let (end, residual) = point.follow(stages, change, alpha);
+            sink(
+                k,
+                &IntervalResult {
+                    x: end.x.as_slice(),
+                    z: end.z0.as_slice(),
+                    stages: residual,
+                    ..IntervalResult::default()
+                },
+            );
         }
         Ok(())
     }
@@ -325,18 +328,19 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
         if self.stages.len() != nodes.len() * count {
             self.place_between(nodes)?;
         }
-        let along = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
+        let alpha = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
         for (k, interval) in nodes.iter().enumerate() {
             let places = k * count..(k + 1) * count;
             let [stages, change] =
                 [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
             let mut stages = stages.to_vec();
-            go::<M, S, T>(&mut stages, change, along);
-            self.at.begin(&interval).map_err(failed(k))?;
-            self.at.set_solution(&stages).map_err(failed(k))?;
-            let visit =
-                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
-            self.at.at_parts(&interval, parts, visit).map_err(failed(k))?;
+            go::<M, S, T>(&mut stages, change, alpha);
+            at(k, self.at.begin(&interval))?;
+            at(k, self.at.set_solution(&stages))?;
+            let visit = &mut |j, x: &[T], z: &[T]| {
+                sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
+            };
+            at(k, self.at.at_parts(&interval, parts, visit))?;
         }
         Ok(true)
     }
@@ -351,7 +355,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
 
     fn move_stages(&mut self, action: StageAction<T>) {
         match action {
-            StageAction::Go(along) => self.go(along),
+            StageAction::Go(alpha) => self.go(alpha),
             StageAction::Remember => self.best.copy_from_slice(&self.stages),
             StageAction::Recall => self.stages.copy_from_slice(&self.best),
         }
@@ -367,14 +371,14 @@ impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Collocation<M, B, S,
 fn forward<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
     of: &Interval<'_, T>,
-) -> Result<Step<'r, T>, Error> {
-    irk.forward(&vector(of.x), &vector(of.u), of.h).map(Step::from)
+) -> Result<IntervalResult<'r, T>, Error> {
+    irk.forward(&vector(of.x), &vector(of.u), of.h).map(IntervalResult::from)
 }
 
 fn hessian<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
     of: &Interval<'_, T>,
-) -> Result<Step<'r, T>, Error> {
+) -> Result<IntervalResult<'r, T>, Error> {
     let lambda = vector(of.multipliers);
-    irk.hessian_along(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None).map(Step::from)
+    irk.hessian_along(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None).map(IntervalResult::from)
 }

@@ -7,7 +7,7 @@ use super::measure;
 use super::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
 use super::predictor::{self, needs_equal_steps};
 use super::scaling::{Relative, relative};
-use super::state::{MARGIN, State};
+use super::state::{GAMMA_PHI, State};
 use super::verdict::Next;
 use super::work::Work;
 use super::{Ipm, elastic};
@@ -218,7 +218,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !state.has_filter {
             state.first_violation = here.violation;
             state.small_violation = 1e-4 * here.violation.max(1.0);
-            state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
+            state.filter = Filter::new(GAMMA_PHI, 1e4 * here.violation.max(1.0));
             state.has_filter = true;
         }
         Ok(here)

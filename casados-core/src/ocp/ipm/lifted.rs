@@ -20,7 +20,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !P::Dynamics::LIFTED {
             return Ok(());
         }
-        self.along = Some(T::ZERO);
+        self.step_length = Some(T::ZERO);
         if warm {
             return Ok(());
         }

@@ -3,11 +3,11 @@
 use super::lengths::Lengths;
 use super::measure;
 use super::newton::{attach, attach_to_new, evaluate_values};
-use super::state::State;
+use super::state::{GAMMA_PHI, State};
 use super::work::Work;
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
-use crate::ocp::filter::{Filter, MARGIN, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
+use crate::ocp::filter::{Filter, GAMMA_THETA, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::Iterate;
@@ -48,9 +48,9 @@ impl Expected {
     /// The shortest step that can be accepted (equation (23)).
     fn shortest(&self) -> f64 {
         let Measure { violation, .. } = self.here;
-        let mut least: f64 = MARGIN;
+        let mut least: f64 = GAMMA_THETA;
         if self.slope < 0.0 {
-            least = least.min(super::state::MARGIN * violation / -self.slope);
+            least = least.min(GAMMA_PHI * violation / -self.slope);
             if violation <= self.small_violation {
                 let powers =
                     (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
@@ -177,7 +177,7 @@ where
         alpha: f64,
     ) -> Option<Measure> {
         let part_of_step = T::from_f64(alpha);
-        ocp.along = Some(part_of_step);
+        ocp.step_length = Some(part_of_step);
         {
             let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
@@ -197,7 +197,7 @@ where
         }
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
         let objective = if self.lengths.alone { 0.0 } else { objective };
-        ocp.along = Some(T::ZERO);
+        ocp.step_length = Some(T::ZERO);
         let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
         if P::Dynamics::LIFTED {
             gaps += ocp.stages[0].to_f64();

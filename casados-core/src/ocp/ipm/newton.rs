@@ -108,15 +108,35 @@ impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
 /// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
 pub(super) fn step<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: T) -> Result<(), QpError> {
-    let mut result = Ok(());
     iterate.proximal = delta;
-    T::compiled::<StepCompiled>(Step { iterate, mu, result: &mut result });
+    towards(iterate, mu, false, true)
+}
+
+/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
+/// that are there.
+///
+/// # Errors
+/// Those of the recursion.
+pub(super) fn again<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, corrected: bool) -> Result<(), QpError> {
+    towards(iterate, mu, corrected, false)
+}
+
+fn towards<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    mu: T,
+    corrected: bool,
+    factor: bool,
+) -> Result<(), QpError> {
+    let mut result = Ok(());
+    T::compiled::<StepCompiled>(Step { iterate, mu, corrected, factor, result: &mut result });
     result
 }
 
 struct Step<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
     mu: T,
+    corrected: bool,
+    factor: bool,
     result: &'r mut Result<(), QpError>,
 }
 
@@ -126,42 +146,13 @@ StepCompiled: Step<'r, 'a, T>);
 impl<T: Real> Registers<T> for Step<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        self.iterate.sides.aim(self.mu);
-        *self.result = self.iterate.newton::<E>(true);
-    }
-}
-
-/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
-/// that are there.
-///
-/// # Errors
-/// Those of the recursion.
-pub(super) fn again<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, corrected: bool) -> Result<(), QpError> {
-    let mut result = Ok(());
-    T::compiled::<AgainCompiled>(Again { iterate, mu, corrected, result: &mut result });
-    result
-}
-
-struct Again<'r, 'a, T> {
-    iterate: &'r mut Iterate<'a, T>,
-    mu: T,
-    corrected: bool,
-    result: &'r mut Result<(), QpError>,
-}
-
-compiled!(/// See [`Again`].
-AgainCompiled: Again<'r, 'a, T>);
-
-impl<T: Real> Registers<T> for Again<'_, '_, T> {
-    #[inline(always)]
-    fn run<E: Packed<T>>(self) {
-        let Self { iterate, mu, corrected, result } = self;
+        let Self { iterate, mu, corrected, factor, result } = self;
         if corrected {
             iterate.sides.correct(mu);
         } else {
             iterate.sides.aim(mu);
         }
-        *result = iterate.newton::<E>(false);
+        *result = iterate.newton::<E>(factor);
     }
 }
 

@@ -10,10 +10,10 @@ use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
-#[cfg(feature = "alloc")]
-use crate::ocp::log::reserve;
 use crate::ocp::outcome::{Outcome, Status};
 use crate::ocp::problem::Formulation;
+#[cfg(feature = "alloc")]
+use crate::qp::room;
 use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -115,8 +115,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             outcome.count(&row);
             #[cfg(feature = "alloc")]
             {
-                if let Err(error) = reserve(&mut self.log, 1) {
-                    break Err(error);
+                if let Err(error) = room(&mut self.log, 1) {
+                    break Err(error.into());
                 }
                 self.log.push(row);
             }
@@ -137,7 +137,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !(is_last && result.is_ok()) && state.best_residual.is_finite() {
             ocp.recall(&self.best);
         }
-        (ocp.along, ocp.has_algebraic) = (None, false);
+        (ocp.step_length, ocp.has_algebraic) = (None, false);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
         if stuck && state.best_residual <= self.options.acceptable_tolerance {

@@ -12,7 +12,7 @@ use crate::qp::interior::{Iterate, Sides};
 use crate::scalar::Real;
 
 /// `γ_φ`
-pub(super) const MARGIN: f64 = 1e-8;
+pub(super) const GAMMA_PHI: f64 = 1e-8;
 
 /// So many iterations with nothing left but complementarity, each of which leaves this part of it,
 /// are no convergence of Newton's method.
@@ -92,7 +92,7 @@ impl<'c> State<'c> {
             lengths,
             mu: options.first_mu(lengths.sizes.force),
             progress: Progress::new(barrier),
-            filter: Filter::new(MARGIN, f64::INFINITY),
+            filter: Filter::new(GAMMA_PHI, f64::INFINITY),
             small_violation: f64::INFINITY,
             first_violation: f64::INFINITY,
             regularisation: Regularisation::default(),

@@ -12,12 +12,11 @@
 
 use super::column::{self, Column, Right, Zero};
 use super::factors::SolutionFactors;
-use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::transfer::dot;
 use crate::qp::element::{add, get, set};
-use crate::qp::{QpError, QpView, Symmetric, assign, marked, part, part_mut};
+use crate::qp::{QpError, QpView, Symmetric, assign, marked, part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 

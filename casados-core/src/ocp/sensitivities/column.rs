@@ -1,12 +1,11 @@
 //! Solutions of the conditions of optimality by the factors of the recursion.
 
 use super::factors::SolutionFactors;
-use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::transfer::dot;
 use crate::qp::element::{add, get, set};
-use crate::qp::{Solution, StageDims, assign, part, part_mut};
+use crate::qp::{Solution, StageDims, assign, part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 

@@ -23,7 +23,7 @@ use super::curvature::Curvature;
 use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
 use super::problem::Formulation;
-use crate::qp::{StageDims, assign, part_mut};
+use crate::qp::{StageDims, assign, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -154,14 +154,6 @@ fn block<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
     let begin = stage.checked_mul(length);
     let end = begin.and_then(|begin| begin.checked_add(length));
     begin.zip(end).and_then(|(begin, end)| matrices.get(begin..end)).unwrap_or_default()
-}
-
-fn zeros<T: Real>(length: usize) -> Result<Vec<T>, OcpError> {
-    let mut memory = Vec::new();
-    let bytes = length.saturating_mul(size_of::<T>());
-    memory.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
-    memory.resize(length, T::ZERO);
-    Ok(memory)
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {

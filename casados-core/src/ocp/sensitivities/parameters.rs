@@ -1,18 +1,17 @@
 //! What parameters change of the conditions of optimality.
 
-use super::zeros;
 use crate::linalg::axpy;
 use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::cost::{At, Cost};
 use crate::ocp::data::{Node, inputs, split};
-use crate::ocp::dynamics::Step;
+use crate::ocp::dynamics::IntervalResult;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::point::{Cross, read};
 use crate::ocp::problem::{Formulation, Problem};
 use crate::ocp::transfer::dot;
-use crate::qp::{SolutionStage, StageDims, assign, part, part_mut};
+use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -108,7 +107,7 @@ impl<T: Real> Parameters<T> {
     }
 
     /// What an interval adds.
-    pub(super) fn take(&mut self, k: usize, step: &Step<'_, T>) {
+    pub(super) fn take(&mut self, k: usize, step: &IntervalResult<'_, T>) {
         let [nx, nu, np] = self.dims;
         let (size, nz) = (nx + nu, step.z.len());
         assign(part_mut(&mut self.algebraic, k * nz * np, nz * np), step.dz[2]);

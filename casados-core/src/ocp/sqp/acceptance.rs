@@ -4,7 +4,7 @@ use super::options::{Globalisation, SqpOptions};
 use crate::ocp::filter::{Filter, Measure, objective_decides};
 
 /// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
-const MARGIN: f64 = 1e-5;
+const GAMMA_PHI: f64 = 1e-5;
 /// The part of the expected decrease that is enough.
 const ARMIJO: f64 = 1e-4;
 
@@ -43,7 +43,7 @@ impl Line {
 
 impl Search {
     pub fn new() -> Self {
-        Self { filter: Filter::new(MARGIN, f64::INFINITY), full: true, linearised: None }
+        Self { filter: Filter::new(GAMMA_PHI, f64::INFINITY), full: true, linearised: None }
     }
 
     /// Whether a point is good enough after a step of this length.

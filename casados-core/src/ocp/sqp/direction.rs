@@ -125,7 +125,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
-        self.qp_solver.relax((self.options.qp_accuracy * state.residual).max(DIGITS * forces.to_f64()));
+        self.qp_solver.permit((self.options.qp_accuracy * state.residual).max(DIGITS * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
@@ -155,7 +155,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
-        self.qp_solver.relax(DIGITS * penalty);
+        self.qp_solver.permit(DIGITS * penalty);
         row.elastic = true;
         let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
         let gaps = ocp.gaps();
@@ -181,7 +181,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             penalty *= GROWTH;
             self.set_elastic(ocp, state, penalty);
             // Forces are as large as penalties, and have as many digits.
-            self.qp_solver.relax(DIGITS * penalty);
+            self.qp_solver.permit(DIGITS * penalty);
             solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
             if solved && self.violation_of_solution(ocp) < STAYS * before {
                 // It is, and from now on it does.
@@ -239,7 +239,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.set_elastic(ocp, state, penalty);
         let mut result = Ok(());
         for (flat, digits) in FLAT {
-            self.qp_solver.relax(digits * penalty);
+            self.qp_solver.permit(digits * penalty);
             ocp.forget_objective(T::from_f64(flat * penalty / violation));
             result = self.solve_qp(ocp, state, QpStart::Cold, row);
             if result.is_ok() {

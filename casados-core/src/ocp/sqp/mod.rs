@@ -156,10 +156,6 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
     ) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
         let length = ocp.ends() + elastic::memory(dims) + scaled::memory::<T>(dims);
-        let mut work = Vec::new();
-        let bytes = length.saturating_mul(size_of::<T>());
-        work.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
-        work.resize(length, T::ZERO);
         Ok(Self {
             options: SqpOptions::new::<T>(),
             curvature: Exact::default(),
@@ -168,7 +164,7 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
             trial: Solution::new(dims)?,
             best: Solution::new(dims)?,
             weights: Solution::new(dims)?,
-            work,
+            work: crate::qp::zeros(length)?,
             history: Vec::new(),
             log: Vec::new(),
         })

@@ -45,7 +45,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.ignore_inequalities();
         ocp.flatten(T::from_f64(SMALL), T::ONE);
         self.solution.copy_from(&ocp.iterate);
-        self.qp_solver.relax(self.options.tolerance);
+        self.qp_solver.permit(self.options.tolerance);
         let result = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
         ocp.set_penalties(self.penalties(ocp), None, &[]);
         let multipliers = self.solution.multipliers_mut();

@@ -11,11 +11,11 @@ use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
-#[cfg(feature = "alloc")]
-use crate::ocp::log::reserve;
 use crate::ocp::outcome::{Outcome, Status};
 use crate::ocp::problem::Formulation;
 use crate::ocp::watch::Watch;
+#[cfg(feature = "alloc")]
+use crate::qp::room;
 use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -111,7 +111,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         ocp.fits(self.solution.dims())?;
         self.options.check()?;
-        self.qp_solver.refine(self.options.tolerance);
+        self.qp_solver.require(self.options.tolerance);
         let mut state = State { over: Some(over), ..State::new() };
         if C::KEEPS {
             ocp.check_without_algebraic()?;
@@ -124,7 +124,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         #[cfg(feature = "alloc")]
         {
             self.log.clear();
-            reserve(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
+            room(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
         }
         let mut outcome = Outcome::new();
         let mut result = Ok(());
@@ -140,8 +140,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             outcome.count(&row);
             #[cfg(feature = "alloc")]
             {
-                if let Err(error) = reserve(&mut self.log, 1) {
-                    result = Err(error);
+                if let Err(error) = room(&mut self.log, 1) {
+                    result = Err(error.into());
                     break;
                 }
                 self.log.push(row);

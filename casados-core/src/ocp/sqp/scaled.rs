@@ -154,7 +154,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         state.sizes = (!are_all_one).then_some(Sizes { force, least });
         if !are_all_one {
             // The last digits of residuals count in units.
-            self.qp_solver.refine(self.options.tolerance / WIDE);
+            self.qp_solver.require(self.options.tolerance / WIDE);
         }
     }
 

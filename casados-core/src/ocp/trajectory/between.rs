@@ -3,13 +3,13 @@
 use super::{Kind, Series, Trajectory};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::data::split;
-use crate::ocp::dynamics::{Dynamics, Step};
+use crate::ocp::dynamics::{Dynamics, IntervalResult};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::{Ocp, nodes};
 use crate::ocp::point::read;
 use crate::ocp::problem::{Formulation, Problem};
 use crate::qp::element::get;
-use crate::qp::{StageDims, part, part_mut};
+use crate::qp::{StageDims, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -56,10 +56,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let solution = self.solution()?;
         let width = P::Shape::NX + P::Shape::NZ + P::Path::ROWS;
         let count = self.intervals().saturating_mul(points).saturating_mul(width);
-        let bytes = count.saturating_mul(size_of::<T>());
-        let mut values = Vec::new();
-        values.try_reserve_exact(count).map_err(|_| OcpError::OutOfMemory { bytes })?;
-        values.resize(count, T::ZERO);
+        let values = zeros(count)?;
         let count = T::from_whole(points + 1);
         let parts: Vec<T> = (1..=points).map(|part| T::from_whole(part) / count).collect();
         let Some(inside) = self.inside(&parts, values)? else { return Ok(solution) };
@@ -87,7 +84,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &Step<'_, T>| {
+        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &IntervalResult<'_, T>| {
             let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
             to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
         })?;

@@ -16,9 +16,9 @@ mod restore;
 pub use csv::Csv;
 pub use error::TrajectoryError;
 
-use super::bounds::means;
 use crate::record::Record;
 use crate::scalar::Real;
+use crate::structure::means;
 use alloc::string::String;
 use alloc::vec::Vec;
 

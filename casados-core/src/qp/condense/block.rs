@@ -3,7 +3,7 @@
 use super::plan::{Kind, Origin, blocks, limits};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, MORE, Part, Source, product, subtract};
-use crate::qp::layout::{Place, Places, StageDims, assign, pad, part, part_mut, take_mut};
+use crate::qp::layout::{Places, StageDims, StageOffsets, assign, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::Row;
 use crate::scalar::{Packed, Real, Registers};
@@ -90,7 +90,7 @@ impl<T: Real> Registers<T> for Condense<'_, T> {
 impl<T: Real> Condense<'_, T> {
     /// One block.
     #[inline(always)]
-    fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &Place, rows: &[Origin]) {
+    fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &StageOffsets, rows: &[Origin]) {
         let Self { qp, work, target, origins, .. } = self;
         let target = part_mut(target, to.data, to.data_len());
         part_mut(target, 0, to.matrix()).fill(T::ZERO);
@@ -115,7 +115,7 @@ impl<T: Real> Condense<'_, T> {
 
 /// A stage of a block.
 struct Stage<'s, T> {
-    place: Place,
+    place: StageOffsets,
     data: &'s [T],
     /// How many controls of later stages there are in the block.
     controls: usize,
@@ -128,7 +128,7 @@ impl<T: Real> Work<'_, T> {
     fn recur<E: Packed<T>>(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>, first: bool) {
         let Self { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = self;
         let (Stage { data, place, .. }, ld_z) = (stage, *ld_z);
-        let &Place { n, ld, next, ld_next, stage, .. } = place;
+        let &StageOffsets { n, ld, next, ld_next, stage, .. } = place;
         let matrix = Columns { data: part(data, 0, place.matrix()), ld };
         let negative = part_mut(minus, 0, ld * next);
         for (negative, &element) in negative.iter_mut().zip(matrix.data) {
@@ -171,8 +171,8 @@ impl<T: Real> Work<'_, T> {
     /// Writes what belongs to the controls of a stage, which is done: columns of rows, `R` and
     /// bounds.
     #[inline(always)]
-    fn write_controls(&self, stage: &Stage<'_, T>, to: &Place, origins: &[Origin], target: &mut [T]) {
-        let Place { nx, nu, ld, .. } = stage.place;
+    fn write_controls(&self, stage: &Stage<'_, T>, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+        let StageOffsets { nx, nu, ld, .. } = stage.place;
         for i in 0..nu {
             let (here, column) =
                 (to.nx + stage.controls + i, part(self.z_next, (nx + i) * self.ld_z, origins.len()));
@@ -192,7 +192,7 @@ impl<T: Real> Work<'_, T> {
     /// Rows of `Z`: mixed derivatives with respect to the controls of a stage.
     #[inline(always)]
     fn add_rows_of_controls(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
-        let Place { nx, nu, ld, stage: number, .. } = stage.place;
+        let StageOffsets { nx, nu, ld, stage: number, .. } = stage.place;
         for i in 0..nu {
             let row = origins.len();
             origins.push(Origin { kind: Kind::Control, stage: number, index: stage.controls + i });
@@ -210,11 +210,11 @@ impl<T: Real> Work<'_, T> {
         &mut self,
         stage: &Stage<'_, T>,
         rows: &[Origin],
-        to: &Place,
+        to: &StageOffsets,
         origins: &mut Vec<Origin>,
         target: &mut [T],
     ) {
-        let Place { nx, n, ld, next, stage: number, .. } = stage.place;
+        let StageOffsets { nx, n, ld, next, stage: number, .. } = stage.place;
         for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == number) {
             let row = origins.len();
             origins.push(Origin { index, ..*origin });
@@ -259,8 +259,14 @@ impl<T: Real> Work<'_, T> {
 
     /// Writes what belongs to the first state of a block.
     #[inline(always)]
-    fn write_first_state(&self, stage: &Stage<'_, T>, to: &Place, origins: &[Origin], target: &mut [T]) {
-        let Place { nx, ld, .. } = stage.place;
+    fn write_first_state(
+        &self,
+        stage: &Stage<'_, T>,
+        to: &StageOffsets,
+        origins: &[Origin],
+        target: &mut [T],
+    ) {
+        let StageOffsets { nx, ld, .. } = stage.place;
         for j in 0..nx {
             for i in j..nx {
                 set(target, to.matrix() + j * to.ld + i, get(self.m, j * ld + i));
@@ -277,7 +283,7 @@ impl<T: Real> Work<'_, T> {
 
     /// Writes what is constant in the rows of a block.
     #[inline(always)]
-    fn write_constants(&self, to: &Place, origins: &[Origin], target: &mut [T]) {
+    fn write_constants(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
             let constant = get(self.constant, row);
             match origin.kind {
@@ -296,7 +302,7 @@ impl<T: Real> Work<'_, T> {
 }
 
 /// Where the element of a row of `Z` with a variable of the condensed stage lies.
-fn at(to: &Place, origin: &Origin, variable: usize) -> usize {
+fn at(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,

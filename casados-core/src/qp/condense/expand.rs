@@ -3,7 +3,7 @@
 use super::plan::{Origin, blocks};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, add_symmetric, add_transposed, subtract, symmetric};
-use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
+use crate::qp::layout::{Places, StageOffsets, assign, pad, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::scalar::{Packed, Real, Registers};
@@ -68,7 +68,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
         let Self { qp, block, solution: SolutionView { v, dynamics, lower, upper, .. }, minus, g } = self;
         let inside = |stage: usize| !stage.is_multiple_of(block) && stage + 1 < qp.dims.len();
         for place in Places::<T>::new(qp.dims).filter(|place| inside(place.stage + 1)) {
-            let Place { n, ld, next, .. } = place;
+            let StageOffsets { n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let (here, coming) = v.split_at_mut_checked(place.v + ld).unwrap_or_default();
             let coming = part_mut(coming, 0, next);
@@ -77,7 +77,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
             add_transposed::<T, E>(coming, matrix, part(here, place.v, ld), n, next);
         }
         for place in Places::<T>::new(qp.dims).rev().filter(|place| inside(place.stage)) {
-            let Place { nx, n, ng, ld, next, .. } = place;
+            let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let (lower, upper) = (part(lower, place.row, place.rows), part(upper, place.row, place.rows));

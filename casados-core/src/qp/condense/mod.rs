@@ -18,7 +18,7 @@ mod plan;
 
 use super::error::QpError;
 use super::layout::{Places, StageDims, pad, part};
-use super::memory::reserve;
+use super::memory::{reserve, room};
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
 use super::solver::{QpSolver, QpStart};
@@ -90,10 +90,8 @@ impl<T: Real, S> Condensing<T, S> {
         self.dims.clear();
         self.rows.clear();
         // As much as there can be, so that no later call needs more.
-        let stages = self.dims.try_reserve(qp.dims.len());
-        let most = qp.dims.iter().map(|d| d.nx + d.ng).sum::<usize>();
-        let bytes = size_of_val(qp.dims).saturating_add(most.saturating_mul(size_of::<Origin>()));
-        stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes })?;
+        room(&mut self.dims, qp.dims.len())?;
+        room(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
         let mut places = Places::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
@@ -122,20 +120,11 @@ impl<T: Real, S> Condensing<T, S> {
 }
 
 impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
-    fn relax(&mut self, tolerance: f64) {
-        self.solver.relax(tolerance);
+    fn permit(&mut self, tolerance: f64) {
+        self.solver.permit(tolerance);
     }
-    fn refine(&mut self, tolerance: f64) {
-        self.solver.refine(tolerance);
-    }
-
-    fn solve(
-        &mut self,
-        qp: QpView<'_, T>,
-        start: QpStart,
-        solution: SolutionView<'_, T>,
-    ) -> Result<QpStatistics, QpError> {
-        self.solve_until(qp, start, solution, &mut || false)
+    fn require(&mut self, tolerance: f64) {
+        self.solver.require(tolerance);
     }
 
     fn solve_until(
@@ -165,12 +154,10 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         };
         let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
         let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
-        let room = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
-        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + room;
-        reserve(work, length)?;
+        let others = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
+        reserve(work, Work::<T>::lengths(&largest).iter().sum::<usize>() + others)?;
         origins.clear();
-        let bytes = largest.rows.saturating_mul(size_of::<Origin>());
-        origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes })?;
+        room(origins, largest.rows)?;
         let target = condensed.data_mut();
         let matrices = Work::new(&largest, work);
         T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });

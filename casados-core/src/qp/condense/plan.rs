@@ -1,7 +1,7 @@
 //! Which stages become one, and what their constraints were before.
 
 use crate::qp::error::{QpError, QpField};
-use crate::qp::layout::{Place, Places, StageDims, part};
+use crate::qp::layout::{Places, StageDims, StageOffsets, part};
 use crate::qp::problem::QpView;
 use crate::qp::stage::Row;
 use crate::scalar::Real;
@@ -28,7 +28,7 @@ pub enum Kind {
 }
 
 /// Bounds and penalties of one row.
-pub fn limits<T: Real>(data: &[T], place: &Place, row: usize) -> [T; 6] {
+pub fn limits<T: Real>(data: &[T], place: &StageOffsets, row: usize) -> [T; 6] {
     let all = [
         Row::Lower,
         Row::Upper,

@@ -22,7 +22,7 @@ use super::symmetric::Symmetric;
 use super::vector::{add_scaled, dot, shrink};
 use crate::qp::element::{add, set};
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
+use crate::qp::layout::{Places, StageOffsets, assign, pad, part, part_mut};
 use crate::qp::{QpView, marked};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -88,7 +88,7 @@ impl<T: Real> Coupling<'_, T> {
             zero.fill(T::ZERO);
         }
         for place in Places::<T>::ending(qp.dims, riccati.end).rev() {
-            let Place { nx, nu, n, next, .. } = place;
+            let StageOffsets { nx, nu, n, next, .. } = place;
             let minus = Columns { data: &*self.minus, ld };
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld: place.ld };
             product::<T, E>(self.gamma, ld, Source::Zero, minus, matrix, (count, 0..n, next), Part::Full);
@@ -112,7 +112,7 @@ impl<T: Real> Coupling<'_, T> {
     /// Adds what a stage itself has of the parameters: `−E` at the last one, and columns of `M`, of
     /// so many variables of all stages.
     #[inline(always)]
-    fn add_own(&mut self, place: &Place, stages: usize, length: usize) {
+    fn add_own(&mut self, place: &StageOffsets, stages: usize, length: usize) {
         let ld = pad::<T>(self.count);
         if place.stage + 1 == stages {
             for (c, state) in marked(self.periodic).enumerate() {
@@ -129,8 +129,8 @@ impl<T: Real> Coupling<'_, T> {
     /// `Y = L⁻¹ Γ_u` of a stage. It leaves `Y` with the signs of pivots where `Γ_u` was, and adds
     /// what belongs to shared controls to `S`.
     #[inline(always)]
-    fn eliminate_controls(&mut self, place: &Place, riccati: &Riccati<'_, T>) {
-        let (Place { nx, nu, .. }, ld) = (*place, pad::<T>(self.count));
+    fn eliminate_controls(&mut self, place: &StageOffsets, riccati: &Riccati<'_, T>) {
+        let (StageOffsets { nx, nu, .. }, ld) = (*place, pad::<T>(self.count));
         let begin = place.v + nx;
         let panel = part(riccati.panels, place.factor, place.ld * nu);
         let controls = part_mut(self.gamma, nx * ld, nu * ld);

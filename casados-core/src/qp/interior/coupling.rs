@@ -7,7 +7,7 @@ use super::kernels::MORE;
 use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
 use crate::qp::element::set;
-use crate::qp::layout::{Place, Places, pad, take_mut};
+use crate::qp::layout::{Places, StageOffsets, first_nx, pad, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
 
@@ -176,17 +176,11 @@ impl<'a, T: Real> Coupling<'a, T> {
         }
         let Some(first) = Places::<T>::new(qp.dims).next() else { return };
         for j in marked(self.shared) {
-            for Place { row, nx, .. } in Places::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu) {
+            for StageOffsets { row, nx, .. } in Places::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
+            {
                 join(first.nx + j, row + nx + j);
             }
         }
-    }
-}
-
-const fn first_nx(dims: &[StageDims]) -> usize {
-    match dims.first() {
-        Some(first) => first.nx,
-        None => 0,
     }
 }
 

@@ -5,7 +5,7 @@ use super::kernels::{Columns, add_transposed, symmetric};
 use super::riccati::Riccati;
 use super::vector::larger;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, Places, assign, part, part_mut, take_mut};
+use crate::qp::layout::{Places, StageOffsets, assign, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::Real;
 
@@ -17,14 +17,14 @@ impl<T: Real> Riccati<'_, T> {
     pub fn verify(
         &mut self,
         qp: QpView<'_, T>,
-        from: &Place,
+        from: &StageOffsets,
         (index, pivot): (usize, T),
         direction: &mut [T],
     ) -> Result<(), QpError> {
         let (mut curvature, mut size) = (T::ZERO, T::ZERO);
         let mut rest = direction.get_mut(from.row..).unwrap_or_default();
         for place in Places::<T>::new(qp.dims).skip(from.stage) {
-            let Place { nx, nu, n, ld, next, .. } = place;
+            let StageOffsets { nx, nu, n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let (panel, inverse) =

@@ -7,7 +7,10 @@ use super::riccati::{Extent, First, Riccati};
 use super::sides::{Counts, Sides};
 use super::terms::Terms;
 use super::vector::larger;
-use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
+use crate::qp::element::get;
+use crate::qp::layout::{
+    Places, StageDims, StageOffsets, assign, end, first_nx, pad, part, part_mut, take_mut,
+};
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -84,13 +87,6 @@ impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
         if let Some((multipliers, objective)) = self.multipliers {
             *objective = self.iterate.gradient::<E>(multipliers, self.costates);
         }
-    }
-}
-
-const fn first_nx(dims: &[StageDims]) -> usize {
-    match dims.first() {
-        Some(first) => first.nx,
-        None => 0,
     }
 }
 
@@ -232,7 +228,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut largest = T::ZERO;
         largest = larger::<T, E>(largest, self.gradient);
         for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
-            let Place { nx, n, ng, ld, next, .. } = place;
+            let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let hessian = part(data, place.matrix(), place.hessian());
@@ -310,7 +306,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut largest = T::ZERO;
         let mut rest = &mut *self.v;
         for place in Places::<T>::new(self.qp.dims) {
-            let Place { n, ng, ld, next, .. } = place;
+            let StageOffsets { n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let (v, general) = take_mut(&mut rest, place.rows).split_at_mut_checked(ld).unwrap_or_default();
@@ -368,7 +364,7 @@ pub fn in_units<T: Real>(proximal: T, units: &[T], row: usize) -> T {
 /// An element; zero if there is none.
 #[inline(always)]
 pub fn at<T: Real>(slice: &[T], index: u32) -> T {
-    slice.get(index as usize).copied().unwrap_or(T::ZERO)
+    get(slice, index as usize)
 }
 
 /// Changes rows by values that belong to them.

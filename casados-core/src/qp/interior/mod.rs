@@ -283,15 +283,6 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
 }
 
 impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I> {
-    fn solve(
-        &mut self,
-        qp: QpView<'_, T>,
-        start: QpStart,
-        solution: SolutionView<'_, T>,
-    ) -> Result<QpStatistics, QpError> {
-        self.solve_until(qp, start, solution, &mut || false)
-    }
-
     fn solve_until(
         &mut self,
         qp: QpView<'_, T>,
@@ -321,7 +312,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         }
     }
 
-    fn relax(&mut self, tolerance: f64) {
+    fn permit(&mut self, tolerance: f64) {
         self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }

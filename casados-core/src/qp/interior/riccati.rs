@@ -13,7 +13,7 @@ use super::cholesky::{eliminate, substitute};
 use super::kernels::{Columns, MORE, add_transposed, subtract};
 use super::shared::Shared;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
+use crate::qp::layout::{Places, StageDims, StageOffsets, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -59,7 +59,7 @@ pub struct Riccati<'a, T> {
     /// that.
     pub largest: T,
     /// Behind the last stage.
-    pub end: Place,
+    pub end: StageOffsets,
 }
 
 /// What is known of a horizon once its stages are gone through: the largest dimensions, and the
@@ -73,7 +73,7 @@ pub struct Extent {
     /// The most states of a stage.
     pub nx: usize,
     next_and_ng: usize,
-    pub end: Place,
+    pub end: StageOffsets,
 }
 
 impl Extent {
@@ -205,7 +205,7 @@ impl<T: Real> Riccati<'_, T> {
             self.largest = T::ZERO;
         }
         for place in Places::<T>::ending(qp.dims, self.end).rev() {
-            let Place { nx, nu, n, ng, ld, next, ld_next, .. } = place;
+            let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             // −(p₊ + P₊ r), behind the end of the horizon nothing; then the general constraints.
@@ -251,7 +251,7 @@ impl<T: Real> Riccati<'_, T> {
         let Equations { qp, first, dynamics, .. } = *equations;
         let mut rest = step;
         for place in Places::<T>::new(qp.dims) {
-            let Place { nx, nu, n, ng, ld, next, .. } = place;
+            let StageOffsets { nx, nu, n, ng, ld, next, .. } = place;
             let here = take_mut(&mut rest, place.rows);
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
             let panel = part(self.panels, place.factor, ld * place.pivots);

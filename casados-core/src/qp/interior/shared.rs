@@ -1,7 +1,7 @@
 //! Controls that are the same at all stages: parameters of the recursion, not eliminated by it.
 
 use crate::qp::element::set;
-use crate::qp::layout::{Place, part_mut};
+use crate::qp::layout::{StageOffsets, part_mut};
 use crate::qp::marked;
 use crate::scalar::Real;
 
@@ -28,8 +28,8 @@ impl<'s, T: Real> Shared<'s, T> {
 
     /// Takes rows and columns of shared controls out of `M`, and leaves those of the identity:
     /// elimination passes them by.
-    pub fn set_apart(&mut self, place: &Place, m: &mut [T]) {
-        let Place { nx, nu, n, ld, .. } = *place;
+    pub fn set_apart(&mut self, place: &StageOffsets, m: &mut [T]) {
+        let StageOffsets { nx, nu, n, ld, .. } = *place;
         let rows = || marked(self.marks).filter(|&j| j < nu).map(|j| nx + j);
         for (c, row) in rows().enumerate() {
             let column = part_mut(self.columns, c * self.length + place.v, ld);

@@ -5,7 +5,7 @@ use super::kernels::{Columns, Part, Source, mirror, product};
 use super::riccati::{Equations, First, Riccati};
 use super::shared::Shared;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, assign, pad, part, part_mut};
+use crate::qp::layout::{StageOffsets, assign, pad, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Riccati<'_, T> {
@@ -13,14 +13,14 @@ impl<T: Real> Riccati<'_, T> {
     #[inline(always)]
     pub fn factor_stage<E: Packed<T>>(
         &mut self,
-        place: &Place,
+        place: &StageOffsets,
         equations: &Equations<'_, T>,
         scratch: &mut [T],
         shared: &mut Shared<'_, T>,
     ) -> Result<(), QpError> {
         self.assemble::<E>(place, equations);
         shared.set_apart(place, self.m);
-        let Place { nx, nu, n, ld, stage, .. } = *place;
+        let StageOffsets { nx, nu, n, ld, stage, .. } = *place;
         let Equations { qp, first, indefinite, .. } = *equations;
         let largest = self.largest;
         let inverse = part_mut(self.inverse, place.v, ld);
@@ -85,8 +85,8 @@ impl<T: Real> Riccati<'_, T> {
     /// `M`: of the controls' columns everything but what is above the diagonal among controls, of
     /// the states' the lower triangle.
     #[inline(always)]
-    fn assemble<E: Packed<T>>(&mut self, place: &Place, equations: &Equations<'_, T>) {
-        let Place { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
+    fn assemble<E: Packed<T>>(&mut self, place: &StageOffsets, equations: &Equations<'_, T>) {
+        let StageOffsets { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
         let Equations { qp, first, objective, .. } = *equations;
         let data = part(qp.data, place.data, place.data_len());
         let weights = part(equations.weights, place.row, place.rows);
