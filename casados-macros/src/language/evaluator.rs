@@ -92,6 +92,8 @@ pub struct Evaluator {
     pub(super) returns: Type,
     /// The number of branches around the function that is being executed.
     pub(super) function_branches: usize,
+    /// Whether the pattern that is being matched cannot fail, so that its names are variables.
+    pub(super) irrefutable: bool,
     /// What has been written to in the branches that are being executed.
     journals: Vec<Journal>,
     numbers: HashMap<String, u32>,

@@ -46,6 +46,14 @@ fn refusals() {
     refused("unsafe { x[0] }", "unsafe code");
     refused("const A: f64 = B; const B: f64 = A; A", "in terms of itself");
     refused("let [a, b] = x; a", "does not match");
+    refused(
+        "let mut s = 0.0; for i in 0..6 { s += match i { LIMIT => 0.0, _ => x[i] }; } s",
+        "as an integer",
+    );
+    refused("match (x[0], 1usize) { (_, LIMIT) => 0.0, _ => x[1] }", "as an integer");
+    refused("use crate::Mode::*; match Some(2) { Some(Fast) => x[0], _ => x[1] }", "as an integer");
+    refused("match u8::try_from(-1) { Ok(_) => x[0], Err(e) => x[1] }", "write `Err(_)`");
+    refused("match Some(1) { Many(n) => x[0], _ => x[1] }", "this pattern on an `Option`");
     refused("let p = Point { x: 1.0 }; p.x", "does not see the definition of `Point`");
     refused(
         "let mut a = x[0]; let mut b = x[1]; let r = if x[2] > 0.0 { &mut a } else { &mut b }; *r",
@@ -134,6 +142,20 @@ fn dual_models_need_their_feature() {
     let error = crate::language::dual::require_feature(&function, false).unwrap_err().to_string();
     assert!(error.contains("needs the feature `num-dual`") && error.contains("with `f64`"), "{error}");
     assert!(crate::language::dual::require_feature(&function, true).is_ok());
+}
+
+/// A capital makes a name in a pattern a constant where the pattern may fail.
+#[test]
+fn constants_from_outside_in_patterns() {
+    let source = "fn f(x: [f64; 6]) -> f64 {
+        let M = x[1]; let (A, [B, ..]) = (x[2], x); let g = |C: f64| C * M;
+        match x[0] { LIMIT => g(A), crate::OTHER => B, _ => x[3] } }";
+    let (evaluator, list) = evaluate(source).unwrap();
+    let value = |opaque: &[f64]| {
+        let variables = &[2.0, 3.0, 5.0, 7.0];
+        evaluator.graph.evaluate(&list, crate::graph::Point { variables, opaque, seeds: &[] })[0]
+    };
+    assert_eq!((value(&[2.0, 1.0]), value(&[1.0, 2.0]), value(&[1.0, 1.0])), (15.0, 2.0, 7.0));
 }
 
 #[test]
