@@ -153,7 +153,7 @@ impl Evaluator {
         }
         let mut arguments = call.arguments;
         // `f64::sqrt(x)` and `Trait::method(x)` are method calls.
-        if (builtin.owner.is_some() || builtin.path.len() > 1) && !arguments.is_empty() {
+        if self.is_method(builtin) && !arguments.is_empty() {
             let first = arguments.remove(0);
             let receiver = self.dereferenced(Receiver::Value(first), at)?;
             if let Some(value) =
@@ -174,6 +174,25 @@ impl Evaluator {
             ),
         )
         .into())
+    }
+
+    /// Whether a path leads to a method: of a type that is known, or of a trait of the language, of
+    /// a crate that it knows, or that the macro sees. A module that the macro does not see has
+    /// functions of its own.
+    fn is_method(&self, builtin: &Builtin) -> bool {
+        let is_seen = |name: &String| {
+            let mut traits = self.implementations.iter().filter_map(|implementation| {
+                implementation.of.as_ref().and_then(|path| path.segments.last())
+            });
+            traits.any(|of| of.ident == name)
+        };
+        match builtin.path.as_slice() {
+            _ if builtin.owner.is_some() => true,
+            [first, _, ..] if CRATES.contains(&first.as_str()) => true,
+            [of, _] if TRAITS.contains(&of.as_str()) => true,
+            [.., of, _] => is_seen(of),
+            _ => false,
+        }
     }
 
     /// A method by name: the user's first, then built-in ones.
@@ -269,6 +288,20 @@ impl Evaluator {
         Err(unsupported(at, format!("the method `{name}` of {}", value.kind())).into())
     }
 }
+
+/// Crates of which functions are methods.
+const CRATES: &[&str] =
+    &["core", "std", "alloc", "nalgebra", "na", "simba", "num_traits", "num_dual", "libm", "casados"];
+
+/// Traits of the language and of those crates, as their methods are called by path.
+#[rustfmt::skip]
+const TRAITS: &[&str] = &[
+    "Add", "Sub", "Mul", "Div", "Rem", "Neg", "Not", "AddAssign", "SubAssign", "MulAssign", "DivAssign",
+    "RemAssign", "Index", "IndexMut", "PartialEq", "PartialOrd", "Eq", "Ord", "Clone", "Copy", "Default",
+    "From", "Into", "TryFrom", "TryInto", "AsRef", "AsMut", "Borrow", "ToOwned", "Iterator", "IntoIterator",
+    "DoubleEndedIterator", "ExactSizeIterator", "Sum", "Product", "Float", "FloatCore", "ComplexField",
+    "RealField", "DualNum",
+];
 
 /// What the context of a call tells about its arguments: `Some(x)` hands its type down.
 fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {

@@ -2,7 +2,8 @@
 
 use super::Table;
 use super::environment::Scope;
-use super::items::{Implementation, Symbol};
+use super::implementation::Implementation;
+use super::items::Symbol;
 use super::place::Cell;
 use super::types::Type;
 use super::value::{Calls, Integer, Value};

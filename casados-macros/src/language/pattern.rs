@@ -12,7 +12,6 @@ use super::place::{Place, Projection};
 use super::types::Type;
 use super::value::Value;
 use crate::graph::Node;
-use quote::ToTokens;
 use std::cell::RefCell;
 use std::rc::Rc;
 use syn::ext::IdentExt;
@@ -347,7 +346,7 @@ impl Evaluator {
                 if !self.irrefutable && ident.unraw().to_string().starts_with(char::is_uppercase) =>
             {
                 let known = methods::constant(self, &builtin);
-                Some(known.unwrap_or_else(|| Value::Opaque(Rc::new(path.to_token_stream()))))
+                Some(known.unwrap_or_else(|| Value::Opaque(Rc::new(self.emitted_path(&builtin, &path)))))
             }
             _ => None,
         })

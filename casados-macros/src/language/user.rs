@@ -4,7 +4,7 @@ use super::arithmetic::Operator;
 use super::call::Arguments;
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator, error};
-use super::items::Implementation;
+use super::implementation::Implementation;
 use super::methods::Receiver;
 use super::place::Place;
 use super::types::Type;

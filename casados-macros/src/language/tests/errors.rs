@@ -30,6 +30,14 @@ fn refusals() {
     refused("x[x[0] as usize]", "has no derivative");
     refused("unknown(x[0])", "does not see the function `unknown`");
     refused("crate::params::mass(x[0])", "does not see the function `crate::params::mass`");
+    for call in ["smooth::abs(x[0])", "crate::smooth::max(x[0], x[1])", "super::helpers::sin(x[0])"] {
+        refused(call, "does not see the function");
+    }
+    refused("use crate::smooth::abs; abs(x[0])", "does not see the function `crate::smooth::abs`");
+    refused("Outside::sqrt(x[0])", "does not see the function `Outside::sqrt`");
+    refused("let k: f64 = gains::default(); k * x[0]", "does not see the function `gains::default`");
+    refused("x.map(smooth::abs)[0]", "does not see the function `smooth::abs`");
+    refused("let k: f64 = crate::array::from_fn(|i| 0.0); k", "does not see the function");
     refused("nalgebra::Quaternion::new(x[0], x[1], x[2], x[3]).norm()", "four numbers of the state");
     refused("use nalgebra::DVector; DVector::zeros(3).norm() + x[0]", "`SVector`, `SMatrix`");
     refused("x[0] * 1_u128 as f64", "a model has no `u128`");
