@@ -28,6 +28,7 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
         ("array", "from_ref") | ("convert", "identity") => call.only()?.clone(),
         ("array", "repeat") => {
             let length = array_length(call)?;
+            evaluator.tick(length, at)?;
             Value::array(vec![call.only()?.clone(); length])
         }
         ("iter", _) => return made_iterator(evaluator, name, call),
@@ -182,10 +183,12 @@ pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
             Value::tuple(parts?)
         }
         Type::Array(element, Some(length)) => {
+            evaluator.tick(*length, at)?;
             let element = default(evaluator, element, at)?;
             Value::array(vec![element; *length])
         }
         Type::Matrix(Some(rows), Some(columns)) => {
+            evaluator.tick(rows.saturating_mul(*columns), at)?;
             let zero = Value::Real(evaluator.graph.constant(0.0));
             Value::matrix(*rows, *columns, vec![zero; rows * columns])
         }

@@ -70,6 +70,16 @@ fn refusals() {
     refused("let a = if x[0] > 0.0 { Some(x[0]) } else { None }; 1.0", "between which nothing can choose");
     refused("let n: u8 = 255; let k = n + 1; x[0]", "overflows `u8`");
     refused("1.0f32", "`f64`");
+    refused("let n = (-1i128..).len(); x[n]", "");
+    for many in [
+        "nalgebra::SMatrix::<f64, 100000, 100000>::zeros()[0]",
+        "nalgebra::SMatrix::<f64, 9000000000000000000, 9000000000000000000>::identity()[0]",
+        "let a: [f64; 100000000] = core::array::repeat(0.0); a[0]",
+        "let a: [f64; 100000000] = Default::default(); a[0]",
+        "let a: nalgebra::SMatrix<f64, 9000000000000000000, 9> = Default::default(); a[0]",
+    ] {
+        refused(many, "evaluation steps");
+    }
     refused("let i: i32 = -1; x[i as usize]", "index out of range");
 }
 
