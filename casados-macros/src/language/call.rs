@@ -4,7 +4,7 @@ use super::evaluator::{At, Evaluated, Evaluator, error, opaque, unsupported};
 use super::methods::{self, Call, Receiver};
 use super::path::Named;
 use super::types::Type;
-use super::value::{Builtin, Function, Generic, Struct, Value};
+use super::value::{Builtin, Function, Struct, Value};
 use std::rc::Rc;
 use syn::punctuated::Punctuated;
 use syn::{Expr, Result, Token};
@@ -156,9 +156,7 @@ impl Evaluator {
         if self.is_method(builtin) && !arguments.is_empty() {
             let first = arguments.remove(0);
             let receiver = self.dereferenced(Receiver::Value(first), at)?;
-            if let Some(value) =
-                self.call_method(&receiver, &name, &builtin.turbofish, arguments, expected, at)?
-            {
+            if let Some(value) = self.call_method(&receiver, builtin, arguments, expected, at)? {
                 return Ok(value);
             }
         }
@@ -195,17 +193,21 @@ impl Evaluator {
         }
     }
 
-    /// A method by name: the user's first, then built-in ones.
+    /// A method by path: the user's first, then built-in ones.
     fn call_method(
         &mut self,
         receiver: &Receiver,
-        name: &str,
-        turbofish: &[Generic],
+        builtin: &Builtin,
         arguments: Vec<Value>,
         expected: &Type,
         at: At,
     ) -> Evaluated<Option<Value>> {
-        if let Some((function, receiver)) = self.user_function(receiver, name, turbofish, at)? {
+        let (name, turbofish) = (builtin.path.last().map_or("", String::as_str), &builtin.turbofish);
+        let function = match builtin.owner {
+            Some(_) => self.user_function(receiver, name, turbofish, at)?,
+            None => self.function_of_trait(receiver, builtin, at)?,
+        };
+        if let Some((function, receiver)) = function {
             let mut values = vec![receiver];
             values.extend(arguments);
             return self.call_function(&function, Arguments::Values(values), expected, at).map(Some);
@@ -239,7 +241,7 @@ impl Evaluator {
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
         // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
-        let receiver = self.place(&call.receiver, true)?;
+        let receiver = self.place_expected(&call.receiver, true, &receiver_hint(call, &name, expected))?;
         let receiver = self.dereferenced(receiver, &call.receiver)?;
         let turbofish = match &call.turbofish {
             Some(arguments) => {
@@ -307,6 +309,21 @@ const TRAITS: &[&str] = &[
 fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {
     match (builtin.path.last(), expected) {
         (Some(name), Type::Option(inner)) if name == "Some" => (**inner).clone(),
+        _ => Type::Unknown,
+    }
+}
+
+/// What the context of a call tells about its receiver: `n.try_into().unwrap()` hands its type
+/// down.
+fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Type {
+    match &*call.receiver {
+        Expr::MethodCall(inner)
+            if inner.method == "try_into"
+                && (name == "expect" || name.starts_with("unwrap"))
+                && !matches!(expected, Type::Unknown) =>
+        {
+            Type::Option(Rc::new(expected.clone()))
+        }
         _ => Type::Unknown,
     }
 }

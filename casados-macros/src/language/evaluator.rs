@@ -206,6 +206,23 @@ impl Evaluator {
         Ok((value, changes))
     }
 
+    /// Executes something that happens only if a condition holds at run time.
+    pub(super) fn only_if<T>(
+        &mut self,
+        condition: Node,
+        execute: impl FnOnce(&mut Self) -> Result<T>,
+        at: At,
+    ) -> Result<T> {
+        match self.branch(|evaluator| Ok(execute(evaluator)?)) {
+            Ok((value, changes)) => {
+                self.merge(condition, changes, Vec::new(), at)?;
+                Ok(value)
+            }
+            Err(Flow::Error(error)) => Err(error),
+            Err(_) => Err(error(at, "`break`, `continue` and `return` do not lead out of here")),
+        }
+    }
+
     /// Makes the changes of two branches, of which the first is taken if the condition holds.
     pub(super) fn merge(&mut self, condition: Node, a: Changes, b: Changes, at: At) -> Result<()> {
         let position: HashMap<_, _> =

@@ -37,7 +37,8 @@ impl Evaluator {
         if let Some(qself) = &path.qself {
             let ty = self.resolve(&qself.ty, &scope)?;
             let turbofish = self.generic_arguments(&last.arguments, &scope)?;
-            return Ok(self.member(&ty, name, &last.ident, turbofish, path)?);
+            let of_trait = qself.position > 0;
+            return Ok(self.member(&ty, of_trait, &last.ident, turbofish, path)?);
         }
         if path.path.segments.len() == 1 {
             if last.arguments.is_none()
@@ -65,7 +66,7 @@ impl Evaluator {
         prefix.segments.pop();
         let ty = self.resolve_path(&prefix, &scope, 0)?;
         if !matches!(ty, Type::Unknown) {
-            return Ok(match self.member(&ty, name, &last.ident, turbofish, path)? {
+            return Ok(match self.member(&ty, false, &last.ident, turbofish, path)? {
                 Named::Builtin(builtin) => {
                     Named::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
                 }
@@ -205,18 +206,20 @@ impl Evaluator {
     fn member(
         &mut self,
         ty: &Type,
-        name: Symbol,
+        of_trait: bool,
         ident: &syn::Ident,
         turbofish: Vec<Generic>,
         at: At,
     ) -> Result<Named> {
+        let name = self.symbol(ident);
+        let hidden = !of_trait && self.is_hidden(ty, &ident.to_string());
         if let Type::Struct(definition, arguments) = ty
             && definition.is_enum
             && let Some(variant) = position(definition, &ident.to_string())
         {
             return Ok(Named::Value(constructor(definition.clone(), arguments.clone(), variant)));
         }
-        if let Some((implementation, item)) = self.find_function(name, ty) {
+        if !hidden && let Some((implementation, item)) = self.find_function(name, ty) {
             let scope = implementation.scope.clone();
             let owner = Some((implementation, ty.clone()));
             return Ok(Named::Value(Value::Function(Rc::new(Function { item, scope, turbofish, owner }))));

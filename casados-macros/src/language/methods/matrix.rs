@@ -106,7 +106,13 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
             let other = argument(evaluator, call, 0)?;
             same_shape(matrix, &other, call)?;
             let difference = zip(evaluator, matrix, &other, Binary::Sub, at)?;
-            let squared = norm_squared(evaluator, &difference, at)?;
+            // One after the other, not as `dot` sums.
+            let mut squared = evaluator.graph.constant(0.0);
+            for element in &difference.elements {
+                let element = evaluator.real(element, at)?;
+                let square = evaluator.graph.binary(Binary::Mul, element, element);
+                squared = evaluator.graph.binary(Binary::Add, squared, square);
+            }
             real(evaluator.graph.unary(Unary::Sqrt, squared))
         }
         "scale" | "unscale" => {

@@ -70,6 +70,15 @@ fn refusals() {
     refused("let a = if x[0] > 0.0 { Some(x[0]) } else { None }; 1.0", "between which nothing can choose");
     refused("let n: u8 = 255; let k = n + 1; x[0]", "overflows `u8`");
     refused("1.0f32", "`f64`");
+    refused("let mut f = 1; for k in 1..14 { f *= k; } x[0] * f as f64", "overflows `i32`: if another type");
+    refused("x[0] * (1 << 31) as f64", "overflows `i32`");
+    refused(
+        "let mut r = [0.0; 3]; for i in 0..3 { for j in 0..3 { r[i] += (i - j) as f64 * x[j]; } } r[0]",
+        "overflows `usize`",
+    );
+    refused("let k = 2i32; let n = (k - 5).try_into().unwrap_or(0); x[n]", "write `usize::try_from(..)`");
+    refused("let k = 300i32; let n: u8 = k.into(); x[0]", "300 does not fit into `u8`");
+    refused("x[0].clamp(1.0, 0.0)", "the bounds of `clamp` are 1 > 0");
     refused("let n = (-1i128..).len(); x[n]", "");
     for many in [
         "nalgebra::SMatrix::<f64, 100000, 100000>::zeros()[0]",
