@@ -34,13 +34,23 @@ impl Evaluator {
         if matches!(ty, Type::Unknown) {
             return Ok(None);
         }
-        if self.is_hidden(&ty, name) {
+        let hidden = self.is_hidden(&ty, name);
+        // Methods of numbers take `self`, those of matrices `&self`: a trait's `self` comes first.
+        let by_reference = matches!(ty, Type::Matrix(..));
+        if hidden && !by_reference {
             return Ok(None);
         }
-        self.trait_function(receiver, (ty, symbol), turbofish, at)
+        let found = self.trait_function(receiver, (ty, symbol), turbofish, at)?;
+        Ok(found.filter(|(function, _)| {
+            !hidden
+                || matches!(
+                    function.item.sig.inputs.first(),
+                    Some(syn::FnArg::Receiver(own)) if !matches!(own.kind, syn::ReceiverKind::Reference(..))
+                )
+        }))
     }
 
-    /// Whether a number has a method of its own of a name that hides those of traits. Where the
+    /// Whether a value has a method of its own of a name that hides those of traits. Where the
     /// type is a parameter, or `Self` of a trait, there are only those of traits.
     pub(super) fn is_hidden(&self, ty: &Type, name: &str) -> bool {
         let is_generic = |scope: &Rc<Scope>| match &scope.names {

@@ -87,6 +87,11 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
         "copysign" => {
             let [sign] = numbers(evaluator, call)?;
             let size = evaluator.graph.unary(Unary::Abs, a);
+            if let Some(known) = evaluator.graph.value(sign) {
+                let negative = known.is_sign_negative();
+                let value = if negative { evaluator.graph.unary(Unary::Neg, size) } else { size };
+                return Ok(Some(Value::Real(value)));
+            }
             let sign = evaluator.graph.unary(Unary::Signum, sign);
             evaluator.graph.binary(Binary::Mul, size, sign)
         }

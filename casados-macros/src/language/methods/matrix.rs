@@ -29,6 +29,18 @@ pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> 
     (row < rows && column < columns).then_some((row, column))
 }
 
+/// Whether nalgebra has a method of a name, which all take `&self`.
+#[rustfmt::skip]
+pub fn is_inherent(name: &str) -> bool {
+    const NAMES: &[&str] = &[
+        "abs", "add_scalar", "column", "component_div", "component_mul", "cross", "cross_matrix", "determinant",
+        "diagonal", "dot", "iter", "len", "magnitude", "magnitude_squared", "map", "max", "mean",
+        "metric_distance", "min", "norm", "norm_squared", "normalize", "product", "row", "scale", "sum",
+        "tr_dot", "trace", "transpose", "unscale", "zip_map",
+    ];
+    NAMES.contains(&name)
+}
+
 /// A method of a matrix. `None` if there is no such method.
 pub fn method(
     evaluator: &mut Evaluator,

@@ -111,11 +111,12 @@ pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Re
     common(evaluator, value, call)
 }
 
-/// Whether a number has a method of its own of a name, which hides those of traits.
+/// Whether a number or a matrix has a method of its own of a name, which hides those of traits.
 pub fn is_inherent(ty: &Type, name: &str) -> bool {
     match ty {
         Type::Real => float::is_inherent(name),
         Type::Integer(_) => integer::is_inherent(name),
+        Type::Matrix(..) => matrix::is_inherent(name),
         _ => false,
     }
 }

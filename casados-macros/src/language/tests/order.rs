@@ -63,6 +63,7 @@ same! {
         let cast = |mode: Mode| { mode as usize as f64 };
         { const BASE: usize = 7; x[Mode::B as usize] + cast(Mode::A) * x[BASE - 4] }
     }
+    signs: fn f(x: [f64; 6]) -> f64 { x[0].copysign(f64::NAN) + 3.0 * x[1].copysign(-0.0) + x[2].copysign(2.0) * 9.0 }
     own_methods_first: fn f(x: [f64; 6]) -> f64 {
         trait Smooth { fn abs(self) -> f64; fn pow(self, n: u32) -> f64; fn half(self) -> f64; fn both(self) -> f64 where Self: Sized + Copy { self.abs() + self.half() } }
         impl Smooth for f64 {
