@@ -74,27 +74,8 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
             let [b] = numbers(evaluator, call)?;
             smaller(evaluator, a, b)
         }
-        "clamp" => {
-            let [low, high] = numbers(evaluator, call)?;
-            if let (Some(low), Some(high)) = (evaluator.graph.value(low), evaluator.graph.value(high))
-                && !matches!(low.partial_cmp(&high), Some(Ordering::Less | Ordering::Equal))
-            {
-                return Err(error(call.at, format!("the bounds of `clamp` are {low} > {high}, or NaN")));
-            }
-            let a = larger(evaluator, a, low);
-            smaller(evaluator, a, high)
-        }
-        "copysign" => {
-            let [sign] = numbers(evaluator, call)?;
-            let size = evaluator.graph.unary(Unary::Abs, a);
-            if let Some(known) = evaluator.graph.value(sign) {
-                let negative = known.is_sign_negative();
-                let value = if negative { evaluator.graph.unary(Unary::Neg, size) } else { size };
-                return Ok(Some(Value::Real(value)));
-            }
-            let sign = evaluator.graph.unary(Unary::Signum, sign);
-            evaluator.graph.binary(Binary::Mul, size, sign)
-        }
+        "clamp" => clamp(evaluator, a, call)?,
+        "copysign" => copysign(evaluator, a, call)?,
         "to_radians" => {
             call.expect(0)?;
             let factor = evaluator.graph.constant(core::f64::consts::PI / 180.0);
@@ -108,6 +89,30 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
         _ => return known(evaluator, a, call),
     };
     Ok(Some(Value::Real(value)))
+}
+
+fn clamp(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
+    let [low, high] = numbers(evaluator, call)?;
+    if let (Some(low), Some(high)) = (evaluator.graph.value(low), evaluator.graph.value(high))
+        && !matches!(low.partial_cmp(&high), Some(Ordering::Less | Ordering::Equal))
+    {
+        return Err(error(call.at, format!("the bounds of `clamp` are {low} > {high}, or NaN")));
+    }
+    let a = larger(evaluator, a, low);
+    Ok(smaller(evaluator, a, high))
+}
+
+fn copysign(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
+    let [sign] = numbers(evaluator, call)?;
+    let size = evaluator.graph.unary(Unary::Abs, a);
+    Ok(match evaluator.graph.value(sign) {
+        Some(sign) if sign.is_sign_negative() => evaluator.graph.unary(Unary::Neg, size),
+        Some(_) => size,
+        None => {
+            let sign = evaluator.graph.unary(Unary::Signum, sign);
+            evaluator.graph.binary(Binary::Mul, size, sign)
+        }
+    })
 }
 
 /// `a` if it is not less than `b`.

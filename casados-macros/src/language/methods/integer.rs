@@ -78,11 +78,8 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         "checked_mul" => checked(x.checked_mul(y)),
         "checked_div" => checked(x.checked_div(y)),
         "checked_pow" => checked(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
-        "count_ones" => {
-            // Negative numbers have the bits of their type.
-            let width = ty.map_or(32, IntegerType::bits);
-            Ok(Some(bits((x << (128 - width)).count_ones())))
-        }
+        // Negative numbers have the bits of their type.
+        "count_ones" => Ok(Some(bits((x << (128 - ty.map_or(32, IntegerType::bits))).count_ones()))),
         "trailing_zeros" => {
             Ok(Some(bits(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() })))
         }
