@@ -207,8 +207,51 @@ fn models_that_branch_take_a_pass_for_each_variable() {
     assert_eq!((passes.len(), passes.pairs().len()), (7, 28));
 }
 
+/// Each constant is evaluated once.
+#[ode]
+mod doubled {
+    use num_dual::DualNum;
+
+    const C0: usize = 1;
+    const C1: usize = C0 * C0;
+    const C2: usize = C1 * C1;
+    const C3: usize = C2 * C2;
+    const C4: usize = C3 * C3;
+    const C5: usize = C4 * C4;
+    const C6: usize = C5 * C5;
+    const C7: usize = C6 * C6;
+    const C8: usize = C7 * C7;
+    const C9: usize = C8 * C8;
+    const C10: usize = C9 * C9;
+    const C11: usize = C10 * C10;
+    const C12: usize = C11 * C11;
+    const C13: usize = C12 * C12;
+    const C14: usize = C13 * C13;
+    const C15: usize = C14 * C14;
+    const C16: usize = C15 * C15;
+    const C17: usize = C16 * C16;
+    const C18: usize = C17 * C17;
+    const C19: usize = C18 * C18;
+    const C20: usize = C19 * C19;
+    const C21: usize = C20 * C20;
+    const C22: usize = C21 * C21;
+    const C23: usize = C22 * C22;
+    const C24: usize = C23 * C23;
+    const C25: usize = C24 * C24;
+    const C26: usize = C25 * C25;
+    const C27: usize = C26 * C26;
+    const C28: usize = C27 * C27;
+    const C29: usize = C28 * C28;
+    const C30: usize = C29 * C29;
+
+    pub fn doubled<T: DualNum<Primitive = f64> + Copy>(x: [T; C30]) -> [T; C30] {
+        x.map(|x| -x)
+    }
+}
+
 #[test]
 fn explicit_models_are_explicit() {
+    assert_eq!(Doubled::STRUCTURE.x.len(), doubled::doubled([1.0]).len());
     assert_eq!(Spring::ROWS, [(0, 1.0), (1, 1.0)]);
     assert_eq!(Spring::STRUCTURE.u, ["u"]);
     assert_eq!(Spring::STRUCTURE.p, ["p[0]", "p[1]"]);

@@ -29,6 +29,20 @@ macro_rules! two_variables {
 
 two_variables!(s, s * 2.0);
 
+/// The same for raw names.
+macro_rules! raw_variables {
+    ($s:ident) => {
+        #[ode]
+        fn raw_names(x: f64) -> f64 {
+            let $s = x + 0.5;
+            let r#in = 2.0 * x;
+            $s * r#in - x
+        }
+    };
+}
+
+raw_variables!(r#in);
+
 /// Constants with the names of what is emitted.
 #[ode]
 #[allow(non_upper_case_globals)]
@@ -78,6 +92,7 @@ fn operations_keep_their_precedence() {
 
 #[test]
 fn variables_of_a_macro_are_its_own() {
+    same_bits::<RawNames>(|v| vec![v[0] - raw_names(v[1])]);
     same_bits::<Hygiene>(|v| {
         let rate = hygiene([v[2], v[3]]);
         vec![v[0] - rate[0], v[1] - rate[1]]

@@ -34,6 +34,7 @@ mod macros;
 mod modules;
 #[path = "nalgebra.rs"]
 mod nalgebra_values;
+mod paths;
 mod statements;
 mod tables;
 mod traits;

@@ -22,7 +22,8 @@ fn vectors(xdot: Vector6<f64>, x: Vector6<f64>, u: Vector3<f64>) -> Vector6<f64>
     let four = Vector4::from([x[0], x[1], x[2], x[3]]);
     let five = SVector::<f64, 5>::from_fn(|i, _| x[i] * i as f64);
     let nine = SVector::<f64, 9>::from_column_slice(&[x[0], x[1], x[2], x[3], x[4], x[5], u[0], u[1], u[2]]);
-    let lengths = four.dot(&four) + five.norm() + nine.norm_squared() + x.norm();
+    let lengths =
+        four.dot(&four) + five.norm() + nine.norm_squared() + x.norm() + nine.metric_distance(&(nine * 0.7));
     let mut f = xdot - x * lengths;
     for i in 0..3 {
         f[i] -= d[i];

@@ -122,6 +122,43 @@ mod defaults {
     }
 }
 
+/// A method of nalgebra comes before one of a trait that takes `&self`, not before one that takes
+/// `self`.
+#[ode]
+mod hidden {
+    use nalgebra::Vector3;
+
+    trait Smooth {
+        fn norm(&self) -> f64;
+        fn sum(self) -> f64;
+    }
+    impl Smooth for Vector3<f64> {
+        fn norm(&self) -> f64 {
+            (self.dot(self) + 0.01).sqrt()
+        }
+        fn sum(self) -> f64 {
+            self.x * self.y * self.z
+        }
+    }
+
+    fn of_any<T: Smooth>(v: &T) -> f64 {
+        v.norm()
+    }
+
+    pub fn hidden(x: Vector3<f64>) -> [f64; 3] {
+        let rate = x.norm() + 2.0 * Smooth::norm(&x) + 3.0 * of_any(&x);
+        [rate, x.sum(), Vector3::norm(&x)]
+    }
+}
+
+#[test]
+fn own_methods_hide_those_of_traits() {
+    same_bits::<hidden::Hidden>(|v| {
+        let rates = hidden::hidden(nalgebra::Vector3::new(v[3], v[4], v[5]));
+        (0..3).map(|i| v[i] - rates[i]).collect()
+    });
+}
+
 #[test]
 fn conversions_between_types() {
     same_bits::<Conversions>(|v| {

@@ -7,7 +7,8 @@
 
 use super::{Binary, Graph, Node, Op, Unary};
 
-/// Selections deeper than this are multiplied from outside: work stays linear in their depth.
+/// Selections nest at most this deeply, so that work stays linear in their depth: more are one by
+/// all of their conditions.
 const DEPTH: usize = 8;
 
 /// Sums of selections nested deeper than this are multiplied from outside.
@@ -43,14 +44,27 @@ impl Graph {
     /// Puts a value into branches.
     fn wrap(&mut self, mut a: Node, mut branches: Vec<Branch>) -> Node {
         let zero = self.constant(0.0);
+        let mut left = Vec::new();
         while let Some((condition, taken)) = branches.pop() {
             if branches.contains(&(condition, !taken)) {
                 return zero;
             }
             if !branches.contains(&(condition, taken)) {
-                let (x, y) = if taken { (a, zero) } else { (zero, a) };
-                a = self.select(condition, x, y);
+                left.push((condition, taken));
             }
+        }
+        // No selection may be deeper than `peel` reaches: many become one.
+        if left.len() > DEPTH {
+            let mut all = None;
+            for (condition, taken) in left {
+                let condition = if taken { condition } else { self.not(condition) };
+                all = Some(all.map_or(condition, |all| self.and(all, condition)));
+            }
+            return all.map_or(a, |all| self.select(all, a, zero));
+        }
+        for (condition, taken) in left {
+            let (x, y) = if taken { (a, zero) } else { (zero, a) };
+            a = self.select(condition, x, y);
         }
         a
     }

@@ -1,11 +1,11 @@
 //! Fields, elements and slices: expressions that name a place.
 
 use super::evaluator::{At, Evaluated, Evaluator, error, opaque};
-use super::methods::Receiver;
+use super::methods::{self, Receiver};
 use super::path::Named;
 use super::place::{Place, Projection};
 use super::types::Type;
-use super::value::{IntegerType, Range, Value};
+use super::value::{Integer, IntegerType, Range, Value};
 use quote::{ToTokens, quote};
 use std::rc::Rc;
 use syn::{Expr, Result};
@@ -104,6 +104,9 @@ impl Evaluator {
             expression => self.expression(expression, &hint)?,
         };
         let position = self.load(position, &index.index)?;
+        if matches!(hint, Type::Integer(_)) {
+            self.becomes_index(&index.index);
+        }
         let projection = match (&value, &position) {
             (Value::Struct(_), _) => {
                 let name = if mutable { "index_mut" } else { "index" };
@@ -161,6 +164,18 @@ impl Evaluator {
         }
     }
 
+    /// An integer variable that is an index is a `usize`, if nothing else has told its type.
+    fn becomes_index(&mut self, index: &Expr) {
+        let Expr::Path(path) = index else { return };
+        let Some(name) = path.path.get_ident() else { return };
+        let symbol = self.symbol(name);
+        if let Some(cell) = self.scope.variable(symbol)
+            && let Value::Integer(Integer { ty: ty @ None, .. }) = &mut *cell.borrow_mut()
+        {
+            *ty = Some(IntegerType::Usize);
+        }
+    }
+
     /// First and end of a range of indices.
     pub fn bounds(&mut self, range: &Range, length: usize, at: At) -> Result<(usize, usize)> {
         let start = match &range.start {
@@ -185,24 +200,8 @@ fn field_projection(value: &Value, member: &syn::Member) -> std::result::Result<
             fields.iter().position(|(field, _)| *field == name).map(Projection::Field).ok_or(())
         }
         (Value::Matrix(matrix), syn::Member::Named(name)) => {
-            let name = name.to_string();
-            if matrix.rows == 1 || matrix.columns == 1 {
-                let index =
-                    ["x", "y", "z", "w", "a", "b"].iter().position(|field| *field == name).ok_or(())?;
-                return Ok(if matrix.columns == 1 {
-                    Projection::Element(index, 0)
-                } else {
-                    Projection::Element(0, index)
-                });
-            }
-            let digits: Vec<usize> = match name.strip_prefix('m') {
-                Some(digits) => digits.chars().filter_map(|c| c.to_digit(10)).map(|d| d as usize).collect(),
-                None => return Err(()),
-            };
-            match digits.as_slice() {
-                &[row, column] if row > 0 && column > 0 => Ok(Projection::Element(row - 1, column - 1)),
-                _ => Err(()),
-            }
+            let element = methods::matrix_field(&name.to_string(), matrix.rows, matrix.columns);
+            element.map(|(row, column)| Projection::Element(row, column)).ok_or(())
         }
         _ => Err(()),
     }

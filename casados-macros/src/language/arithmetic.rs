@@ -368,8 +368,11 @@ pub fn integer_operator(operator: Operator, a: Integer, b: Integer) -> std::resu
             }
         }
     };
+    // Without a type it is `i32`, unless the compiler finds another one.
+    let value = value.filter(|&value| ty.is_some() || i32::try_from(value).is_ok());
     fit(value, ty).ok_or_else(|| {
-        let name = ty.map_or("i128", IntegerType::name);
-        format!("attempt to compute `{x} {} {y}`, which overflows `{name}`", operator.symbol())
+        let name = ty.map_or("i32", IntegerType::name);
+        let text = format!("attempt to compute `{x} {} {y}`, which overflows `{name}`", operator.symbol());
+        if ty.is_some() { text } else { format!("{text}: if another type is meant, write it, as in `1_i64`") }
     })
 }

@@ -3,6 +3,7 @@
 use super::arithmetic::Operator;
 use super::evaluator::{Evaluated, Evaluator, error};
 use super::methods::Receiver;
+use super::place::Place;
 use super::types::Type;
 use super::value::Value;
 use quote::ToTokens;
@@ -19,17 +20,34 @@ impl Evaluator {
                 self.assign_parts(&assign.left, value)?;
             }
             left => {
-                let Receiver::Place(place) = self.place(left, true)? else {
-                    return Err(error(left, "this cannot be assigned to").into());
+                let place = self.assigned(left);
+                // The right side comes first, and may change which place this is.
+                let place = if is_plain(left) { place.ok() } else { Some(place?) };
+                let expected = match &place {
+                    Some(place) => {
+                        let old = self.read(place, left)?;
+                        self.type_of(&old)
+                    }
+                    None => Type::Unknown,
                 };
-                let old = self.read(&place, left)?;
-                let expected = self.type_of(&old);
                 let value = self.expression(&assign.right, &expected)?;
                 let value = self.coerce(value, &expected, &assign.right)?;
+                let place = match place {
+                    Some(place) if !is_plain(left) || is_plain(&assign.right) => place,
+                    _ => self.assigned(left)?,
+                };
                 self.write(&place, value, assign)?;
             }
         }
         Ok(Value::unit())
+    }
+
+    /// The place on the left of an assignment.
+    fn assigned(&mut self, left: &Expr) -> Evaluated<Place> {
+        match self.place(left, true)? {
+            Receiver::Place(place) => Ok(place),
+            Receiver::Value(_) => Err(error(left, "this cannot be assigned to").into()),
+        }
     }
 
     /// Destructuring assignment.
@@ -123,9 +141,41 @@ impl Evaluator {
         {
             return Ok(Value::unit());
         }
+        // Of numbers the right side comes first, and may change which place this is.
+        let is_number = matches!(
+            before,
+            Value::Real(_) | Value::Integer(_) | Value::Bool(_) | Value::Condition(_) | Value::Opaque(_)
+        );
+        let place = if is_number && is_plain(&binary.left) && !is_plain(&binary.right) {
+            let place = self.assigned(&binary.left)?;
+            self.follow(place, binary)?
+        } else {
+            place
+        };
         let before = self.read(&place, binary)?;
         let value = self.binary(operator, &before, &right, binary)?;
         self.write(&place, value, binary)?;
         Ok(Value::unit())
+    }
+}
+
+/// Whether an expression changes nothing.
+fn is_plain(expression: &Expr) -> bool {
+    match expression {
+        Expr::Path(_) | Expr::Lit(_) => true,
+        Expr::Field(field) => is_plain(&field.base),
+        Expr::Index(index) => is_plain(&index.expr) && is_plain(&index.index),
+        Expr::Paren(inner) => is_plain(&inner.expr),
+        Expr::Group(inner) => is_plain(&inner.expr),
+        Expr::Cast(cast) => is_plain(&cast.expr),
+        Expr::Unary(unary) => is_plain(&unary.expr),
+        Expr::Binary(binary) => {
+            super::operator::operator(&binary.op).is_some()
+                && is_plain(&binary.left)
+                && is_plain(&binary.right)
+        }
+        Expr::Tuple(tuple) => tuple.elems.iter().all(is_plain),
+        Expr::Range(range) => [&range.start, &range.end].into_iter().flatten().all(|end| is_plain(end)),
+        _ => false,
     }
 }

@@ -4,7 +4,7 @@ use super::evaluator::{At, Evaluated, Evaluator, error, opaque, unsupported};
 use super::methods::{self, Call, Receiver};
 use super::path::Named;
 use super::types::Type;
-use super::value::{Builtin, Function, Generic, Struct, Value};
+use super::value::{Builtin, Function, Struct, Value};
 use std::rc::Rc;
 use syn::punctuated::Punctuated;
 use syn::{Expr, Result, Token};
@@ -153,12 +153,10 @@ impl Evaluator {
         }
         let mut arguments = call.arguments;
         // `f64::sqrt(x)` and `Trait::method(x)` are method calls.
-        if (builtin.owner.is_some() || builtin.path.len() > 1) && !arguments.is_empty() {
+        if self.is_method(builtin) && !arguments.is_empty() {
             let first = arguments.remove(0);
             let receiver = self.dereferenced(Receiver::Value(first), at)?;
-            if let Some(value) =
-                self.call_method(&receiver, &name, &builtin.turbofish, arguments, expected, at)?
-            {
+            if let Some(value) = self.call_method(&receiver, builtin, arguments, expected, at)? {
                 return Ok(value);
             }
         }
@@ -176,17 +174,40 @@ impl Evaluator {
         .into())
     }
 
-    /// A method by name: the user's first, then built-in ones.
+    /// Whether a path leads to a method: of a type that is known, or of a trait of the language, of
+    /// a crate that it knows, or that the macro sees. A module that the macro does not see has
+    /// functions of its own.
+    fn is_method(&self, builtin: &Builtin) -> bool {
+        let is_seen = |name: &String| {
+            let mut traits = self.implementations.iter().filter_map(|implementation| {
+                implementation.of.as_ref().and_then(|path| path.segments.last())
+            });
+            traits.any(|of| of.ident == name)
+        };
+        match builtin.path.as_slice() {
+            _ if builtin.owner.is_some() => true,
+            [first, _, ..] if CRATES.contains(&first.as_str()) => true,
+            [of, _] if TRAITS.contains(&of.as_str()) => true,
+            [.., of, _] => is_seen(of),
+            _ => false,
+        }
+    }
+
+    /// A method by path: the user's first, then built-in ones.
     fn call_method(
         &mut self,
         receiver: &Receiver,
-        name: &str,
-        turbofish: &[Generic],
+        builtin: &Builtin,
         arguments: Vec<Value>,
         expected: &Type,
         at: At,
     ) -> Evaluated<Option<Value>> {
-        if let Some((function, receiver)) = self.user_function(receiver, name, turbofish, at)? {
+        let (name, turbofish) = (builtin.path.last().map_or("", String::as_str), &builtin.turbofish);
+        let function = match builtin.owner {
+            Some(_) => self.user_function(receiver, name, turbofish, at)?,
+            None => self.function_of_trait(receiver, builtin, at)?,
+        };
+        if let Some((function, receiver)) = function {
             let mut values = vec![receiver];
             values.extend(arguments);
             return self.call_function(&function, Arguments::Values(values), expected, at).map(Some);
@@ -220,7 +241,7 @@ impl Evaluator {
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
         // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
-        let receiver = self.place(&call.receiver, true)?;
+        let receiver = self.place_expected(&call.receiver, true, &receiver_hint(call, &name, expected))?;
         let receiver = self.dereferenced(receiver, &call.receiver)?;
         let turbofish = match &call.turbofish {
             Some(arguments) => {
@@ -270,10 +291,39 @@ impl Evaluator {
     }
 }
 
+/// Crates of which functions are methods.
+const CRATES: &[&str] =
+    &["core", "std", "alloc", "nalgebra", "na", "simba", "num_traits", "num_dual", "libm", "casados"];
+
+/// Traits of the language and of those crates, as their methods are called by path.
+#[rustfmt::skip]
+const TRAITS: &[&str] = &[
+    "Add", "Sub", "Mul", "Div", "Rem", "Neg", "Not", "AddAssign", "SubAssign", "MulAssign", "DivAssign",
+    "RemAssign", "Index", "IndexMut", "PartialEq", "PartialOrd", "Eq", "Ord", "Clone", "Copy", "Default",
+    "From", "Into", "TryFrom", "TryInto", "AsRef", "AsMut", "Borrow", "ToOwned", "Iterator", "IntoIterator",
+    "DoubleEndedIterator", "ExactSizeIterator", "Sum", "Product", "Float", "FloatCore", "ComplexField",
+    "RealField", "DualNum",
+];
+
 /// What the context of a call tells about its arguments: `Some(x)` hands its type down.
 fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {
     match (builtin.path.last(), expected) {
         (Some(name), Type::Option(inner)) if name == "Some" => (**inner).clone(),
+        _ => Type::Unknown,
+    }
+}
+
+/// What the context of a call tells about its receiver: `n.try_into().unwrap()` hands its type
+/// down.
+fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Type {
+    match &*call.receiver {
+        Expr::MethodCall(inner)
+            if inner.method == "try_into"
+                && (name == "expect" || name.starts_with("unwrap"))
+                && !matches!(expected, Type::Unknown) =>
+        {
+            Type::Option(Rc::new(expected.clone()))
+        }
         _ => Type::Unknown,
     }
 }

@@ -6,6 +6,8 @@ use super::signature::{self, Role};
 use super::{Form, Instance, Place, Sampling, Variables, module};
 use proc_macro2::{Ident, TokenStream};
 use quote::ToTokens;
+use std::cell::RefCell;
+use std::collections::HashMap;
 use syn::{Error, Expr, GenericParam, Item, ItemFn, Result, Type};
 
 /// What an attribute stands on, if it is a dual model.
@@ -100,8 +102,11 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
         .instances(&consts)?
         .into_iter()
         .map(|instance| {
-            let signature =
-                Signature::read(form, &function, &Lengths { instance: &instance, items: &items })?;
+            let signature = Signature::read(
+                form,
+                &function,
+                &Lengths { instance: &instance, items: &items, known: RefCell::default() },
+            )?;
             Ok(Model {
                 form,
                 name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&name)),
@@ -234,6 +239,8 @@ fn names(name: &str, length: Option<usize>) -> Vec<String> {
 struct Lengths<'a> {
     instance: &'a [Instance],
     items: &'a [Item],
+    /// The constants that have been evaluated, by their expressions.
+    known: RefCell<HashMap<*const Expr, usize>>,
 }
 
 impl Lengths<'_> {
@@ -318,7 +325,12 @@ impl Lengths<'_> {
                 });
                 match (instance, item) {
                     (Some(instance), _) => usize::try_from(instance.value).ok(),
-                    (None, Some(expression)) => Some(self.of(expression, depth + 1)?),
+                    (None, Some(expression)) => {
+                        let known = self.known.borrow().get(&std::ptr::from_ref(&**expression)).copied();
+                        let value = known.map_or_else(|| self.of(expression, depth + 1), Ok)?;
+                        self.known.borrow_mut().insert(std::ptr::from_ref(&**expression), value);
+                        Some(value)
+                    }
                     (None, None) => None,
                 }
             }

@@ -2,7 +2,8 @@
 
 use super::Table;
 use super::environment::Scope;
-use super::items::{Implementation, Symbol};
+use super::implementation::Implementation;
+use super::items::Symbol;
 use super::place::Cell;
 use super::types::Type;
 use super::value::{Calls, Integer, Value};
@@ -92,6 +93,8 @@ pub struct Evaluator {
     pub(super) returns: Type,
     /// The number of branches around the function that is being executed.
     pub(super) function_branches: usize,
+    /// Whether the pattern that is being matched cannot fail, so that its names are variables.
+    pub(super) irrefutable: bool,
     /// What has been written to in the branches that are being executed.
     journals: Vec<Journal>,
     numbers: HashMap<String, u32>,
@@ -201,6 +204,23 @@ impl Evaluator {
             }
         }
         Ok((value, changes))
+    }
+
+    /// Executes something that happens only if a condition holds at run time.
+    pub(super) fn only_if<T>(
+        &mut self,
+        condition: Node,
+        execute: impl FnOnce(&mut Self) -> Result<T>,
+        at: At,
+    ) -> Result<T> {
+        match self.branch(|evaluator| Ok(execute(evaluator)?)) {
+            Ok((value, changes)) => {
+                self.merge(condition, changes, Vec::new(), at)?;
+                Ok(value)
+            }
+            Err(Flow::Error(error)) => Err(error),
+            Err(_) => Err(error(at, "`break`, `continue` and `return` do not lead out of here")),
+        }
     }
 
     /// Makes the changes of two branches, of which the first is taken if the condition holds.

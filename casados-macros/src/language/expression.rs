@@ -137,7 +137,11 @@ impl Evaluator {
                 let mut value = 0;
                 for (index, variant) in structure.definition.variants.iter().enumerate() {
                     if let Some(discriminant) = &variant.discriminant {
-                        let discriminant = self.expression(discriminant, &Type::Unknown)?;
+                        let scope = structure.definition.scope();
+                        let saved = std::mem::replace(&mut self.scope, scope);
+                        let discriminant = self.expression(discriminant, &Type::Unknown);
+                        self.scope = saved;
+                        let discriminant = discriminant?;
                         value = self.integer(&discriminant, cast)?.value;
                     }
                     if index == structure.variant {

@@ -7,6 +7,7 @@
 
 use proc_macro2::{Group, Ident, TokenStream, TokenTree};
 use std::collections::{HashMap, HashSet};
+use syn::ext::IdentExt;
 use syn::visit::{self, Visit};
 use syn::visit_mut::{self, VisitMut};
 
@@ -91,7 +92,7 @@ impl Rename {
         let Some(contexts) = self.bound.get(&ident.to_string()) else { return };
         let context = context(ident);
         if contexts.contains(&context) {
-            let text = format!("{ident}_{}", context.trim_start_matches('#'));
+            let text = format!("{}_{}", ident.unraw(), context.trim_start_matches('#'));
             *ident = Ident::new(&text, ident.span());
         }
     }

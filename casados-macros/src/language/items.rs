@@ -2,6 +2,7 @@
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
+use super::modules::{Module, module_of, names_of};
 use super::value::{Definition, Style, Value, Variant};
 use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
@@ -24,6 +25,8 @@ pub struct Items {
     pub uses: HashMap<Symbol, Vec<String>>,
     /// `use` of everything in a module.
     pub globs: Vec<Vec<String>>,
+    /// Which module it is; nothing for a block.
+    pub module: Option<Module>,
 }
 
 /// What a name stands for as a value.
@@ -68,23 +71,6 @@ pub enum State {
     Done(Value),
 }
 
-/// An `impl` block, or the defaults of a trait.
-#[derive(Debug)]
-pub struct Implementation {
-    /// Its generic parameters.
-    pub generics: syn::Generics,
-    /// The type it is for; `None` for the defaults of a trait.
-    pub self_type: Option<Rc<syn::Type>>,
-    /// The trait and its generic arguments.
-    pub of: Option<syn::Path>,
-    /// Functions.
-    pub functions: HashMap<Symbol, Rc<syn::ItemFn>>,
-    /// Constants: of generic blocks their values depend on the type.
-    pub constants: HashMap<Symbol, Rc<Constant>>,
-    /// Where it stands.
-    pub scope: Rc<Scope>,
-}
-
 impl Evaluator {
     /// The number of a name.
     pub fn symbol(&mut self, name: &syn::Ident) -> Symbol {
@@ -101,24 +87,55 @@ impl Evaluator {
         symbol
     }
 
-    /// A scope of items inside of another; `impl` blocks are known from now on.
+    /// The scope of a module; `impl` blocks are known from now on.
+    pub fn module<'a>(
+        &mut self,
+        items: impl Iterator<Item = &'a syn::Item> + Clone,
+        module: Module,
+    ) -> Result<Rc<Scope>> {
+        // What is around a module is not seen in it.
+        self.items_of(items, &Rc::default(), Some(module))
+    }
+
+    /// The scope of the items of a block inside of another; `impl` blocks are known from now on.
     pub fn items<'a>(
         &mut self,
         items: impl Iterator<Item = &'a syn::Item> + Clone,
         parent: &Rc<Scope>,
     ) -> Result<Rc<Scope>> {
-        let mut names = Items::default();
+        self.items_of(items, parent, None)
+    }
+
+    fn items_of<'a>(
+        &mut self,
+        items: impl Iterator<Item = &'a syn::Item> + Clone,
+        parent: &Rc<Scope>,
+        module: Option<Module>,
+    ) -> Result<Rc<Scope>> {
+        let mut names = Items { module, ..Items::default() };
         let mut definitions = Vec::new();
         for item in items.clone() {
             self.item(item, parent, &mut names, &mut definitions)?;
         }
         let scope = Scope::inside(parent, Names::Items(Box::new(names)));
+        if let Names::Items(names) = &scope.names
+            && let Some(around) = module_of(&scope)
+        {
+            for inner in names.modules.values() {
+                if let Names::Items(inner) = &inner.names
+                    && let Some(module) = &inner.module
+                {
+                    let _ = module.around.set(Rc::downgrade(around));
+                }
+            }
+        }
         for item in items.clone() {
             if let syn::Item::Use(item) = item
                 && !self.is_local(&item.tree, &scope)
-                && !self.uses.contains(item)
+                && let Some(item) = self.emitted_use(item, &scope)
+                && !self.uses.contains(&item)
             {
-                self.uses.push(item.clone());
+                self.uses.push(item);
             }
         }
         for definition in definitions {
@@ -197,7 +214,9 @@ impl Evaluator {
                 let Some((_, content)) = &item.content else {
                     return Err(unsupported(item, "a module in another file"));
                 };
-                let scope = self.items(content.iter(), parent)?;
+                let around = names.module.as_ref().map_or_else(|| names_of(parent), |module| &module.names);
+                let path = around.iter().cloned().chain([item.ident.to_string()]).collect();
+                let scope = self.module(content.iter(), Module { names: path, ..Module::default() })?;
                 let name = self.symbol(&item.ident);
                 names.modules.insert(name, scope);
             }
@@ -255,72 +274,6 @@ impl Evaluator {
         })
     }
 
-    fn implementation(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
-        let mut implementation = Implementation {
-            generics: item.generics.clone(),
-            self_type: Some(Rc::new((*item.self_ty).clone())),
-            of: item.trait_.as_ref().map(|(path, _)| path.clone()),
-            functions: HashMap::new(),
-            constants: HashMap::new(),
-            scope: scope.clone(),
-        };
-        for entry in &item.items {
-            match entry {
-                syn::ImplItem::Fn(function) => {
-                    let name = self.symbol(&function.sig.ident);
-                    let function = syn::ItemFn {
-                        attrs: Vec::new(),
-                        vis: syn::Visibility::Inherited,
-                        modifiers: function.modifiers.clone(),
-                        sig: function.sig.clone(),
-                        block: Box::new(function.block.clone()),
-                    };
-                    implementation.functions.insert(name, Rc::new(function));
-                }
-                syn::ImplItem::Const(item) => {
-                    let name = self.symbol(&item.ident);
-                    implementation.constants.insert(name, constant(&item.ident, &item.ty, &item.expr));
-                }
-                _ => {}
-            }
-        }
-        self.implementations.push(Rc::new(implementation));
-    }
-
-    fn defaults(&mut self, item: &syn::ItemTrait, scope: &Rc<Scope>) {
-        let mut implementation = Implementation {
-            generics: item.generics.clone(),
-            self_type: None,
-            of: Some(item.ident.clone().into()),
-            functions: HashMap::new(),
-            constants: HashMap::new(),
-            scope: scope.clone(),
-        };
-        for entry in &item.items {
-            match entry {
-                syn::TraitItem::Fn(function) => {
-                    let Some(block) = &function.default else { continue };
-                    let name = self.symbol(&function.sig.ident);
-                    let function = syn::ItemFn {
-                        attrs: Vec::new(),
-                        vis: syn::Visibility::Inherited,
-                        modifiers: function.modifiers.clone(),
-                        sig: function.sig.clone(),
-                        block: Box::new(block.clone()),
-                    };
-                    implementation.functions.insert(name, Rc::new(function));
-                }
-                syn::TraitItem::Const(item) => {
-                    let Some((_, expression)) = &item.default else { continue };
-                    let name = self.symbol(&item.ident);
-                    implementation.constants.insert(name, constant(&item.ident, &item.ty, expression));
-                }
-                _ => {}
-            }
-        }
-        self.implementations.push(Rc::new(implementation));
-    }
-
     /// The value of a constant; its expression sees what the constant sees.
     pub fn constant_value(&mut self, constant: &Constant, scope: &Rc<Scope>) -> Result<Value> {
         let state = constant.state.borrow().clone();
@@ -356,7 +309,7 @@ impl Evaluator {
     }
 }
 
-fn constant(name: &syn::Ident, ty: &syn::Type, expression: &syn::Expr) -> Rc<Constant> {
+pub(super) fn constant(name: &syn::Ident, ty: &syn::Type, expression: &syn::Expr) -> Rc<Constant> {
     Rc::new(Constant {
         name: name.clone(),
         ty: ty.clone(),

@@ -117,22 +117,7 @@ impl Evaluator {
         }
         let types = self.field_types(&definition, variant, &arguments)?;
         let declared = &definition.variants[variant].fields;
-        let mut fields = match &literal.rest {
-            Some(rest) => {
-                let own = Type::Struct(definition.clone(), arguments.clone());
-                let value = self.expression(rest, &own)?;
-                match self.load(value, rest)? {
-                    Value::Struct(structure) if Rc::ptr_eq(&structure.definition, &definition) => {
-                        structure.fields.clone()
-                    }
-                    other => {
-                        let message = format!("expected a `{}`, found {}", definition.name, other.kind());
-                        return Err(error(rest, message).into());
-                    }
-                }
-            }
-            None => vec![Value::Uninitialised; declared.len()],
-        };
+        let mut fields = vec![Value::Uninitialised; declared.len()];
         for field in &literal.fields {
             let member = field.member.to_token_stream().to_string();
             let Some(index) = declared.iter().position(|(name, _)| *name == member) else {
@@ -140,6 +125,24 @@ impl Evaluator {
             };
             let value = self.expression(&field.expr, &types[index])?;
             fields[index] = self.coerce(value, &types[index], &field.expr)?;
+        }
+        // `..rest` is executed after the fields.
+        if let Some(rest) = &literal.rest {
+            let own = Type::Struct(definition.clone(), arguments.clone());
+            let value = self.expression(rest, &own)?;
+            match self.load(value, rest)? {
+                Value::Struct(structure) if Rc::ptr_eq(&structure.definition, &definition) => {
+                    for (field, value) in fields.iter_mut().zip(&structure.fields) {
+                        if matches!(field, Value::Uninitialised) {
+                            *field = value.clone();
+                        }
+                    }
+                }
+                other => {
+                    let message = format!("expected a `{}`, found {}", definition.name, other.kind());
+                    return Err(error(rest, message).into());
+                }
+            }
         }
         if fields.iter().any(|field| matches!(field, Value::Uninitialised)) {
             return Err(error(literal, format!("fields of `{}` are missing", definition.name)).into());

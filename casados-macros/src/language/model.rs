@@ -5,6 +5,7 @@ use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
 use super::flatten;
 use super::mistakes::Mistakes;
+use super::modules::Module;
 use super::place::Place;
 use super::signature::{self, Argument, Role};
 use super::types::Type;
@@ -37,7 +38,7 @@ impl Template<'_> {
     pub fn model(&self, instance: Vec<Instance>) -> Result<Model> {
         let arguments = signature::arguments(self.form, self.function)?;
         let mut evaluator = Evaluator::default();
-        let items = evaluator.items(self.items.iter(), &Rc::new(Scope::default()))?;
+        let items = evaluator.module(self.items.iter(), Module::default())?;
         let turbofish = instance.iter().map(integer).collect::<Result<Vec<_>>>()?;
         let parameters = instance
             .iter()

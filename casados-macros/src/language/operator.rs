@@ -104,7 +104,7 @@ impl Evaluator {
 }
 
 /// The operators that yield numbers.
-fn operator(op: &syn::BinOp) -> Option<Operator> {
+pub(super) fn operator(op: &syn::BinOp) -> Option<Operator> {
     Some(match op {
         syn::BinOp::Add(_) => Operator::Add,
         syn::BinOp::Sub(_) => Operator::Sub,

@@ -2,14 +2,19 @@
 
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator};
-use super::items::{Implementation, Symbol, TypeItem, ValueItem};
+use super::implementation::Implementation;
+use super::items::{Symbol, TypeItem, ValueItem};
 use super::methods;
+use super::modules::{LINKS, Lead, Trail, from_outermost, names_of, used};
 use super::place::Cell;
 use super::types::Type;
 use super::value::{Builtin, Definition, Function, Generic, Struct, Style, Value};
+use proc_macro2::{Span, TokenStream};
 use quote::ToTokens;
 use std::rc::Rc;
 use syn::Result;
+use syn::ext::IdentExt;
+use syn::parse::Parser;
 
 /// What a path stands for.
 pub enum Named {
@@ -32,7 +37,8 @@ impl Evaluator {
         if let Some(qself) = &path.qself {
             let ty = self.resolve(&qself.ty, &scope)?;
             let turbofish = self.generic_arguments(&last.arguments, &scope)?;
-            return Ok(self.member(&ty, name, &last.ident, turbofish, path)?);
+            let of_trait = qself.position > 0;
+            return Ok(self.member(&ty, of_trait, &last.ident, turbofish, path)?);
         }
         if path.path.segments.len() == 1 {
             if last.arguments.is_none()
@@ -41,34 +47,26 @@ impl Evaluator {
                 return Ok(Named::Variable(cell));
             }
             let turbofish = self.generic_arguments(&last.arguments, &scope)?;
-            return Ok(self.item_named(name, &last.ident, turbofish, &scope)?);
+            return Ok(self.item_named(name, &last.ident, turbofish, &scope, &mut Vec::new())?);
         }
         let turbofish = self.generic_arguments(&last.arguments, &scope)?;
-        // Modules that the macro sees.
-        let mut inner = scope.clone();
-        let mut seen = 0;
         let count = path.path.segments.len();
-        for segment in path.path.segments.iter().take(count - 1) {
-            if segment.ident == "self" || segment.ident == "super" {
-                seen += 1;
-                continue;
-            }
-            let segment = self.symbol(&segment.ident);
-            match module(&inner, segment) {
-                Some(module) => inner = module,
-                None => break,
-            }
-            seen += 1;
-        }
-        if seen == count - 1 {
-            return Ok(self.item_named(name, &last.ident, turbofish, &inner)?);
+        let modules: Vec<_> =
+            path.path.segments.iter().take(count - 1).map(|module| module.ident.to_string()).collect();
+        if let Lead::Module(module) = self.lead(&modules, &scope, &mut Vec::new()) {
+            return Ok(match self.item_named(name, &last.ident, turbofish, &module, &mut Vec::new())? {
+                Named::Builtin(builtin) if builtin.path.len() == 1 => {
+                    Named::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
+                }
+                named => named,
+            });
         }
         // Types.
         let mut prefix = path.path.clone();
         prefix.segments.pop();
         let ty = self.resolve_path(&prefix, &scope, 0)?;
         if !matches!(ty, Type::Unknown) {
-            return Ok(match self.member(&ty, name, &last.ident, turbofish, path)? {
+            return Ok(match self.member(&ty, false, &last.ident, turbofish, path)? {
                 Named::Builtin(builtin) => {
                     Named::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
                 }
@@ -79,19 +77,15 @@ impl Evaluator {
         Ok(Named::Builtin(Builtin { owner: None, path: full, turbofish }))
     }
 
-    /// The segments of a path, with a local `use` of the first one resolved.
+    /// The segments of a path, with a local `use` of the first one resolved, from the outermost
+    /// module that the macro sees.
     fn full_path(&mut self, path: &syn::Path, scope: &Rc<Scope>) -> Vec<String> {
-        let mut segments = path.segments.iter();
-        let mut full = Vec::new();
-        if let Some(first) = segments.next() {
-            let symbol = self.symbol(&first.ident);
-            match used(scope, symbol) {
-                Some(path) => full = path,
-                None => full.push(first.ident.to_string()),
-            }
-        }
-        full.extend(segments.map(|segment| segment.ident.to_string()));
-        full
+        let mut segments = path.segments.iter().map(|segment| segment.ident.to_string());
+        let first = segments.next().unwrap_or_default();
+        let symbol = self.symbol_of(&first);
+        let (mut full, place) = used(scope, symbol).unwrap_or_else(|| (vec![first], scope.clone()));
+        full.extend(segments);
+        from_outermost(full, &place)
     }
 
     /// An item of a scope.
@@ -101,6 +95,7 @@ impl Evaluator {
         ident: &syn::Ident,
         turbofish: Vec<Generic>,
         scope: &Rc<Scope>,
+        trail: &mut Trail,
     ) -> Result<Named> {
         if ident == "Self" {
             // `Self` of a unit or tuple struct.
@@ -136,76 +131,95 @@ impl Evaluator {
                 _ => {}
             }
             if let Some(full) = items.uses.get(&name) {
-                let full = full.clone();
-                return self.used_path(full, turbofish, scope);
+                return self.used_path(full.clone(), turbofish, around, trail);
             }
             for glob in &items.globs {
-                // `use Mode::*;`
-                if let Some(last) = glob.last() {
-                    let last = self.symbol_of(last);
-                    if let Some(definition) = enumeration(scope, last)
-                        && let Some(variant) = position(&definition, &ident.to_string())
-                    {
-                        return Ok(Named::Value(constructor(definition, Rc::new(turbofish), variant)));
-                    }
-                }
-                let mut full = glob.clone();
-                full.push(ident.to_string());
-                let builtin = Builtin { owner: None, path: full, turbofish: Vec::new() };
-                if let Some(value) = methods::constant(self, &builtin) {
-                    return Ok(Named::Value(value));
+                if let Some(named) = self.glob(glob, ident, &turbofish, around, trail)? {
+                    return Ok(named);
                 }
             }
         }
         Ok(Named::Builtin(Builtin { owner: None, path: vec![ident.to_string()], turbofish }))
     }
 
+    /// What `use path::*;` brings under a name.
+    fn glob(
+        &mut self,
+        path: &[String],
+        ident: &syn::Ident,
+        turbofish: &[Generic],
+        scope: &Rc<Scope>,
+        trail: &mut Trail,
+    ) -> Result<Option<Named>> {
+        if let Lead::Module(module) = self.lead(path, scope, trail) {
+            if trail.contains(&Rc::as_ptr(&module)) {
+                return Ok(None);
+            }
+            trail.push(Rc::as_ptr(&module));
+            let symbol = self.symbol(ident);
+            let named = self.item_named(symbol, ident, turbofish.to_vec(), &module, trail)?;
+            return Ok(Some(named).filter(|named| !matches!(named, Named::Builtin(_))));
+        }
+        // `use Mode::*;`
+        if let Some((TypeItem::Definition(definition), _)) = self.seen_type(path, scope, &mut Vec::new())
+            && definition.is_enum
+            && let Some(variant) = position(&definition, &ident.to_string())
+        {
+            return Ok(Some(Named::Value(constructor(definition, Rc::new(turbofish.to_vec()), variant))));
+        }
+        let path = path.iter().cloned().chain([ident.to_string()]).collect();
+        let builtin = Builtin { owner: None, path, turbofish: Vec::new() };
+        Ok(methods::constant(self, &builtin).map(Named::Value))
+    }
+
     /// What a path that was written in a `use` stands for.
-    fn used_path(&mut self, full: Vec<String>, turbofish: Vec<Generic>, scope: &Rc<Scope>) -> Result<Named> {
-        if let [.., owner, name] = full.as_slice() {
-            let owner = self.symbol_of(owner);
-            if let Some(definition) = enumeration(scope, owner)
+    fn used_path(
+        &mut self,
+        full: Vec<String>,
+        turbofish: Vec<Generic>,
+        scope: &Rc<Scope>,
+        trail: &mut Trail,
+    ) -> Result<Named> {
+        if let Some((name, owner)) = full.split_last()
+            && trail.len() < LINKS
+        {
+            if let Some((TypeItem::Definition(definition), _)) = self.seen_type(owner, scope, &mut Vec::new())
+                && definition.is_enum
                 && let Some(variant) = position(&definition, name)
             {
                 return Ok(Named::Value(constructor(definition, Rc::new(turbofish), variant)));
             }
-            if let Some(inner) = module(scope, owner) {
+            if let Lead::Module(module) = self.lead(owner, scope, &mut Vec::new()) {
+                trail.push(Rc::as_ptr(scope));
                 let symbol = self.symbol_of(name);
                 let ident = quote::format_ident!("{name}");
-                return self.item_named(symbol, &ident, turbofish, &inner);
-            }
-        }
-        if full.first().is_some_and(|first| first == "self" || first == "super")
-            && let Some(name) = full.last()
-        {
-            let symbol = self.symbol_of(name);
-            for around in scope.chain() {
-                let Names::Items(items) = &around.names else { continue };
-                if items.values.contains_key(&symbol) || items.types.contains_key(&symbol) {
-                    let ident = quote::format_ident!("{name}");
-                    return self.item_named(symbol, &ident, turbofish, around);
+                match self.item_named(symbol, &ident, turbofish.clone(), &module, trail)? {
+                    Named::Builtin(builtin) if builtin.path.len() == 1 => {}
+                    named => return Ok(named),
                 }
             }
         }
-        Ok(Named::Builtin(Builtin { owner: None, path: full, turbofish }))
+        Ok(Named::Builtin(Builtin { owner: None, path: from_outermost(full, scope), turbofish }))
     }
 
     /// An associated function or constant, or a variant.
     fn member(
         &mut self,
         ty: &Type,
-        name: Symbol,
+        of_trait: bool,
         ident: &syn::Ident,
         turbofish: Vec<Generic>,
         at: At,
     ) -> Result<Named> {
+        let name = self.symbol(ident);
+        let hidden = !of_trait && self.is_hidden(ty, &ident.to_string());
         if let Type::Struct(definition, arguments) = ty
             && definition.is_enum
             && let Some(variant) = position(definition, &ident.to_string())
         {
             return Ok(Named::Value(constructor(definition.clone(), arguments.clone(), variant)));
         }
-        if let Some((implementation, item)) = self.find_function(name, ty) {
+        if !hidden && let Some((implementation, item)) = self.find_function(name, ty) {
             let scope = implementation.scope.clone();
             let owner = Some((implementation, ty.clone()));
             return Ok(Named::Value(Value::Function(Rc::new(Function { item, scope, turbofish, owner }))));
@@ -304,49 +318,43 @@ impl Evaluator {
         if let Some(value) = methods::constant(self, &builtin) {
             return value;
         }
-        match builtin.path.last() {
-            Some(name) if name == "None" => Value::Option(None),
-            // A name of the surrounding module: as a value it is more often a constant than a
-            // function.
-            Some(_)
-                if builtin.owner.is_none()
-                    && (builtin.path.len() == 1
-                        || builtin.path[0] == "crate"
-                        || builtin.path[0] == "super")
-                    && builtin.path.last().is_some_and(|name| !name.starts_with(char::is_uppercase))
-                    && builtin.path.last().is_some_and(|name| name != "from_fn" && name != "identity") =>
-            {
-                Value::Opaque(Rc::new(path.to_token_stream()))
-            }
-            // By convention functions and methods are in snake case, constants are not.
-            Some(name) if name.chars().any(char::is_lowercase) => Value::Builtin(Rc::new(builtin)),
-            _ => Value::Opaque(Rc::new(path.to_token_stream())),
+        if builtin.path.last().is_some_and(|name| name == "None") {
+            return Value::Option(None);
         }
+        let Some(name) = builtin.path.last() else {
+            return Value::Opaque(Rc::new(path.to_token_stream()));
+        };
+        let from_here = builtin.path.len() == 1 || matches!(builtin.path[0].as_str(), "crate" | "super");
+        // A name of the surrounding module: as a value it is more often a constant than a function.
+        let constant = builtin.owner.is_none()
+            && from_here
+            && !name.starts_with(char::is_uppercase)
+            && name != "from_fn"
+            && name != "identity";
+        // By convention functions and methods are in snake case, constants are not.
+        if !constant && name.chars().any(char::is_lowercase) {
+            return Value::Builtin(Rc::new(builtin));
+        }
+        Value::Opaque(Rc::new(self.emitted_path(&builtin, path)))
     }
-}
 
-fn module(scope: &Rc<Scope>, name: Symbol) -> Option<Rc<Scope>> {
-    scope.chain().find_map(|scope| match &scope.names {
-        Names::Items(items) => items.modules.get(&name).cloned(),
-        _ => None,
-    })
-}
-
-fn used(scope: &Rc<Scope>, name: Symbol) -> Option<Vec<String>> {
-    scope.chain().find_map(|scope| match &scope.names {
-        Names::Items(items) => items.uses.get(&name).cloned(),
-        _ => None,
-    })
-}
-
-fn enumeration(scope: &Rc<Scope>, name: Symbol) -> Option<Rc<Definition>> {
-    scope.chain().find_map(|scope| match &scope.names {
-        Names::Items(items) => match items.types.get(&name) {
-            Some(TypeItem::Definition(definition)) if definition.is_enum => Some(definition.clone()),
-            _ => None,
-        },
-        _ => None,
-    })
+    /// How generated code, which stands in the outermost module, names what the macro does not see.
+    pub(super) fn emitted_path(&self, builtin: &Builtin, path: &syn::ExprPath) -> TokenStream {
+        if names_of(&self.scope).is_empty() || builtin.owner.is_some() || builtin.path.len() < 2 {
+            return path.to_token_stream();
+        }
+        let span = path.path.segments.last().map_or_else(Span::call_site, |last| last.ident.span());
+        let names = builtin.path.iter().map(|name| {
+            syn::Ident::parse_any.parse_str(name).map_or_else(
+                |_| syn::Ident::new("_", span),
+                |mut name| {
+                    name.set_span(span);
+                    name
+                },
+            )
+        });
+        quote::quote!(#(#names)::*)
+    }
 }
 
 /// Index of the variant of a name.

@@ -6,6 +6,7 @@ use super::arithmetic::Comparison;
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
 use super::items::Symbol;
+use super::methods;
 use super::path::Named;
 use super::place::{Place, Projection};
 use super::types::Type;
@@ -13,6 +14,7 @@ use super::value::Value;
 use crate::graph::Node;
 use std::cell::RefCell;
 use std::rc::Rc;
+use syn::ext::IdentExt;
 
 /// Whether something holds: known, or at run time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +51,10 @@ impl Evaluator {
     /// Matches a pattern that cannot fail.
     pub(super) fn bind(&mut self, pattern: &syn::Pat, subject: Subject) -> Evaluated<Bindings> {
         let mut bindings = Vec::new();
-        match self.matches(pattern, subject, &mut bindings)? {
+        let saved = std::mem::replace(&mut self.irrefutable, true);
+        let truth = self.matches(pattern, subject, &mut bindings);
+        self.irrefutable = saved;
+        match truth? {
             Truth::Known(true) => Ok(bindings),
             Truth::Known(false) => Err(error(pattern, "this pattern does not match the value").into()),
             Truth::When(_) => {
@@ -170,15 +175,25 @@ impl Evaluator {
             syn::ExprPath { attrs: Vec::new(), qself: pattern.qself.clone(), path: pattern.path.clone() };
         let value = self.subject_value(&subject, pattern)?;
         if let Value::Option(content) = &value {
-            return match (path.path.segments.last(), content) {
-                (Some(name), Some(_)) if name.ident == "Some" => {
+            let name = path.path.segments.last().map(|name| name.ident.to_string()).unwrap_or_default();
+            return match (name.as_str(), content) {
+                ("Some" | "Ok", Some(_)) => {
                     let inside = self.subject_part(&subject, Projection::Some, pattern)?;
                     match pattern.elems.first() {
                         Some(content) => self.matches(content, inside, bindings),
                         None => Ok(Truth::Known(true)),
                     }
                 }
-                _ => Ok(Truth::Known(false)),
+                ("Some" | "Ok", None) | ("Err", Some(_)) => Ok(Truth::Known(false)),
+                ("Err", None) => match pattern.elems.first() {
+                    None | Some(syn::Pat::Wild(_) | syn::Pat::Rest(_)) => Ok(Truth::Known(true)),
+                    Some(error_value) => Err(error(
+                        error_value,
+                        "of a `Result` the macro knows the value only, not the error: write `Err(_)`",
+                    )
+                    .into()),
+                },
+                _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
             };
         }
         match (self.named(&path)?, &value) {
@@ -325,6 +340,14 @@ impl Evaluator {
         Ok(match self.named(&path)? {
             Named::Value(Value::Function(_) | Value::Constructor(..)) => None,
             Named::Value(value) => Some(value),
+            // By convention constants and variants begin with a capital, variables do not. Where a
+            // pattern cannot fail, the compiler would refuse them.
+            Named::Builtin(builtin)
+                if !self.irrefutable && ident.unraw().to_string().starts_with(char::is_uppercase) =>
+            {
+                let known = methods::constant(self, &builtin);
+                Some(known.unwrap_or_else(|| Value::Opaque(Rc::new(self.emitted_path(&builtin, &path)))))
+            }
             _ => None,
         })
     }

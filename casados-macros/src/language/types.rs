@@ -3,6 +3,7 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
 use super::items::TypeItem;
+use super::modules::Lead;
 use super::value::{Definition, Generic, Integer, IntegerType, Value};
 use quote::quote;
 use std::rc::Rc;
@@ -118,21 +119,22 @@ impl Evaluator {
         if depth > 64 {
             return Err(error(&path, "this type is nested too deeply, or defined in terms of itself"));
         }
-        let mut scope = scope.clone();
-        for segment in path.segments.iter().take(path.segments.len() - 1) {
-            let name = self.symbol(&segment.ident);
-            let module = scope.chain().find_map(|scope| match &scope.names {
-                Names::Items(items) => items.modules.get(&name).cloned(),
-                _ => None,
-            });
-            if let Some(module) = module {
-                scope = module;
-            }
-        }
         let symbol = self.symbol(&last.ident);
         let name = last.ident.to_string();
+        let modules: Vec<_> = path
+            .segments
+            .iter()
+            .take(path.segments.len() - 1)
+            .map(|module| module.ident.to_string())
+            .collect();
+        let place = match self.lead(&modules, scope, &mut Vec::new()) {
+            Lead::Module(module) => module,
+            Lead::Elsewhere if modules.is_empty() => scope.clone(),
+            // What is in a module that the macro does not see is none of the user's own types.
+            Lead::Elsewhere => return self.resolve_known(path, last, &name, scope),
+        };
         let mut renamed = None;
-        for around in scope.clone().chain() {
+        for around in place.chain() {
             match &around.names {
                 Names::SelfType(ty, _) if name == "Self" => return Ok(ty.clone()),
                 Names::Types(types) => {
@@ -141,14 +143,14 @@ impl Evaluator {
                     }
                 }
                 Names::Items(items) => {
-                    match items.types.get(&symbol) {
-                        Some(TypeItem::Definition(definition)) => {
-                            let arguments = self.generic_arguments(&last.arguments, &scope)?;
-                            return Ok(Type::Struct(definition.clone(), Rc::new(arguments)));
+                    match self.type_in(symbol, around, &mut Vec::new()) {
+                        Some((TypeItem::Definition(definition), _)) => {
+                            let arguments = self.generic_arguments(&last.arguments, scope)?;
+                            return Ok(Type::Struct(definition, Rc::new(arguments)));
                         }
-                        Some(TypeItem::Alias(alias)) => {
-                            let arguments = self.generic_arguments(&last.arguments, &scope)?;
-                            let inner = self.generic_scope(&alias.generics, around);
+                        Some((TypeItem::Alias(alias), around)) => {
+                            let arguments = self.generic_arguments(&last.arguments, scope)?;
+                            let inner = self.generic_scope(&alias.generics, &around);
                             self.bind_turbofish(&alias.generics, &arguments, &inner);
                             return self.resolve_within(&alias.ty, &inner, depth + 1);
                         }
@@ -161,7 +163,7 @@ impl Evaluator {
                 _ => {}
             }
         }
-        self.resolve_known(path, last, &renamed.unwrap_or(name), &scope)
+        self.resolve_known(path, last, &renamed.unwrap_or(name), scope)
     }
 
     /// The type of a name that is not the user's own: of the language, or of nalgebra.

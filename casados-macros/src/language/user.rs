@@ -4,11 +4,13 @@ use super::arithmetic::Operator;
 use super::call::Arguments;
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator, error};
-use super::items::Implementation;
-use super::methods::Receiver;
+use super::implementation::Implementation;
+use super::items::Symbol;
+use super::methods::{self, Receiver};
 use super::place::Place;
 use super::types::Type;
-use super::value::{Function, Generic, Value};
+use super::value::{Builtin, Function, Generic, Value};
+use std::rc::Rc;
 use syn::Result;
 
 impl Evaluator {
@@ -32,6 +34,42 @@ impl Evaluator {
         if matches!(ty, Type::Unknown) {
             return Ok(None);
         }
+        let hidden = self.is_hidden(&ty, name);
+        // Methods of numbers take `self`, those of matrices `&self`: a trait's `self` comes first.
+        let by_reference = matches!(ty, Type::Matrix(..));
+        if hidden && !by_reference {
+            return Ok(None);
+        }
+        let found = self.trait_function(receiver, (ty, symbol), turbofish, at)?;
+        Ok(found.filter(|(function, _)| {
+            !hidden
+                || matches!(
+                    function.item.sig.inputs.first(),
+                    Some(syn::FnArg::Receiver(own)) if !matches!(own.kind, syn::ReceiverKind::Reference(..))
+                )
+        }))
+    }
+
+    /// Whether a value has a method of its own of a name that hides those of traits. Where the
+    /// type is a parameter, or `Self` of a trait, there are only those of traits.
+    pub(super) fn is_hidden(&self, ty: &Type, name: &str) -> bool {
+        let is_generic = |scope: &Rc<Scope>| match &scope.names {
+            Names::Types(types) => !types.is_empty(),
+            Names::SelfType(_, written) => written.is_none(),
+            _ => false,
+        };
+        methods::is_inherent(ty, name) && !self.scope.chain().any(is_generic)
+    }
+
+    /// The user's method for a receiver of a type.
+    fn trait_function(
+        &mut self,
+        receiver: &Receiver,
+        (ty, symbol): (Type, Symbol),
+        turbofish: &[Generic],
+        at: At,
+    ) -> Result<Option<(Function, Value)>> {
+        let value = receiver.value(self, at)?;
         let Some((implementation, item)) = self.find_function(symbol, &ty) else { return Ok(None) };
         let Some(syn::FnArg::Receiver(own)) = item.sig.inputs.first() else { return Ok(None) };
         let mutable = matches!(&own.kind, syn::ReceiverKind::Reference(_, _, Some(_)));
@@ -44,6 +82,22 @@ impl Evaluator {
         let function =
             Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
         Ok(Some((function, first)))
+    }
+
+    /// The user's method that a path names by its trait, `Trait::method(x)`.
+    pub(super) fn function_of_trait(
+        &mut self,
+        receiver: &Receiver,
+        builtin: &Builtin,
+        at: At,
+    ) -> Result<Option<(Function, Value)>> {
+        let value = receiver.value(self, at)?;
+        let ty = self.type_of(&value);
+        let symbol = self.symbol_of(builtin.path.last().map_or("", String::as_str));
+        if matches!(ty, Type::Unknown) {
+            return Ok(None);
+        }
+        self.trait_function(receiver, (ty, symbol), &builtin.turbofish, at)
     }
 
     /// The implementations of a generic trait for one type, of which the arguments of a call choose

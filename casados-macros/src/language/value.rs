@@ -5,7 +5,7 @@
 //! own.
 
 use super::environment::Scope;
-use super::items::Implementation;
+use super::implementation::Implementation;
 use super::methods::iterator::Iter;
 use super::place::Place;
 use super::types::Type;

@@ -4,7 +4,7 @@
 
 use super::Model;
 use super::samples::{Position, Term};
-use crate::graph::{Degree, Entry, Point};
+use crate::graph::{Degree, Entry};
 use std::collections::BTreeMap;
 
 /// A kinematic state.
@@ -89,14 +89,17 @@ pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<Position>) -> V
 
 /// Of trivial rows those that are `c ẋ + c′ v`, without a function of time or a constant.
 fn homogeneous(model: &Model, trivial: &[u32]) -> Vec<u32> {
-    let Model { graph, residual, variables, opaque, .. } = model;
+    let Model { graph, residual, variables, .. } = model;
     let [x, z, u, p] = [&variables.x, &variables.z, &variables.u, &variables.p].map(|names| names.len());
     let time = 2 * x + z + u + p;
-    // Constants that are not known here are anything.
-    let (point, opaque) = (vec![0.0; time + 1], vec![0.75; opaque.len()]);
-    let values = graph.evaluate(residual, Point { variables: &point, opaque: &opaque, seeds: &[] });
+    // Constants from outside and tables may have any value: zero is what remains of the equation
+    // where all variables are zero, whatever they are.
+    let mut at_zero = graph.clone();
+    let zero = at_zero.constant(0.0);
+    let by = (0..=time as u32).map(|variable| (variable, zero)).collect();
+    let rest = at_zero.substitute(residual, &by);
+    let vanishes = |row: u32| at_zero.value(rest[row as usize]) == Some(0.0);
     let degrees = graph.degrees(residual, |variable| variable as usize == time);
-    let is_homogeneous =
-        |&row: &u32| values[row as usize] == 0.0 && degrees[row as usize] == Degree::Constant;
+    let is_homogeneous = |&row: &u32| vanishes(row) && degrees[row as usize] == Degree::Constant;
     trivial.iter().copied().filter(is_homogeneous).collect()
 }

@@ -254,3 +254,30 @@ fn linearity() {
         assert_eq!(g.degrees(&[expression.1], |variable| variable < 2), [degree]);
     }
 }
+
+/// Behind many nested selections, too, branches that are not taken stay out of derivatives.
+#[test]
+fn deep_selections() {
+    let mut graph = Graph::default();
+    let x = graph.variable(0);
+    let (start, step) = (graph.constant(19.0), graph.constant(1.0));
+    let inside = graph.binary(Binary::Sub, x, start);
+    let root = graph.unary(Unary::Sqrt, inside);
+    let mut y = graph.binary(Binary::Mul, root, x);
+    for border in (1..20).rev() {
+        let border = graph.constant(f64::from(border));
+        let below = graph.compare(crate::graph::Compare::Lt, x, border);
+        let constant = graph.binary(Binary::Add, border, step);
+        y = graph.select(below, constant, y);
+    }
+    let seeds = seeded(&mut graph, &[y]);
+    let slope = gradient(&mut graph, &seeds, 1);
+    let curvature = hessian(&mut graph, &seeds, 1);
+    let nodes = [slope[0], curvature[0].2];
+    let at = |x: f64| graph.evaluate(&nodes, Point { variables: &[x], seeds: &[1.0], opaque: &[] });
+    for x in [0.5, 8.5, 18.5, 18.999] {
+        assert_eq!(at(x), [0.0, 0.0]);
+    }
+    // (√(x − 19) x)′ = √(x − 19) + x / (2 √(x − 19)), its derivative 1 / √(x − 19) − x / (4 √³).
+    assert_eq!(at(20.0), [11.0, -4.0]);
+}

@@ -2,8 +2,8 @@
 
 use super::iterator::{Iter, holds, into_iter, known_option};
 use super::{Call, Receiver, option};
+use crate::language::arithmetic::Comparison;
 use crate::language::evaluator::{Evaluator, error};
-use crate::language::place::Place;
 use crate::language::value::Value;
 use syn::Result;
 
@@ -17,21 +17,17 @@ pub fn method(
     if let Value::Range(range) = value {
         match call.name {
             "contains" => {
-                let item = evaluator.integer(call.only()?, call.at)?.value;
+                let item = call.only()?;
                 let above = match &range.start {
-                    Some(start) => evaluator.integer(start, call.at)?.value <= item,
-                    None => true,
+                    Some(start) => evaluator.compare(Comparison::Le, start, item, call.at)?,
+                    None => Value::Bool(true),
                 };
+                let end = if range.inclusive { Comparison::Le } else { Comparison::Lt };
                 let below = match &range.end {
-                    Some(end) => {
-                        item < evaluator
-                            .integer(end, call.at)?
-                            .value
-                            .saturating_add(i128::from(range.inclusive))
-                    }
-                    None => true,
+                    Some(bound) => evaluator.compare(end, item, bound, call.at)?,
+                    None => Value::Bool(true),
                 };
-                return Ok(Some(Value::Bool(above && below)));
+                return evaluator.and(&above, &below, call.at).map(Some);
             }
             "clone" => return Ok(None),
             _ => {}
@@ -106,8 +102,20 @@ fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Val
             // Conditions at run time are collected: all elements are looked at then.
             let any = call.name == "any";
             let mut result = Value::Bool(!any);
-            while let Some(value) = iter.next(evaluator, at)? {
-                let holds = evaluator.call(closure, vec![value], at)?;
+            loop {
+                let mut next = |evaluator: &mut Evaluator| match iter.next(evaluator, at)? {
+                    Some(value) => evaluator.call(closure, vec![value], at).map(Some),
+                    None => Ok(None),
+                };
+                // What the closure changes depends on those before.
+                let holds = match result {
+                    Value::Condition(node) => {
+                        let undecided = if any { evaluator.graph.not(node) } else { node };
+                        evaluator.only_if(undecided, next, at)?
+                    }
+                    _ => next(evaluator)?,
+                };
+                let Some(holds) = holds else { break };
                 result = if any {
                     evaluator.or(&result, &holds, at)?
                 } else {
@@ -166,11 +174,7 @@ fn adapt(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<It
         "map_while" => Iter::MapWhile(Some(inner), call.only()?.clone()),
         "scan" => {
             call.expect(2)?;
-            Iter::Scan {
-                inner,
-                state: Place::new(call.arguments[0].clone()),
-                closure: call.arguments[1].clone(),
-            }
+            Iter::Scan { inner, state: call.arguments[0].clone(), closure: call.arguments[1].clone() }
         }
         "rev" => Iter::Rev(inner),
         "take" => Iter::Take(inner, evaluator.usize(call.only()?, at)?),

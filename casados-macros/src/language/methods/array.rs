@@ -3,7 +3,7 @@
 use super::iterator::{self, Iter};
 use super::{Call, Receiver, option};
 use crate::language::arithmetic::Comparison;
-use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::evaluator::{Evaluator, error, unsupported};
 use crate::language::place::Projection;
 use crate::language::value::Value;
 use std::rc::Rc;
@@ -42,7 +42,7 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
         "last" => Value::Option(elements.last().cloned().map(Box::new)),
         "get" => match evaluator.load(call.only()?.clone(), at)? {
             Value::Range(range) => {
-                let (start, end) = bounds(evaluator, &range, length, at)?;
+                let (start, end) = evaluator.bounds(&range, length, at)?;
                 Value::Option(elements.get(start..end).map(|part| Box::new(Value::array(part.to_vec()))))
             }
             index => {
@@ -276,22 +276,4 @@ fn change(
     }
     option::update(evaluator, receiver, Value::array(new), call)?;
     Ok(Some(Value::unit()))
-}
-
-/// Start and end of a range of indices.
-pub fn bounds(
-    evaluator: &mut Evaluator,
-    range: &crate::language::value::Range,
-    length: usize,
-    at: At,
-) -> Result<(usize, usize)> {
-    let start = match &range.start {
-        Some(start) => evaluator.usize(start, at)?,
-        None => 0,
-    };
-    let end = match &range.end {
-        Some(end) => evaluator.usize(end, at)?.saturating_add(usize::from(range.inclusive)),
-        None => length,
-    };
-    Ok((start, end))
 }

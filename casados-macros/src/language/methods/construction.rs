@@ -49,30 +49,30 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         Type::Matrix(rows, columns) => (own_rows.or(*rows), own_columns.or(*columns)),
         _ => (own_rows, own_columns),
     };
-    let size = || known_size(name, (rows, columns), at);
+    let size = |evaluator: &mut Evaluator| known_size(evaluator, name, (rows, columns), at);
     let constant = |evaluator: &mut Evaluator, value: f64| Value::Real(evaluator.graph.constant(value));
     Ok(Some(match name {
         "zeros" | "zero" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             Value::matrix(rows, columns, vec![constant(evaluator, 0.0); rows * columns])
         }
         "identity" | "one" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let (zero, one) = (constant(evaluator, 0.0), constant(evaluator, 1.0));
             from_fn(rows, columns, |r, c| Ok(if r == c { one.clone() } else { zero.clone() }))?
         }
         "repeat" | "from_element" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let element = Value::Real(evaluator.real(call.only()?, at)?);
             Value::matrix(rows, columns, vec![element; rows * columns])
         }
         "from_diagonal_element" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let (zero, element) = (constant(evaluator, 0.0), Value::Real(evaluator.real(call.only()?, at)?));
             from_fn(rows, columns, |r, c| Ok(if r == c { element.clone() } else { zero.clone() }))?
         }
         "from_fn" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let closure = call.only()?;
             from_fn(rows, columns, |r, c| {
                 evaluator.tick(1, at)?;
@@ -81,7 +81,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         }
         // Elements row after row, as one reads a matrix.
         "new" => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let elements = reals(evaluator, &call.arguments, at)?;
             fits(elements.len(), rows, columns, at)?;
             from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))?
@@ -108,7 +108,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
             from_fn(n, n, |r, c| Ok(if r == c { diagonal.elements[r].clone() } else { zero.clone() }))?
         }
         "x" | "y" | "z" | "w" | "x_axis" | "y_axis" | "z_axis" if call.arguments.is_empty() => {
-            let (rows, columns) = size()?;
+            let (rows, columns) = size(evaluator)?;
             let Some((axis, _)) = super::matrix::field(&name[..1], rows, columns) else { return Ok(None) };
             let (zero, one) = (constant(evaluator, 0.0), constant(evaluator, 1.0));
             from_fn(rows, columns, |r, _| Ok(if r == axis { one.clone() } else { zero.clone() }))?
@@ -118,9 +118,17 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
 }
 
 /// The size of a matrix that has to be known.
-fn known_size(name: &str, size: (Option<usize>, Option<usize>), at: At) -> Result<(usize, usize)> {
+fn known_size(
+    evaluator: &mut Evaluator,
+    name: &str,
+    size: (Option<usize>, Option<usize>),
+    at: At,
+) -> Result<(usize, usize)> {
     match size {
-        (Some(rows), Some(columns)) => Ok((rows, columns)),
+        (Some(rows), Some(columns)) => {
+            evaluator.tick(rows.saturating_mul(columns), at)?;
+            Ok((rows, columns))
+        }
         _ => Err(error(
             at,
             format!(
@@ -140,7 +148,7 @@ fn from_list(
     let elements = elements_of(evaluator, call, rows.zip(columns))?;
     let (rows, columns) = match (rows, columns) {
         (None, Some(1)) => (elements.len(), 1),
-        size => known_size(name, size, call.at)?,
+        size => known_size(evaluator, name, size, call.at)?,
     };
     fits(elements.len(), rows, columns, call.at)?;
     if name.starts_with("from_row") {
@@ -184,7 +192,7 @@ fn elements_of(evaluator: &mut Evaluator, call: &Call, size: Option<(usize, usiz
     let mut elements = Vec::new();
     let source = evaluator.load(call.only()?.clone(), at)?;
     let mut iter = super::iterator::into_iter(evaluator, source, at)?;
-    let limit = size.map_or(usize::MAX, |(rows, columns)| rows * columns);
+    let limit = size.map_or(usize::MAX, |(rows, columns)| rows.saturating_mul(columns));
     while elements.len() < limit {
         let Some(value) = iter.next(evaluator, at)? else { break };
         elements.push(Value::Real(evaluator.real(&value, at)?));

@@ -1,14 +1,15 @@
 //! Methods and constants of `f64`.
 //!
-//! Each is built from the graph's functions such that the bits are those of the method, with three
-//! exceptions: `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, and `powi`
-//! of a graph is that of the scalar it runs on.
+//! Each is built from the graph's functions such that the bits are those of the method, with four
+//! exceptions: `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, as
+//! `copysign` of a NaN is, and `powi` of a graph is that of the scalar it runs on.
 
 use super::Call;
 use crate::graph::{Binary, Compare, Node, Unary};
 use crate::language::arithmetic::{Comparison, Operator};
 use crate::language::evaluator::{Evaluator, error, unsupported};
 use crate::language::value::Value;
+use core::cmp::Ordering;
 use syn::Result;
 
 /// A method of `f64`. `None` if there is no such method.
@@ -73,17 +74,8 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
             let [b] = numbers(evaluator, call)?;
             smaller(evaluator, a, b)
         }
-        "clamp" => {
-            let [low, high] = numbers(evaluator, call)?;
-            let a = larger(evaluator, a, low);
-            smaller(evaluator, a, high)
-        }
-        "copysign" => {
-            let [sign] = numbers(evaluator, call)?;
-            let size = evaluator.graph.unary(Unary::Abs, a);
-            let sign = evaluator.graph.unary(Unary::Signum, sign);
-            evaluator.graph.binary(Binary::Mul, size, sign)
-        }
+        "clamp" => clamp(evaluator, a, call)?,
+        "copysign" => copysign(evaluator, a, call)?,
         "to_radians" => {
             call.expect(0)?;
             let factor = evaluator.graph.constant(core::f64::consts::PI / 180.0);
@@ -97,6 +89,30 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
         _ => return known(evaluator, a, call),
     };
     Ok(Some(Value::Real(value)))
+}
+
+fn clamp(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
+    let [low, high] = numbers(evaluator, call)?;
+    if let (Some(low), Some(high)) = (evaluator.graph.value(low), evaluator.graph.value(high))
+        && !matches!(low.partial_cmp(&high), Some(Ordering::Less | Ordering::Equal))
+    {
+        return Err(error(call.at, format!("the bounds of `clamp` are {low} > {high}, or NaN")));
+    }
+    let a = larger(evaluator, a, low);
+    Ok(smaller(evaluator, a, high))
+}
+
+fn copysign(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
+    let [sign] = numbers(evaluator, call)?;
+    let size = evaluator.graph.unary(Unary::Abs, a);
+    Ok(match evaluator.graph.value(sign) {
+        Some(sign) if sign.is_sign_negative() => evaluator.graph.unary(Unary::Neg, size),
+        Some(_) => size,
+        None => {
+            let sign = evaluator.graph.unary(Unary::Signum, sign);
+            evaluator.graph.binary(Binary::Mul, size, sign)
+        }
+    })
 }
 
 /// `a` if it is not less than `b`.
@@ -117,27 +133,24 @@ fn smaller(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
     evaluator.graph.select(greater, b, a)
 }
 
+/// Methods of known numbers.
+#[rustfmt::skip]
+const KNOWN: &[&str] = &[
+    "floor", "ceil", "round", "round_ties_even", "trunc", "fract", "rem_euclid", "div_euclid", "is_nan",
+    "is_finite", "is_infinite", "is_sign_positive", "is_sign_negative", "total_cmp", "partial_cmp", "to_bits",
+];
+
+/// Whether `f64` has a method of its own of a name, not by a trait.
+pub fn is_inherent(name: &str) -> bool {
+    unary(name).is_some()
+        || KNOWN.contains(&name) && name != "partial_cmp"
+        || matches!(name, "sin_cos" | "powi" | "powf" | "atan2" | "hypot" | "log" | "mul_add" | "recip")
+        || matches!(name, "max" | "min" | "clamp" | "copysign" | "to_radians" | "to_degrees")
+}
+
 /// Methods without a useful derivative: of numbers that are known, they are known too.
 fn known(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value>> {
-    const NAMES: &[&str] = &[
-        "floor",
-        "ceil",
-        "round",
-        "round_ties_even",
-        "trunc",
-        "fract",
-        "rem_euclid",
-        "div_euclid",
-        "is_nan",
-        "is_finite",
-        "is_infinite",
-        "is_sign_positive",
-        "is_sign_negative",
-        "total_cmp",
-        "partial_cmp",
-        "to_bits",
-    ];
-    if !NAMES.contains(&call.name) {
+    if !KNOWN.contains(&call.name) {
         return Ok(None);
     }
     let refuse = || unsupported(call.at, format!("`{}` of a model quantity", call.name));

@@ -20,11 +20,15 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
     if let Some(value) = table::construct(evaluator, before, call)? {
         return Ok(Some(value));
     }
+    let of_user = matches!(function.path[0].as_str(), "crate" | "super" | "self");
     let value = match (before, name) {
+        // What is in the user's own modules is none of these, whatever they are called.
+        _ if function.owner.is_none() && of_user => return Ok(None),
         ("array", "from_fn") => from_fn(evaluator, call)?,
         ("array", "from_ref") | ("convert", "identity") => call.only()?.clone(),
         ("array", "repeat") => {
             let length = array_length(call)?;
+            evaluator.tick(length, at)?;
             Value::array(vec![call.only()?.clone(); length])
         }
         ("iter", _) => return made_iterator(evaluator, name, call),
@@ -48,7 +52,9 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
             Value::Bool(known) => Value::Real(evaluator.graph.constant(f64::from(u8::from(known)))),
             other => Value::Real(evaluator.real(&other, at)?),
         },
-        (_, "default") if call.arguments.is_empty() => {
+        (before, "default")
+            if call.arguments.is_empty() && (function.owner.is_some() || before == "Default") =>
+        {
             let ty = function.owner.clone().unwrap_or_default();
             let ty = if matches!(ty, Type::Unknown) { call.expected.clone() } else { ty };
             return match ty {
@@ -177,10 +183,12 @@ pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
             Value::tuple(parts?)
         }
         Type::Array(element, Some(length)) => {
+            evaluator.tick(*length, at)?;
             let element = default(evaluator, element, at)?;
             Value::array(vec![element; *length])
         }
         Type::Matrix(Some(rows), Some(columns)) => {
+            evaluator.tick(rows.saturating_mul(*columns), at)?;
             let zero = Value::Real(evaluator.graph.constant(0.0));
             Value::matrix(*rows, *columns, vec![zero; rows * columns])
         }
@@ -211,7 +219,14 @@ pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
     if (module, name.as_str()) == ("", "None") || (module, name.as_str()) == ("Option", "None") {
         return Some(Value::Option(None));
     }
-    if let Some(value) = float::constant(module, name) {
+    // Other modules may be called `consts`, too.
+    let of_float = match path.path.as_slice() {
+        [root @ .., float, _, _] if module == "consts" => {
+            float == "f64" && (root.is_empty() || root == ["core"] || root == ["std"])
+        }
+        _ => module != "consts",
+    };
+    if of_float && let Some(value) = float::constant(module, name) {
         return Some(Value::Real(evaluator.graph.constant(value)));
     }
     let ty = match &path.owner {

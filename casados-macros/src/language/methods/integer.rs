@@ -78,7 +78,8 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         "checked_mul" => checked(x.checked_mul(y)),
         "checked_div" => checked(x.checked_div(y)),
         "checked_pow" => checked(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
-        "count_ones" => Ok(Some(bits(x.count_ones()))),
+        // Negative numbers have the bits of their type.
+        "count_ones" => Ok(Some(bits((x << (128 - ty.map_or(32, IntegerType::bits))).count_ones()))),
         "trailing_zeros" => {
             Ok(Some(bits(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() })))
         }
@@ -117,6 +118,13 @@ fn takes_integers(name: &str) -> bool {
             | "checked_pow"
             | "ilog"
     )
+}
+
+/// Whether integers have a method of their own of a name, not by a trait.
+pub fn is_inherent(name: &str) -> bool {
+    takes_integers(name) && !matches!(name, "min" | "max" | "clamp")
+        || matches!(name, "abs" | "unsigned_abs" | "signum" | "isqrt" | "is_power_of_two" | "is_positive")
+        || matches!(name, "is_negative" | "count_ones" | "trailing_zeros" | "ilog2")
 }
 
 fn bits(value: u32) -> Value {

@@ -44,8 +44,8 @@ pub enum Iter {
     SkipWhile(Box<Iter>, Option<Value>),
     /// As long as a closure makes some; `None` once it did not.
     MapWhile(Option<Box<Iter>>, Value),
-    /// A closure with a state.
-    Scan { inner: Box<Iter>, state: Place, closure: Value },
+    /// A closure with a state, which copies of the iterator do not share.
+    Scan { inner: Box<Iter>, state: Value, closure: Value },
     /// From the back.
     Rev(Box<Iter>),
     /// The first so many.
@@ -78,7 +78,9 @@ impl Iter {
             Iter::Elements { front, back, .. } | Iter::Places { front, back, .. } => {
                 back.saturating_sub(*front)
             }
-            Iter::Range { front, back, .. } => usize::try_from((*back - *front).max(0)).unwrap_or(usize::MAX),
+            Iter::Range { front, back, .. } => {
+                usize::try_from(back.saturating_sub(*front).max(0)).unwrap_or(usize::MAX)
+            }
             Iter::ByRef(place) => match evaluator.read(place, at)? {
                 Value::Iterator(inner) => inner.length(evaluator, at)?,
                 _ => 0,

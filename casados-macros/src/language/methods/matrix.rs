@@ -6,7 +6,7 @@ use super::iterator::Iter;
 use super::{Call, Receiver, construction};
 use crate::graph::{Binary, Node, Unary};
 use crate::language::arithmetic::Operator;
-use crate::language::evaluator::{Evaluator, error, unsupported};
+use crate::language::evaluator::{At, Evaluator, error, unsupported};
 use crate::language::types::Type;
 use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
@@ -27,6 +27,29 @@ pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> 
         _ => return None,
     };
     (row < rows && column < columns).then_some((row, column))
+}
+
+/// The length of a difference: squares are summed one after the other, not as `dot` does it.
+fn distance(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> Result<Node> {
+    let mut squared = evaluator.graph.constant(0.0);
+    for element in &zip(evaluator, a, b, Binary::Sub, at)?.elements {
+        let element = evaluator.real(element, at)?;
+        let square = evaluator.graph.binary(Binary::Mul, element, element);
+        squared = evaluator.graph.binary(Binary::Add, squared, square);
+    }
+    Ok(evaluator.graph.unary(Unary::Sqrt, squared))
+}
+
+/// Whether nalgebra has a method of a name, which all take `&self`.
+#[rustfmt::skip]
+pub fn is_inherent(name: &str) -> bool {
+    const NAMES: &[&str] = &[
+        "abs", "add_scalar", "column", "component_div", "component_mul", "cross", "cross_matrix", "determinant",
+        "diagonal", "dot", "iter", "len", "magnitude", "magnitude_squared", "map", "max", "mean",
+        "metric_distance", "min", "norm", "norm_squared", "normalize", "product", "row", "scale", "sum",
+        "tr_dot", "trace", "transpose", "unscale", "zip_map",
+    ];
+    NAMES.contains(&name)
 }
 
 /// A method of a matrix. `None` if there is no such method.
@@ -105,9 +128,7 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
         "metric_distance" => {
             let other = argument(evaluator, call, 0)?;
             same_shape(matrix, &other, call)?;
-            let difference = zip(evaluator, matrix, &other, Binary::Sub, at)?;
-            let squared = norm_squared(evaluator, &difference, at)?;
-            real(evaluator.graph.unary(Unary::Sqrt, squared))
+            real(distance(evaluator, matrix, &other, at)?)
         }
         "scale" | "unscale" => {
             let factor = evaluator.real(call.only()?, at)?;

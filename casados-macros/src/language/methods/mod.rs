@@ -15,6 +15,8 @@ mod matrix;
 mod option;
 mod table;
 
+pub use matrix::field as matrix_field;
+
 use super::evaluator::{At, Evaluator, error};
 use super::place::Place;
 use super::types::Type;
@@ -109,6 +111,16 @@ pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Re
     common(evaluator, value, call)
 }
 
+/// Whether a number or a matrix has a method of its own of a name, which hides those of traits.
+pub fn is_inherent(ty: &Type, name: &str) -> bool {
+    match ty {
+        Type::Real => float::is_inherent(name),
+        Type::Integer(_) => integer::is_inherent(name),
+        Type::Matrix(..) => matrix::is_inherent(name),
+        _ => false,
+    }
+}
+
 /// Whether a method is one that every value has.
 fn is_common(name: &str) -> bool {
     matches!(name, "clone" | "to_owned" | "borrow" | "as_ref" | "into" | "try_into")
@@ -127,7 +139,19 @@ fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option
                 Type::Option(ty) => (**ty).clone(),
                 _ => Type::Unknown,
             };
-            Value::some(convert(evaluator, value, &ty, call.at)?)
+            match (&value, &ty) {
+                (Value::Integer(integer), Type::Integer(ty)) => {
+                    let fitted = super::arithmetic::fit(Some(integer.value), Some(*ty));
+                    Value::Option(fitted.map(|integer| Box::new(Value::Integer(integer))))
+                }
+                (Value::Integer(_), _) => {
+                    return Err(error(
+                        call.at,
+                        "the macro does not see what type `try_into` makes here: write `usize::try_from(..)`",
+                    ));
+                }
+                _ => Value::some(convert(evaluator, value, &ty, call.at)?),
+            }
         }
         _ => value,
     }))
@@ -138,6 +162,10 @@ pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: At) -> Re
     match (&value, ty) {
         (Value::Integer(integer), Type::Real) => {
             Ok(Value::Real(evaluator.graph.constant(integer.value as f64)))
+        }
+        (Value::Integer(integer), Type::Integer(ty)) => {
+            let fitted = super::arithmetic::fit(Some(integer.value), Some(*ty)).map(Value::Integer);
+            fitted.ok_or_else(|| error(at, format!("{} does not fit into `{}`", integer.value, ty.name())))
         }
         (Value::Array(elements), Type::Matrix(rows, columns)) => {
             matrix::from_arrays(evaluator, elements, *rows, *columns, at)

@@ -30,6 +30,14 @@ fn refusals() {
     refused("x[x[0] as usize]", "has no derivative");
     refused("unknown(x[0])", "does not see the function `unknown`");
     refused("crate::params::mass(x[0])", "does not see the function `crate::params::mass`");
+    for call in ["smooth::abs(x[0])", "crate::smooth::max(x[0], x[1])", "super::helpers::sin(x[0])"] {
+        refused(call, "does not see the function");
+    }
+    refused("use crate::smooth::abs; abs(x[0])", "does not see the function `crate::smooth::abs`");
+    refused("Outside::sqrt(x[0])", "does not see the function `Outside::sqrt`");
+    refused("let k: f64 = gains::default(); k * x[0]", "does not see the function `gains::default`");
+    refused("x.map(smooth::abs)[0]", "does not see the function `smooth::abs`");
+    refused("let k: f64 = crate::array::from_fn(|i| 0.0); k", "does not see the function");
     refused("nalgebra::Quaternion::new(x[0], x[1], x[2], x[3]).norm()", "four numbers of the state");
     refused("use nalgebra::DVector; DVector::zeros(3).norm() + x[0]", "`SVector`, `SMatrix`");
     refused("x[0] * 1_u128 as f64", "a model has no `u128`");
@@ -46,6 +54,14 @@ fn refusals() {
     refused("unsafe { x[0] }", "unsafe code");
     refused("const A: f64 = B; const B: f64 = A; A", "in terms of itself");
     refused("let [a, b] = x; a", "does not match");
+    refused(
+        "let mut s = 0.0; for i in 0..6 { s += match i { LIMIT => 0.0, _ => x[i] }; } s",
+        "as an integer",
+    );
+    refused("match (x[0], 1usize) { (_, LIMIT) => 0.0, _ => x[1] }", "as an integer");
+    refused("use crate::Mode::*; match Some(2) { Some(Fast) => x[0], _ => x[1] }", "as an integer");
+    refused("match u8::try_from(-1) { Ok(_) => x[0], Err(e) => x[1] }", "write `Err(_)`");
+    refused("match Some(1) { Many(n) => x[0], _ => x[1] }", "this pattern on an `Option`");
     refused("let p = Point { x: 1.0 }; p.x", "does not see the definition of `Point`");
     refused(
         "let mut a = x[0]; let mut b = x[1]; let r = if x[2] > 0.0 { &mut a } else { &mut b }; *r",
@@ -54,6 +70,25 @@ fn refusals() {
     refused("let a = if x[0] > 0.0 { Some(x[0]) } else { None }; 1.0", "between which nothing can choose");
     refused("let n: u8 = 255; let k = n + 1; x[0]", "overflows `u8`");
     refused("1.0f32", "`f64`");
+    refused("let mut f = 1; for k in 1..14 { f *= k; } x[0] * f as f64", "overflows `i32`: if another type");
+    refused("x[0] * (1 << 31) as f64", "overflows `i32`");
+    refused(
+        "let mut r = [0.0; 3]; for i in 0..3 { for j in 0..3 { r[i] += (i - j) as f64 * x[j]; } } r[0]",
+        "overflows `usize`",
+    );
+    refused("let k = 2i32; let n = (k - 5).try_into().unwrap_or(0); x[n]", "write `usize::try_from(..)`");
+    refused("let k = 300i32; let n: u8 = k.into(); x[0]", "300 does not fit into `u8`");
+    refused("x[0].clamp(1.0, 0.0)", "the bounds of `clamp` are 1 > 0");
+    refused("let n = (-1i128..).len(); x[n]", "");
+    for many in [
+        "nalgebra::SMatrix::<f64, 100000, 100000>::zeros()[0]",
+        "nalgebra::SMatrix::<f64, 9000000000000000000, 9000000000000000000>::identity()[0]",
+        "let a: [f64; 100000000] = core::array::repeat(0.0); a[0]",
+        "let a: [f64; 100000000] = Default::default(); a[0]",
+        "let a: nalgebra::SMatrix<f64, 9000000000000000000, 9> = Default::default(); a[0]",
+    ] {
+        refused(many, "evaluation steps");
+    }
     refused("let i: i32 = -1; x[i as usize]", "index out of range");
 }
 
@@ -134,6 +169,20 @@ fn dual_models_need_their_feature() {
     let error = crate::language::dual::require_feature(&function, false).unwrap_err().to_string();
     assert!(error.contains("needs the feature `num-dual`") && error.contains("with `f64`"), "{error}");
     assert!(crate::language::dual::require_feature(&function, true).is_ok());
+}
+
+/// A capital makes a name in a pattern a constant where the pattern may fail.
+#[test]
+fn constants_from_outside_in_patterns() {
+    let source = "fn f(x: [f64; 6]) -> f64 {
+        let M = x[1]; let (A, [B, ..]) = (x[2], x); let g = |C: f64| C * M;
+        match x[0] { LIMIT => g(A), crate::OTHER => B, _ => x[3] } }";
+    let (evaluator, list) = evaluate(source).unwrap();
+    let value = |opaque: &[f64]| {
+        let variables = &[2.0, 3.0, 5.0, 7.0];
+        evaluator.graph.evaluate(&list, crate::graph::Point { variables, opaque, seeds: &[] })[0]
+    };
+    assert_eq!((value(&[2.0, 1.0]), value(&[1.0, 2.0]), value(&[1.0, 1.0])), (15.0, 2.0, 7.0));
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod control;
 mod errors;
 mod functions;
 mod models;
+mod order;
 mod patterns;
 mod selection;
 mod values;

@@ -85,3 +85,25 @@ fn long_chains_are_errors() {
         assert!(message.contains(expected), "{message}");
     }
 }
+
+/// Modules that use each other, and names that are nowhere: an end in bounded time.
+#[test]
+fn uses_that_lead_in_circles() {
+    let names = ["a", "b", "c", "d", "e", "g"];
+    let module = |name: &str| {
+        let others: String = names.iter().map(|other| format!("pub use super::{other}::*; ")).collect();
+        format!(
+            "pub mod {name} {{ {others} pub use super::a::K; pub use super::b::T as T; pub use self::r#in as r#in; }} "
+        )
+    };
+    let modules: String = names.iter().map(|name| module(name)).collect();
+    let of = |body: &str| {
+        let source = format!("mod m {{ {modules} pub fn m(x: f64) -> f64 {{ {body} }} }}");
+        read(Form::Ode, quote!(), syn::parse_str(&source).unwrap())
+    };
+    assert!(of("a::K * x + b::other::K + super::super::K + self::a::b::LIMIT").is_ok());
+    for body in ["a::f(x)", "super::m::f(x)", "self::self::f(x)", "c::T { y: x }.y", "a::r#in(x)"] {
+        let error = of(body).err().map(|error| error.to_string());
+        assert!(error.is_some_and(|error| error.contains("does not see")), "{body}");
+    }
+}

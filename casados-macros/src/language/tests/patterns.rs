@@ -24,4 +24,13 @@ same! {
     constants: fn f(x: [f64; 6]) -> f64 { const N: usize = 3; const m: usize = 4; let mut s = 0.0; for i in 0..6 { s += match i { N => x[0], m => x[1] * 2.0, usize::MAX => 0.0, _ => 1.0 }; } s }
     matched_mutation: fn f(x: [f64; 6]) -> f64 { let mut o = Some(x[0]); if let Some(v) = &mut o { *v += x[1]; } if let Some(ref mut v) = o { *v *= 2.0; } match o { Some(v) => v, None => 0.0 } }
     loops: fn f(x: [f64; 6]) -> f64 { let mut s = 0.0; for (i, [a, b]) in [(1usize, [x[0], x[1]]), (2, [x[2], x[3]])] { s += a * b * i as f64; } for &(i, v) in &[(0usize, 1.0), (3, 2.0)] { s += x[i] * v; } s }
+    results: fn f(x: [f64; 6]) -> [f64; 6] {
+        core::array::from_fn(|i| {
+            let Ok(small) = u8::try_from(i as i32 * 100) else { return x[5] };
+            let r = match i8::try_from(i as i32 * 50) { Ok(v) if v > 60 => 3.0, Ok(_) => 1.0, Err(_) => 2.0 };
+            let m = matches!(usize::try_from(i as i32 - 3), Ok(1 | 2));
+            let e = if let Err(_) = usize::try_from(i as i32 - 2) { 5.0 } else { 0.5 };
+            if let Ok(j) = usize::try_from(i as i32 - 1) { x[j] * r + e } else { small as f64 + m as u8 as f64 }
+        })
+    }
 }

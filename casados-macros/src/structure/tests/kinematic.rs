@@ -50,6 +50,18 @@ fn kinematic_states() {
         sub(g, v[5], constant)
     };
     assert_eq!(kinematic(shifted, None, sine), []);
+    // So does a difference of constants from outside; a factor from outside is no constant.
+    let unknown: Row = |g, v| {
+        let (a, b) = (g.opaque(0), g.opaque(1));
+        let difference = sub(g, a, b);
+        sub(g, v[5], difference)
+    };
+    assert_eq!(kinematic(unknown, None, sine), []);
+    let scaled: Row = |g, v| {
+        let factor = g.opaque(0);
+        mul(g, factor, v[5])
+    };
+    assert_eq!(kinematic(scaled, None, sine), [(0, 4, 5, vec![5, 9, 13])]);
     let timed: Row = |g, v| {
         let time = g.unary(Unary::Sin, v[9]);
         sub(g, v[5], time)

@@ -139,6 +139,20 @@ pub fn map_while(
     Ok(value)
 }
 
+/// `scan`: the state is lent to the closure.
+pub fn scan(
+    state: &mut Value,
+    closure: &Value,
+    value: Value,
+    evaluator: &mut Evaluator,
+    at: At,
+) -> Result<Option<Value>> {
+    let place = Place::new(state.clone());
+    let next = evaluator.call(closure, vec![Value::Reference(place.clone()), value], at)?;
+    *state = evaluator.read(&place, at)?;
+    known_option(next, at)
+}
+
 pub fn skip(inner: &mut Iter, left: &mut usize, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
     while *left > 0 {
         *left -= 1;

@@ -60,10 +60,7 @@ impl Iter {
             Iter::MapWhile(inner, closure) => adapters::map_while(inner, closure, evaluator, at)?,
             Iter::Scan { inner, state, closure } => match inner.next(evaluator, at)? {
                 None => None,
-                Some(value) => {
-                    let arguments = vec![Value::Reference(state.clone()), value];
-                    known_option(evaluator.call(closure, arguments, at)?, at)?
-                }
+                Some(value) => adapters::scan(state, closure, value, evaluator, at)?,
             },
             Iter::Rev(inner) => inner.next_back(evaluator, at)?,
             Iter::Take(_, 0) => None,
@@ -127,7 +124,10 @@ impl Iter {
             Iter::FilterMap(inner, closure) => adapters::filter_map(inner, closure, BACK, evaluator, at)?,
             Iter::Rev(inner) => inner.next(evaluator, at)?,
             Iter::Take(inner, left) => {
-                for _ in *left..inner.length(evaluator, at)? {
+                // All values of `repeat` are the last one.
+                let endless = matches!(**inner, Iter::Repeat(_));
+                let length = if endless { *left } else { inner.length(evaluator, at)? };
+                for _ in *left..length {
                     inner.next_back(evaluator, at)?;
                 }
                 *left = left.saturating_sub(1);

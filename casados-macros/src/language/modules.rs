@@ -1,0 +1,199 @@
+//! Modules that the macro sees: where paths and `use` lead.
+
+use super::environment::{Names, Scope};
+use super::evaluator::Evaluator;
+use super::items::{Items, Symbol, TypeItem};
+use std::cell::OnceCell;
+use std::rc::{Rc, Weak};
+
+/// A module among those that the macro sees.
+#[derive(Debug, Default)]
+pub struct Module {
+    /// The names that lead to it from the outermost one.
+    pub names: Vec<String>,
+    /// The module around it, if the macro sees it.
+    pub around: OnceCell<Weak<Scope>>,
+}
+
+/// Where a path to a module leads.
+pub(super) enum Lead {
+    /// To a module that the macro sees.
+    Module(Rc<Scope>),
+    /// Out of them, or to something else: a crate, a type.
+    Elsewhere,
+}
+
+/// The modules that a search has been in, so that it ends where each of two uses the other.
+pub(super) type Trail = Vec<*const Scope>;
+
+/// `use` items that lead to each other are followed so far.
+pub(super) const LINKS: usize = 64;
+
+/// The items of a scope, if it has any.
+fn items(scope: &Scope) -> Option<&Items> {
+    match &scope.names {
+        Names::Items(items) => Some(items),
+        _ => None,
+    }
+}
+
+/// The innermost module around a scope.
+pub(super) fn module_of(scope: &Rc<Scope>) -> Option<&Rc<Scope>> {
+    scope.chain().find(|scope| items(scope).is_some_and(|items| items.module.is_some()))
+}
+
+/// The names from the outermost module that the macro sees to the one around a scope.
+pub(super) fn names_of(scope: &Rc<Scope>) -> &[String] {
+    let module = module_of(scope).and_then(|module| items(module)).and_then(|items| items.module.as_ref());
+    module.map_or(&[], |module| &module.names)
+}
+
+/// The module around the innermost one.
+fn around(scope: &Rc<Scope>) -> Option<Rc<Scope>> {
+    let module = items(module_of(scope)?)?.module.as_ref()?;
+    module.around.get()?.upgrade()
+}
+
+/// The full path of a name that a `use` has brought here, and where that stands.
+pub(super) fn used(scope: &Rc<Scope>, name: Symbol) -> Option<(Vec<String>, Rc<Scope>)> {
+    scope.chain().find_map(|scope| Some((items(scope)?.uses.get(&name)?.clone(), scope.clone())))
+}
+
+/// The path from the outermost module that the macro sees, of one that begins with `self` or
+/// `super` in an inner one.
+pub(super) fn from_outermost(path: Vec<String>, scope: &Rc<Scope>) -> Vec<String> {
+    let names = names_of(scope);
+    let steps = path.iter().take_while(|name| matches!(name.as_str(), "self" | "super")).count();
+    if names.is_empty() || steps == 0 {
+        return path;
+    }
+    let up = path[..steps].iter().filter(|name| *name == "super").count();
+    let mut full = match names.len().checked_sub(up) {
+        Some(left) => ["self".to_owned()].into_iter().chain(names[..left].iter().cloned()).collect(),
+        None => vec!["super".to_owned(); up - names.len()],
+    };
+    full.extend_from_slice(&path[steps..]);
+    full
+}
+
+impl Evaluator {
+    /// Where the names of a path lead that is written in a scope.
+    pub(super) fn lead(&mut self, names: &[String], scope: &Rc<Scope>, trail: &mut Trail) -> Lead {
+        let mut current: Option<Rc<Scope>> = None;
+        let mut names = names;
+        while let Some((first, rest)) = names.split_first() {
+            let next = match first.as_str() {
+                "self" => module_of(current.as_ref().unwrap_or(scope)).cloned(),
+                "super" => around(current.as_ref().unwrap_or(scope)),
+                "crate" => None,
+                _ => break,
+            };
+            let Some(next) = next else { return Lead::Elsewhere };
+            (current, names) = (Some(next), rest);
+        }
+        for name in names {
+            let symbol = self.symbol_of(name);
+            let place = current.as_ref().unwrap_or(scope);
+            let module = place.chain().find_map(|scope| items(scope)?.modules.get(&symbol).cloned());
+            let next = match (module, used(place, symbol)) {
+                (Some(module), _) => module,
+                (None, Some((full, place))) if trail.len() < LINKS => {
+                    trail.push(Rc::as_ptr(&place));
+                    match self.lead(&full, &place, trail) {
+                        Lead::Module(module) => module,
+                        Lead::Elsewhere => return Lead::Elsewhere,
+                    }
+                }
+                _ => return Lead::Elsewhere,
+            };
+            current = Some(next);
+        }
+        current.map_or(Lead::Elsewhere, Lead::Module)
+    }
+
+    /// The type that a path leads to, and where it stands.
+    pub(super) fn seen_type(
+        &mut self,
+        path: &[String],
+        scope: &Rc<Scope>,
+        trail: &mut Trail,
+    ) -> Option<(TypeItem, Rc<Scope>)> {
+        let (last, modules) = path.split_last()?;
+        let symbol = self.symbol_of(last);
+        let place = match self.lead(modules, scope, trail) {
+            Lead::Module(module) => module,
+            Lead::Elsewhere if modules.is_empty() => scope.clone(),
+            Lead::Elsewhere => return None,
+        };
+        let places: Vec<_> = place.chain().cloned().collect();
+        places.iter().find_map(|place| self.type_in(symbol, place, trail))
+    }
+
+    /// The type of a name among the items of a scope, or brought there by a `use`.
+    pub(super) fn type_in(
+        &mut self,
+        symbol: Symbol,
+        scope: &Rc<Scope>,
+        trail: &mut Trail,
+    ) -> Option<(TypeItem, Rc<Scope>)> {
+        let items = items(scope)?;
+        if let Some(item) = items.types.get(&symbol) {
+            return Some((item.clone(), scope.clone()));
+        }
+        if trail.len() >= LINKS {
+            return None;
+        }
+        if let Some(full) = items.uses.get(&symbol) {
+            trail.push(Rc::as_ptr(scope));
+            return self.seen_type(full, scope, trail);
+        }
+        for glob in &items.globs {
+            let Lead::Module(module) = self.lead(glob, scope, trail) else { continue };
+            if trail.contains(&Rc::as_ptr(&module)) {
+                continue;
+            }
+            trail.push(Rc::as_ptr(&module));
+            if let Some(found) = self.type_in(symbol, &module, trail) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// A `use` as generated code needs it, which stands in the outermost module: of one in an inner
+    /// module nothing but globs, as other names have full paths.
+    pub(super) fn emitted_use(&mut self, item: &syn::ItemUse, scope: &Rc<Scope>) -> Option<syn::ItemUse> {
+        let names = names_of(scope);
+        if names.is_empty() {
+            return Some(item.clone());
+        }
+        if !has_glob(&item.tree) {
+            return None;
+        }
+        let mut up = 0;
+        let mut tree = &item.tree;
+        while let syn::UseTree::Path(path) = tree
+            && (path.ident == "self" || path.ident == "super")
+        {
+            up += usize::from(path.ident == "super");
+            tree = &path.tree;
+        }
+        if std::ptr::eq(tree, &raw const item.tree) {
+            return Some(item.clone());
+        }
+        // Of modules that the macro sees it knows the names.
+        let up = up.checked_sub(names.len()).filter(|up| *up > 0)?;
+        let above = std::iter::repeat_n(quote::quote!(super::), up);
+        syn::parse2(quote::quote!(use #(#above)* #tree;)).ok()
+    }
+}
+
+/// Whether a `use` brings everything of a module.
+fn has_glob(tree: &syn::UseTree) -> bool {
+    match tree {
+        syn::UseTree::Path(path) => has_glob(&path.tree),
+        syn::UseTree::Group(group) => group.items.iter().any(has_glob),
+        syn::UseTree::Glob(_) => true,
+        _ => false,
+    }
+}
