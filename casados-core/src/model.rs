@@ -259,8 +259,7 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
-    /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual depends on that may
-    /// change within an interval; zero too where they are not known.
+    /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has; none if unknown.
     const BRANCHES: usize = 0;
 
     /// The residual `f(v)`.
@@ -315,8 +314,7 @@ pub trait Dae: 'static {
         hessian: &mut Self::Hessian<S::Cell>,
     );
 
-    /// Which of them the residual takes: a number that changes where a condition does or a linear
-    /// table has a point, and one that changes at the points of splines.
+    /// A number that changes with the conditions and pieces of linear tables, and one of splines.
     fn branches<S: Lanes>(_v: &ArrayV<Self, S::Cell>, _branches: &mut [S::Cell; 2]) {}
 
     /// What is known about the model, to be printed: `println!("{}", Pendulum::describe())`.

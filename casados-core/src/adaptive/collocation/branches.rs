@@ -1,5 +1,5 @@
-//! Whether a model changes its branch inside of a step: whether at a stage a condition of an `if`, a
-//! `max` or an `abs` is another one than at the start, or the piece of a table. Between two stages
+//! Whether a model changes its branch inside of a step: whether a condition of an `if`, a `max` or
+//! an `abs` is another one at a stage than at the start, or the piece of a table. Between two stages
 //! nobody knows.
 
 use super::*;
