@@ -259,7 +259,7 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
-    /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has; none if unknown.
+    /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 
     /// The residual `f(v)`.

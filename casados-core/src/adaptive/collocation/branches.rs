@@ -1,6 +1,6 @@
 //! Whether a model changes its branch inside of a step: whether a condition of an `if`, a `max` or
-//! an `abs` is another one at a stage than at the start, or the piece of a table. Between two stages
-//! nobody knows.
+//! an `abs` is another one at a stage than at the start, or the piece of a table. Nobody knows what
+//! happens between two stages.
 
 use super::*;
 
