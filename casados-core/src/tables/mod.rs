@@ -38,9 +38,9 @@
 //! so that it stays C², where the second derivative of the others jumps. A linear table that should
 //! stay constant has its last value twice; a spline is clamped with the slope zero.
 //!
-//! **Where a linear table has a kink** its derivative is that of the piece on the right. Newton's
-//! method and error estimates of steps know nothing of kinks: steps across one lose their order.
-//! A spline has none.
+//! **Where a linear table has a kink** its derivative is that of the piece on the right. Steps
+//! across one lose their order: adaptive implicit methods see them and take shorter ones. A spline
+//! has none.
 //!
 //! Points that do not increase and numbers that are not finite are errors of the compiler in a
 //! `const`.
