@@ -77,6 +77,7 @@ pub(crate) fn check_forward<M: Dae, T: Real>(result: &Forward<M, T>, step: usize
 ///
 /// # Errors
 /// [`Error::Overflow`] of the first element that is not finite.
+#[inline(always)]
 pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), Error> {
     check_output(x0, 0)?;
     check_output(u, 0)?;
