@@ -1,9 +1,8 @@
 //! The calls that all integrators have in common, with an integrand or without.
 
-use super::integrator::Integrator;
+use super::integrator::{Integrator, finite};
 use super::sweeps::Whole;
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
 use crate::integrator::{self, With};
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Ode, VectorP, VectorU, VectorX};
@@ -82,7 +81,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
     where
         W: WithHessian,
     {
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut Whole, &mut along)?.1)
     }

@@ -5,10 +5,9 @@ use super::along::Nothing;
 use super::doubt::Doubt;
 use super::engine::write_state;
 use super::forward::{Seeded, write};
-use super::integrator::Integrator;
+use super::integrator::{Integrator, finite};
 use super::sweeps::Whole;
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
 use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
 #[cfg(feature = "alloc")]
@@ -73,9 +72,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check_named::<M, T>(Argument::SeedX, seeds.x0.as_slice())?;
-        check_named::<M, T>(Argument::SeedU, seeds.u.as_slice())?;
-        check_named::<M, T>(Argument::SeedP, seeds.p.as_slice())?;
+        finite::<M, T>(seeds.x0.as_slice(), Argument::SeedX)?;
+        finite::<M, T>(seeds.u.as_slice(), Argument::SeedU)?;
+        finite::<M, T>(seeds.p.as_slice(), Argument::SeedP)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.engine.base)?;
         let variation = &mut W::forward(&mut self.engine.forward)?.sweep.forward;
@@ -120,7 +119,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         lambda: &VectorX<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.adjoint(&grid, lambda.as_slice(), &mut along)?.1)
     }
@@ -139,7 +138,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check_named::<M, T>(Argument::Lambda, lambdas.as_slice())?;
+        finite::<M, T>(lambdas.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.engine.base)?;
         let sweep = &mut W::forward(&mut self.engine.forward)?.sweep;
@@ -177,7 +176,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.forward_adjoint(&grid, lambda.as_slice(), &mut Whole)?.1)
     }
