@@ -106,11 +106,9 @@ fn single(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### One call\n")?;
     writeln!(
         text,
-        "Microseconds: the median of five rounds [the least, the greatest]. Cold: from zero. 1e-8: Newton's method to 1e-8 / steps, as acados; rounding: the default."
-    )?;
-    writeln!(
-        text,
-        "Warm: two intervals in turn whose inputs are 1e-2 apart. Error: largest, relative to the largest element of the reference.\n"
+        "Microseconds: the median of five rounds [the least, the greatest]. Cold: from zero. 1e-8:\n\
+         Newton's method to 1e-8 / steps, as acados; rounding: the default. Warm: two intervals in turn\n\
+         whose inputs are 1e-2 apart. Error: largest, relative to the largest element of the reference.\n"
     )?;
     single_table(text, rows)
 }
@@ -146,11 +144,9 @@ fn peers(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### One call beside CasADi and acados\n")?;
     writeln!(
         text,
-        "Microseconds; cold, tolerance 1e-8 / steps; all that has a range was measured in turn, in five rounds, and what has the sign ≈ was carried over by the ratio of CasADi."
-    )?;
-    writeln!(
-        text,
-        "The last columns say how many times faster casados is. Errors stand behind the peer that they are of.\n"
+        "Microseconds; cold, tolerance 1e-8 / steps; all that has a range was measured in turn, in five\n\
+         rounds, and what has the sign ≈ was carried over by the ratio of CasADi. The last columns say\n\
+         how many times faster casados is. Errors stand behind the peer that they are of.\n"
     )?;
     peers_table(text, rows)
 }
@@ -192,7 +188,8 @@ fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### Forty intervals\n")?;
     writeln!(
         text,
-        "Microseconds of one of 40 different intervals, whose results are all kept; cold, tolerance 1e-8 / steps; on one thread.\n"
+        "Microseconds of one of 40 different intervals, whose results are all kept; cold, tolerance 1e-8\n\
+         / steps; on one thread.\n"
     )?;
     writeln!(
         text,
@@ -225,9 +222,9 @@ fn adaptive(text: &mut String, results: &Results) -> std::fmt::Result {
     writeln!(text, "\n### Beside solvers with step-size control\n")?;
     writeln!(
         text,
-        "Peers at relative and absolute tolerance 1e-8, default settings; microseconds of one call, error against the exact flow. The"
+        "Peers at relative and absolute tolerance 1e-8, default settings; microseconds of one call, error\n\
+         against the exact flow. The adjoint and the Hessian have no exact flow to compare with.\n"
     )?;
-    writeln!(text, "adjoint and the Hessian have no exact flow to compare with.\n")?;
     writeln!(text, "| problem | nx | mode | solver | time | error |\n| --- | --- | --- | --- | --- | --- |")?;
     for line in &results.adaptive {
         let (time, error) = match &line.measured {
@@ -251,7 +248,8 @@ fn growth(text: &mut String, results: &Results) -> std::fmt::Result {
         writeln!(text, "\n### Growth, s = {}, {} steps\n", growth.stages, growth.steps)?;
         writeln!(
             text,
-            "Microseconds of one call, cold, for chains of 9 to 65 masses; the exponent is the slope of log time over log nx.\n"
+            "Microseconds of one call, cold, for chains of 9 to 65 masses; the exponent is the slope of log\n\
+             time over log nx.\n"
         )?;
         writeln!(text, "| nx | simulation | forward | adjoint | Hessian |\n| --- | --- | --- | --- | --- |")?;
         for (nx, measured) in &growth.points {
@@ -271,7 +269,8 @@ fn precision(text: &mut String, results: &Results) -> std::fmt::Result {
     writeln!(text, "\n### What accuracy costs\n")?;
     writeln!(
         text,
-        "Chain of 5 masses, 0.2 s, Gauss-Legendre; microseconds of one call, error against the exact flow (itself known to {uncertainty:.0e}).\n"
+        "Chain of 5 masses, 0.2 s, Gauss-Legendre; microseconds of one call, error against the exact flow\n\
+         (itself known to {uncertainty:.0e}).\n"
     )?;
     writeln!(
         text,
