@@ -208,7 +208,7 @@ pub trait Dynamics<T: Real> {
     type Shape: Shape;
     /// Names of the variables.
     const NAMES: Names;
-    /// Whether [`Step::z`] says what the algebraic states are at nodes.
+    /// Whether [`IntervalResult::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
     /// What the ends of intervals follow from.
     #[doc(hidden)]
