@@ -128,17 +128,17 @@ impl Convergence {
 /// An error of the states, and `(hJ)⁻²` times it.
 pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
 
-/// Why the shape of a defect is looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why the shape of a defect is looked at, the strongest reason last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Look {
     /// Its size is unusual.
     Unusual,
     /// The step is watched, whatever its size is.
     Watched,
-    /// The model changes its branch: the step is rough, whatever its shape is.
-    Branch,
     /// A spline changes its piece: no lower derivative jumps than its highest.
     Knot,
+    /// The model changes its branch: the step is rough, whatever its shape is.
+    Branch,
 }
 
 /// A step with any number of stages.

@@ -207,8 +207,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-/// [`check_named`](crate::finite::check_named), one number after the other: calls of firmware take
-/// up to 2 % fewer instructions.
+/// [`check_named`](crate::finite::check_named), one number after the other: that is shorter where
+/// there are no registers, as on firmware.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]

@@ -14,24 +14,19 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let before = branches_at::<M, T>(start.point);
         let mut point = ArrayV::<M, T>::zeroed();
         let mut change = None;
-        for stage in 0..=S {
-            let end = stage == S;
-            if end && !self.estimates(start, &mut point) {
-                break;
-            }
-            if !end {
-                take(self.memory.points[stage / GROUP].as_ref(), stage % GROUP, point.as_mut());
-            }
-            let [kinks, knots] = branches_at::<M, T>(&point);
-            if kinks != before[0] {
-                return Some(Look::Branch);
-            }
-            if knots != before[1] {
-                change = Some(Look::Knot);
-            }
+        for stage in 0..S {
+            take(self.memory.points[stage / GROUP].as_ref(), stage % GROUP, point.as_mut());
+            change = change.max(difference(before, branches_at::<M, T>(&point)));
+        }
+        if self.estimates(start, &mut point) {
+            change = change.max(difference(before, branches_at::<M, T>(&point)));
         }
         change
     }
+}
+
+fn difference<T: Real>([kinks, knots]: [T; 2], other: [T; 2]) -> Option<Look> {
+    if kinks != other[0] { Some(Look::Branch) } else { (knots != other[1]).then_some(Look::Knot) }
 }
 
 fn branches_at<M: Dae, T: Real>(point: &ArrayV<M, T>) -> [T; 2] {

@@ -56,7 +56,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let (a, b) = ((1.0 - share) / at_seen * at_far, share / at_near * at_far);
         let difference = unlike::<M, T>(&second, &scaled_sum::<M, T>(a, &known, b, &first), start);
         let decades = Scalar::ln(growth) / core::f64::consts::LN_10;
-        let rough = matches!(look, Look::Branch | Look::Knot) || difference * (1.0 + decades) > ROUGH;
+        let rough = look >= Look::Knot || difference * (1.0 + decades) > ROUGH;
         Ok(if rough { largest.max(size::<M, T>(&second, start)) } else { 0.0 })
     }
 

@@ -178,7 +178,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             let shorter = walk.h * T::from_f64(SHORTEST * factor);
             if rough >= 1.0
                 && self.check_step(walk.t, shorter, Refusal::Error).is_ok()
-                && (matches!(look, Look::Branch | Look::Knot) || walk.roughness.refuses(size, seen, error))
+                && (look >= Look::Knot || walk.roughness.refuses(size, seen, error))
             {
                 return Err(Failure::Rough(factor));
             }
