@@ -5,7 +5,7 @@
 //! sum of harmonics from `2jπ` to `(2j + 1)π` and zero from there to `(2j + 2)π`.
 
 use casados::tables::Linear;
-use casados::{Adaptive, AdaptiveOptions, Gauss, Radau, ode};
+use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Gauss, Radau, ode};
 use nalgebra::{SVector, Vector2, vector};
 use std::f64::consts::PI;
 
@@ -104,9 +104,13 @@ macro_rules! errors {
 /// Where only the shape of the defect tells, one in fifteen is.
 #[test]
 fn jumps_of_derivatives_inside_steps() {
-    for errors in
-        [errors!("Radau", Radau), errors!("Gauss, s = 3", Gauss<3>), errors!("Gauss, s = 4", Gauss<4>)]
-    {
+    for errors in [
+        errors!("Radau", Radau),
+        errors!("Gauss, s = 3", Gauss<3>),
+        errors!("Gauss, s = 4", Gauss<4>),
+        errors!("Dormand-Prince 5", DormandPrince5),
+        errors!("Dormand-Prince 8", DormandPrince8),
+    ] {
         let largest = errors.into_iter().fold(0.0, f64::max);
         assert!(largest <= 30.0, "{largest} tolerances");
     }
@@ -161,8 +165,12 @@ fn branches_that_the_state_takes() {
         errors_of_springs!(TwoSprings, Radau),
         errors_of_springs!(TwoSprings, Gauss<3>),
         errors_of_springs!(TwoSprings, Gauss<4>),
+        errors_of_springs!(TwoSprings, DormandPrince5),
+        errors_of_springs!(TwoSprings, DormandPrince8),
         errors_of_springs!(TwoSpringsOfATable, Radau),
         errors_of_springs!(TwoSpringsOfATable, Gauss<4>),
+        errors_of_springs!(TwoSpringsOfATable, DormandPrince5),
+        errors_of_springs!(TwoSpringsOfATable, DormandPrince8),
     ];
     assert!(all.iter().all(|error| *error <= 30.0), "{all:?} tolerances");
 }

@@ -4,6 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
+use super::stages::Look;
 use crate::scalar::{Real, Scalar};
 
 /// Where the first estimate is asked for this much less than the solution, or even less, its
@@ -213,42 +214,73 @@ pub struct Proportional {
     refused_to: f64,
 }
 
+/// A step of an explicit method.
+#[derive(Clone, Copy, Debug)]
+pub struct Passed {
+    /// Where it begins, in the direction of the run,
+    pub t: f64,
+    /// its length,
+    pub h: f64,
+    /// and how it changes the branches of the model, if it does.
+    pub change: Option<Look>,
+}
+
+impl Passed {
+    /// Whether it is long beside roundoff errors of the time, shortened by a factor: no shorter
+    /// step helps.
+    fn is_above_rounding<T: Real>(self, factor: f64) -> bool {
+        factor * self.h > 1e4 * T::EPSILON * self.t.abs()
+    }
+}
+
 impl Proportional {
     /// Where a force jumps between two stages, or its slope, the error of a step is up to so many
     /// times the difference of the two methods, whose weights cancel there.
     const OVER_DIFFERENCE: f64 = 8.0;
-    /// Steps that are no more than so many roundoff errors of the time are not made shorter.
-    const SHORTEST: f64 = 1e4;
+    /// Where the model changes its branch it counts so often: there may be many such steps.
+    const OVER_BRANCH: f64 = 30.0;
 
     pub fn new(control: Control) -> Self {
         Self { control, last: (f64::INFINITY, control.before), refused_to: f64::NEG_INFINITY }
     }
 
-    /// The error of a step from `t` out of the difference of the two methods: larger before the end
-    /// of a step that was refused by much. Of ever shorter steps over a jump one has a small
-    /// difference by chance, and would be accepted.
-    pub fn error_of_difference<T: Real>(&mut self, direction: f64, t: T, h: T, difference: f64) -> f64 {
-        let (t, h) = (direction * t.to_f64(), h.to_f64().abs());
-        let is_over_jump = t < self.refused_to && h > Self::SHORTEST * T::EPSILON * t.abs();
+    /// The error of a step out of the difference of the two methods: larger before the end of a
+    /// step that was refused by much, and where the model changes its branch. Of ever shorter steps
+    /// over a jump one has a small difference by chance, and would be accepted.
+    pub fn error_of_difference<T: Real>(&mut self, step: Passed, difference: f64) -> f64 {
+        let is_over_jump = step.t < self.refused_to;
         if difference >= MUCH {
-            self.refused_to = self.refused_to.max(t + h);
+            self.refused_to = self.refused_to.max(step.t + step.h);
         }
-        if is_over_jump { Self::OVER_DIFFERENCE * difference } else { difference }
+        let count = match step.change {
+            _ if !step.is_above_rounding::<T>(1.0) => 1.0,
+            Some(Look::Branch) => Self::OVER_BRANCH,
+            None if !is_over_jump => 1.0,
+            _ => Self::OVER_DIFFERENCE,
+        };
+        count * difference
     }
 
-    /// The factor for the step size after a step of size `h`, within a range.
-    pub fn factor(&mut self, h: f64, error: f64) -> f64 {
+    /// The factor for the step size after a step with this error, within a range. Where the model
+    /// changes its branch the error behaves like `h³` or a lower power.
+    pub fn factor<T: Real>(&mut self, step: Passed, error: f64) -> f64 {
         let Control { order, memory, safety, predicts, range, .. } = self.control;
         let exponent = 1.0 / order;
         let present = power(error, exponent - 0.75 * memory);
         if error > 1.0 {
-            return (0.9 / present).clamp(range.0, range.1);
+            let over_branch = (0.9 / Scalar::cbrt(error)).clamp(0.1, 0.9);
+            let is_over_branch = step.change == Some(Look::Branch);
+            return if is_over_branch && step.is_above_rounding::<T>(over_branch) {
+                over_branch
+            } else {
+                (0.9 / present).clamp(range.0, range.1)
+            };
         }
-        let (step, before) = core::mem::replace(&mut self.last, (h, error.max(1e-4)));
+        let (length, before) = core::mem::replace(&mut self.last, (step.h, error.max(1e-4)));
         let past = if memory > 0.0 { power(before, memory) } else { 1.0 };
         let mut factor = safety * past / present;
-        if predicts && step.is_finite() {
-            factor = factor.min(0.9 * (h / step) * power(before / (error * error), exponent));
+        if predicts && length.is_finite() {
+            factor = factor.min(0.9 * (step.h / length) * power(before / (error * error), exponent));
         }
         factor.clamp(range.0, range.1)
     }

@@ -1,8 +1,10 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
+use super::branches::Branches;
 use super::norm::norm;
 use super::pairs::Pair;
-use crate::erk::{Grid, Point, Record, Scheme};
+use super::stages::Look;
+use crate::erk::{Grid, Own, Point, Record, Scheme};
 use crate::error::{Error, Place};
 use crate::finite::check_output;
 use crate::memory::allocate;
@@ -27,6 +29,8 @@ struct Memory<M: Ode, T: Real, const S: usize> {
     scale: ArrayX<M, T>,
     /// Stages for dense output.
     more: [ArrayX<M, T>; 3],
+    /// The branches of the model at the start of the step, and at its end.
+    branches: [Branches; 2],
 }
 
 /// A step of an explicit pair.
@@ -54,6 +58,8 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    /// How the step that was taken changes the branches of the model, if it does.
+    fn change(&self) -> Option<Look>;
     /// The state at the end.
     fn end(&self) -> &[T];
     /// The end is the next start.
@@ -73,6 +79,8 @@ pub trait Take<M: Dae, T: Real> {
 pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<Memory<M, T, S>>,
+    /// How the step that was taken changes the branches of the model, if it does.
+    change: Option<Look>,
     /// Steps at the bound of stability less those that are not.
     at_bound: i64,
     method: PhantomData<fn() -> B>,
@@ -80,7 +88,13 @@ pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     pub fn new() -> Result<Self, Error> {
-        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory: allocate()?, at_bound: 0, method: PhantomData })
+        Ok(Self {
+            scheme: Scheme::new(&B::TABLEAU),
+            memory: allocate()?,
+            change: None,
+            at_bound: 0,
+            method: PhantomData,
+        })
     }
 
     /// The derivative at a state.
@@ -156,25 +170,31 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     }
 
     fn slope(&mut self, t: T) -> Result<&[T], Error> {
-        let Memory { point, record, .. } = &mut *self.memory;
+        let Memory { point, record, branches, .. } = &mut *self.memory;
         Self::evaluate(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
+        branches[0] = Branches::of::<M, Own<T>>(&point.v);
         Ok(record.k[0].as_ref())
     }
 
     fn take(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, record, end, .. } = &mut *self.memory;
+        let Memory { point, record, end, branches, .. } = &mut *self.memory;
         let grid = Grid { start: t, h, steps: 1, compensated: false };
+        self.change = None;
         for stage in 1..S {
             let at = Place { step: 0, stage, iteration: 0 };
             point.go(&self.scheme, &grid, record, at)?;
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
+            self.change = self.change.max(branches[0].change(Branches::of::<M, Own<T>>(&point.v)));
         }
         record.end(&self.scheme, &grid, 0, end, None, &mut point.doubt)
     }
 
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, end, end_slope, .. } = &mut *self.memory;
-        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
+        let Memory { point, end, end_slope, branches, .. } = &mut *self.memory;
+        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)?;
+        branches[1] = Branches::of::<M, Own<T>>(&point.v);
+        self.change = self.change.max(branches[0].change(branches[1]));
+        Ok(())
     }
 
     fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
@@ -210,14 +230,19 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Ok(error * self.persistence(steps))
     }
 
+    fn change(&self) -> Option<Look> {
+        self.change
+    }
+
     fn end(&self) -> &[T] {
         self.memory.end.as_ref()
     }
 
     fn advance(&mut self) {
-        let Memory { record, end, end_slope, .. } = &mut *self.memory;
+        let Memory { record, end, end_slope, branches, .. } = &mut *self.memory;
         record.x = *end;
         record.k[0] = *end_slope;
+        branches[0] = branches[1];
     }
 
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {

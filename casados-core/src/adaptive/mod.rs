@@ -22,6 +22,7 @@
 //! `integrals` those of an integrand, `events`, `integrator` what users see.
 
 mod along;
+mod branches;
 mod collocation;
 mod columns;
 mod consistent;

@@ -29,7 +29,7 @@ pub use integrator::Integrator;
 #[cfg(feature = "alloc")]
 pub(crate) use scheme::{Grid, Scheme};
 #[cfg(feature = "alloc")]
-pub(crate) use step::{Point, Record};
+pub(crate) use step::{Own, Point, Record};
 // What computes a batch.
 #[cfg(feature = "alloc")]
 pub(crate) use {

@@ -8,7 +8,7 @@ use crate::adaptive::stages::{Convergence, Look};
 const ROUGH_OVER_ERROR: f64 = 3.0;
 /// Where the model changes its branch the error is held below the tolerance that was asked for by
 /// this: there may be many such steps, and what follows makes more of them.
-const OVER_BRANCHES: f64 = 3.0;
+const OVER_BRANCHES: f64 = 6.0;
 /// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;

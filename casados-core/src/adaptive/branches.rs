@@ -1,0 +1,34 @@
+//! The branches that a model takes at a point: which conditions of `if`, `max` or `abs` hold there,
+//! and which pieces its tables have.
+
+use super::stages::Look;
+use crate::model::{ArrayV, Dae};
+use crate::scalar::Lanes;
+use bytemuck::Zeroable;
+
+/// A number of the conditions and linear tables of a model, and one of its splines.
+#[derive(Clone, Copy, Debug, Default, Zeroable)]
+pub struct Branches {
+    kinks: f64,
+    knots: f64,
+}
+
+impl Branches {
+    /// Those at a point.
+    pub fn of<M: Dae, S: Lanes>(v: &ArrayV<M, S::Cell>) -> Self {
+        let mut numbers = [S::Cell::zeroed(); 2];
+        if const { M::BRANCHES > 0 } {
+            M::branches::<S>(v, &mut numbers);
+        }
+        Self { kinks: S::lane(&numbers[0], 0), knots: S::lane(&numbers[1], 0) }
+    }
+
+    /// How a step is to be looked at that has both.
+    pub fn change(self, other: Self) -> Option<Look> {
+        if self.kinks != other.kinks {
+            Some(Look::Branch)
+        } else {
+            (self.knots != other.knots).then_some(Look::Knot)
+        }
+    }
+}
