@@ -359,21 +359,24 @@ fn assert_same_lanes<L: Lanes>(found: L, expected: L, argument: L) {
     }
 }
 
-/// Those that are compiled differently: registers that are all used, of four doubles such as have
-/// room for two in one as well, and one of each with a lane that is not used.
+/// All functions in one register; in the others, whose arguments are packed differently, one with
+/// an argument and a result, one with two of each. Registers are those that are all used, of four
+/// doubles such as have room for two in one as well, and one of each with a lane that is not used.
 #[test]
 fn those_together_are_what_each_is() {
     macro_rules! all {
         ($register:ty: $($function:ident)*) => {
             $( at_once::<$register, _, _, _, 2>(functions::$function); at_once::<$register, _, _, _, 4>(functions::$function); )*
         };
-        ($register:ty) => {
-            all!($register: exp exp2 exp_m1 sinh cosh tanh powf ln ln_1p log2 log10 asinh acosh atanh sin cos tan asin
-                acos atan atan2 sin_cos cbrt hypot)
-        };
+        ($register:ty) => { all!($register: exp atan2 sin_cos); };
     }
     macro_rules! check {
-        (F64x4, $element:ident, $($n:literal),*) => { all!(F64x4<2>); all!(F64x4<3>); all!(F64x4<4>); };
+        (F64x4, $element:ident, $($n:literal),*) => {
+            all!(F64x4<3>: exp exp2 exp_m1 sinh cosh tanh powf ln ln_1p log2 log10 asinh acosh atanh sin cos tan asin
+                acos atan atan2 sin_cos cbrt hypot);
+            all!(F64x4<2>);
+            all!(F64x4<4>);
+        };
         (F64x8, $element:ident, $($n:literal),*) => { all!(F64x8<7>); all!(F64x8<8>); };
         ($name:ident, $element:ident, $n:literal $(, $more:literal)+) => { check!($name, $element $(, $more)+); };
         ($name:ident, $element:ident, $n:literal) => { all!($name<$n>); };
