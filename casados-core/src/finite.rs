@@ -5,7 +5,7 @@ use crate::linalg::{are_finite, kernels};
 use crate::model::Dae;
 use crate::result::{Forward, Hessian};
 use crate::scalar::Real;
-use crate::shape::Matrix;
+use crate::shape::{Matrix, Plain};
 
 /// Of what has no names: times and lengths.
 ///
@@ -87,17 +87,19 @@ pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), 
 /// # Errors
 /// [`Error::Overflow`] of the first second derivative that is not finite.
 pub(crate) fn check_second<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
-    for values in [
-        result.h_xx.as_slice(),
-        result.h_xu.as_slice(),
-        result.h_uu.as_slice(),
-        result.h_xp.as_slice(),
-        result.h_up.as_slice(),
-        result.h_pp.as_slice(),
-    ] {
+    for values in result.second() {
         check_output(values, 0)?;
     }
     Ok(())
+}
+
+impl<M: Dae, T: Plain> Hessian<M, T> {
+    /// The blocks of `∇²(λᵀx)`, column by column.
+    #[inline]
+    pub(crate) fn second(&self) -> [&[T]; 6] {
+        let Self { h_xx, h_xu, h_uu, h_xp, h_up, h_pp, .. } = self;
+        [h_xx.as_slice(), h_xu.as_slice(), h_uu.as_slice(), h_xp.as_slice(), h_up.as_slice(), h_pp.as_slice()]
+    }
 }
 
 /// The first element that is infinite or NaN.

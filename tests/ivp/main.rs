@@ -7,6 +7,7 @@ mod models {
 
 mod ends;
 mod explicit;
+mod jumps;
 mod kinks;
 mod rough;
 mod sensitivities;

@@ -14,6 +14,7 @@ mod rate;
 mod roughness;
 mod scheme;
 
+use super::branches::Branches;
 use super::control::LENIENT;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
@@ -59,6 +60,8 @@ struct Memory<M: Dae, T: Plain, const S: usize, const G: usize> {
     f_point: ArrayK<M, T>,
     /// The estimated error of `(x, z)`.
     error: ArrayK<M, T>,
+    /// The branches of the model at the stages.
+    branches: [Branches; S],
     factors: EigenFactors<M, T>,
 }
 
@@ -154,6 +157,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
         self.advance(start, false);
         convergence.begin(S);
+        self.compare_branches(convergence);
+        let mut passed = false;
         for iteration in 1..=convergence.most {
             *residuals += S;
             self.evaluate();
@@ -166,9 +171,17 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
                 let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
+            let (compared, elsewhere) = (iteration > 1 && !passed, convergence.elsewhere);
+            passed = self.compare_branches(convergence);
             if convergence.after(increment, tolerance)? {
-                // The rate of an earlier step holds where the matrix is exact.
-                let measured = iteration > 1 || increment <= tolerance || M::STRUCTURE.constant_matrix;
+                // The rate of an earlier step holds where the matrix is exact, on this side of a
+                // border; two increments that a border is between say nothing of a rate.
+                let exact = M::STRUCTURE.constant_matrix;
+                if exact && passed && iteration < convergence.most {
+                    continue;
+                }
+                let here = !elsewhere && !convergence.elsewhere;
+                let measured = exact || compared || here && (iteration > 1 || increment <= tolerance);
                 if measured || self.confirms(tolerance / increment, convergence, residuals)? {
                     return Ok(());
                 }
@@ -244,6 +257,11 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         let states = &mut self.memory.point.as_mut()[M::Shape::NX..];
         for (state, error) in states.iter_mut().zip(self.memory.error.as_ref()) {
             *state = *state + *error;
+        }
+        // What the model is on the other side of a border says nothing of this one.
+        let branches = Branches::of::<M, T>(start.point);
+        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(Look::Branch) {
+            return Ok(error);
         }
         self.estimate(start, at_end, residuals)
     }

@@ -1,6 +1,7 @@
 //! The steps of an interval.
 
 mod checked;
+mod cross;
 mod steps;
 mod tolerances;
 mod walk;
@@ -156,6 +157,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                         _ => self.statistics.failed += 1,
                     }
                     walk.fail(failure);
+                    self.cross(&mut walk, span)?;
                 }
                 Ok(error) => {
                     let factor = walk.factor(error, stages.count());

@@ -1,5 +1,6 @@
 //! What a run asks of a step with any number of stages.
 
+use super::branches::Branches;
 use super::defect_filter::DefectFilter;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
@@ -66,6 +67,11 @@ pub struct Convergence {
     pub factor: f64,
     /// Whether the Jacobian was evaluated for this step, and not kept from an earlier one.
     pub fresh: bool,
+    /// The branches of the model where that was.
+    pub branches: Branches,
+    /// Whether stages have other ones: how fast an iteration converges is to be seen then, and no
+    /// earlier step tells.
+    pub elsewhere: bool,
     /// The last increment and the last rate.
     last: [f64; 2],
 }
@@ -73,7 +79,16 @@ pub struct Convergence {
 impl Default for Convergence {
     fn default() -> Self {
         let (most, factor, last) = (ITERATIONS as usize, Self::UNKNOWN, [0.0; 2]);
-        Self { iterations: 0, most, rate: 0.0, factor, fresh: false, last }
+        Self {
+            iterations: 0,
+            most,
+            rate: 0.0,
+            factor,
+            fresh: false,
+            branches: Branches::default(),
+            elsewhere: false,
+            last,
+        }
     }
 }
 
@@ -86,6 +101,7 @@ impl Convergence {
         self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)).max(4.0) as usize;
         self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
         self.rate = FAST;
+        self.elsewhere = false;
         self.last = [0.0; 2];
     }
 
@@ -96,7 +112,7 @@ impl Convergence {
     /// It does not converge, or not soon enough.
     pub(super) fn after(&mut self, increment: f64, tolerance: f64) -> Result<bool, Failure> {
         let (iteration, most, [last, last_rate]) = (self.iterations, self.most, self.last);
-        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
+        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last && !self.elsewhere {
             // So does what converges slowly with the Jacobian of an earlier step: the next one gets
             // its own, too.
             self.rate = 2.0 * FAST;

@@ -186,18 +186,6 @@ pub fn of_jacobian<M: Dae>(result: &Forward<M>) -> [&[f64]; 3] {
     [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()]
 }
 
-/// The blocks of `∇²(λᵀx)`.
-pub fn of_hessian<M: Dae>(result: &Hessian<M>) -> [&[f64]; 6] {
-    [
-        result.h_xx.as_slice(),
-        result.h_xu.as_slice(),
-        result.h_uu.as_slice(),
-        result.h_xp.as_slice(),
-        result.h_up.as_slice(),
-        result.h_pp.as_slice(),
-    ]
-}
-
 /// Where those of a model are.
 pub fn second<M: Dae>() -> Blocks {
     Blocks([M::Shape::NX, M::Shape::NU, M::Shape::NP])

@@ -2,8 +2,7 @@
 //! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{
-    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_hessian, read_inputs, read_multipliers,
-    second, write,
+    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, read_inputs, read_multipliers, second, write,
 };
 use super::cache::{Answer, Cache, Given, key};
 use super::dependence::{self, Dimensions};
@@ -79,7 +78,7 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
                 value.copy_from_slice(result.x.as_slice());
                 jacobian(result, nx, slope);
                 join(&of_gradient(result), first);
-                join(&of_hessian(result), second);
+                join(&result.second(), second);
             }
         } else if wanted.gradient {
             let mut results = vec![Adjoint::default(); count];

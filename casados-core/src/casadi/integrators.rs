@@ -5,8 +5,8 @@
 
 use super::algebraic::{self, Sizes};
 use super::blocks::{
-    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_hessian, of_jacobian, read_inputs,
-    read_multipliers, rows, second, write,
+    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_jacobian, read_inputs, read_multipliers,
+    rows, second, write,
 };
 use super::cache::{self, Answer, Cache, Given, Part, key};
 use super::dependence::{self, Dimensions};
@@ -286,9 +286,9 @@ impl<M: Dae> Asked<'_, M> {
             }
             if copies {
                 join(&of_gradient(result), answer.gradient.set(nw));
-                join(&of_hessian(result), answer.hessian.set(second::<M>().len()));
+                join(&result.second(), answer.hessian.set(second::<M>().len()));
             }
-            (numbers.gradient, numbers.hessian) = (of_gradient(result), of_hessian(result));
+            (numbers.gradient, numbers.hessian) = (of_gradient(result), result.second());
             (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
         } else if wanted.gradient {
             let result = integrator.adjoint_along(x0, u, *h, seed, along)?;

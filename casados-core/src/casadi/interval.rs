@@ -136,7 +136,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
             let result = self.hessian_with_z0(&at.x0, &at.u, 0.0, &Zeroable::zeroed(), &vector(nu))?;
             copy(to, result);
             to.hessian.resize(super::blocks::second::<M>().len(), 0.0);
-            super::blocks::join(&super::blocks::of_hessian(result), &mut to.hessian);
+            super::blocks::join(&result.second(), &mut to.hessian);
         }
         Ok(())
     }

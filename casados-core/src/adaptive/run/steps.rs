@@ -1,6 +1,7 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
+use crate::adaptive::branches::Branches;
 use crate::adaptive::stages::{Convergence, Look};
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
@@ -40,8 +41,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
         let stages = levels.get::<B>(walk.order.level)?;
         match ratio {
-            Some(ratio) => stages.continue_from_last(ratio),
-            None => stages.begin(&self.base.point),
+            // The polynomial of the last step may be that of another branch.
+            Some(ratio) if M::BRANCHES == 0 || !walk.is_unsolved() => {
+                stages.continue_from_last(ratio);
+            }
+            _ => stages.begin(&self.base.point),
         }
         Ok(())
     }
@@ -104,6 +108,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if walk.current {
             self.evaluate_jacobian(false, walk.tried)?;
         }
+        let point = if walk.current { &self.base.point } else { &self.base.middle };
+        walk.convergence.branches = Branches::of::<M, T>(point);
         Ok(())
     }
 

@@ -153,6 +153,11 @@ impl<T: Real> Walk<T> {
         self.accepted.is_none() || self.rejected
     }
 
+    /// Whether the stages of a step from here were not solved.
+    pub fn is_unsolved(&self) -> bool {
+        self.rejected && self.refusal == Refusal::NotConverged
+    }
+
     /// The end of the step.
     pub fn end(&self) -> T {
         if self.last { self.span.end } else { self.t + self.h }
@@ -212,6 +217,13 @@ impl<T: Real> Walk<T> {
         let most = 2.0 * self.convergence.most as f64;
         let effort = (1.0 + most) / (self.convergence.iterations as f64 + most);
         self.controller.factor(self.h.to_f64(), error, 1.0 / order, effort)
+    }
+
+    /// Goes on from here as at the start of an interval, with the number of stages that is there.
+    pub fn restart(&mut self, t: T, first: f64) {
+        *self = Self { order: self.order, tried: self.tried, ..Self::new(self.span, self.longest) };
+        self.t = t;
+        self.begin(first);
     }
 
     /// The error is too large.
