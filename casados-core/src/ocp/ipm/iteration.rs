@@ -104,6 +104,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         state.count_straying(row.step);
+        state.regularisation.gone(accepted.alpha / direction.primal);
         self.accept(ocp, capacity, state, &direction, accepted)?;
         let least =
             (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);

@@ -14,13 +14,49 @@ const FLAT: f64 = 1e-6;
 const LEAST: f64 = 1e-20;
 /// Where this is not enough nothing is.
 const MOST: f64 = 1e20;
+/// A step that goes no farther than this part of what bounds leave of it is short,
+const SHORT: f64 = 0.1;
+/// and after so many in sequence the next ones are damped,
+const PATIENCE: usize = 3;
+/// at first by this, as `δ_w` is,
+const FIRST_DAMPING: f64 = 1e-3;
+/// and not at all any more where this does not help.
+const MOST_DAMPING: f64 = 1e2;
+
 /// What is remembered of `δ_w`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Regularisation {
+    /// The last one that curvature asked for.
     last: f64,
+    /// No less is taken while steps are short.
+    damping: f64,
+    /// So many steps in sequence were short.
+    short: usize,
 }
 
 impl Regularisation {
+    /// A step was accepted that goes so far of what bounds leave of it. Where constraints are
+    /// curved and the reduced Hessian is nearly singular, full steps leave the constraints at once,
+    /// and what the line search leaves of them is nothing: as in a trust region shorter steps in
+    /// another direction go farther.
+    pub fn gone(&mut self, part: f64) {
+        if part >= SHORT {
+            self.short = 0;
+            if part >= 1.0 {
+                let less = self.damping / 3.0;
+                self.damping = if less > 1e-2 * FIRST_DAMPING { less } else { 0.0 };
+            }
+            return;
+        }
+        self.short += 1;
+        if self.short >= PATIENCE || self.damping > 0.0 {
+            self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last);
+            if self.damping > MOST_DAMPING {
+                (self.damping, self.short) = (0.0, 0);
+            }
+        }
+    }
+
     /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
     ///
     /// # Errors
@@ -31,11 +67,12 @@ impl Regularisation {
         mu: T,
         force: f64,
     ) -> Result<f64, QpError> {
-        let mut failed = match self.attempt(iterate, mu, 0.0, force) {
-            Ok(()) => return Ok(0.0),
+        let mut failed = match self.attempt(iterate, mu, self.damping, force) {
+            Ok(()) => return Ok(self.damping * force),
             Err(failed) => failed,
         };
         let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
+        delta = delta.max(8.0 * self.damping);
         while delta < MOST {
             match self.attempt(iterate, mu, delta, force) {
                 Ok(()) => {
