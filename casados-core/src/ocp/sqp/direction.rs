@@ -125,7 +125,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
-        self.qp_solver.permit((self.options.qp_accuracy * state.residual).max(DIGITS * forces.to_f64()));
+        // Without multipliers stationarity is the gradient, and says nothing of what is far away.
+        let begins = row.iteration == 0 && forces == T::ZERO;
+        let exact = begins || state.exact || state.again;
+        let permitted = if exact { 0.0 } else { self.options.qp_accuracy * state.residual };
+        self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
