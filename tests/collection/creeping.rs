@@ -85,8 +85,8 @@ fn illness(x: [f64; 2], u: [f64; 2]) -> f64 {
 }
 
 /// Multipliers are zero at first, and the largest residual is the gradient of a cost in large
-/// units: QPs that were solved to a part of that ended in QPs that were not solved. IPOPT (as above)
-/// takes 38 iterations to -29513.830; it relaxes bounds by 1e-8 of their size.
+/// units: QPs that were solved to a part of that ended in QPs that were not solved. IPOPT (as
+/// above) takes 38 iterations to -29513.830; it relaxes bounds by 1e-8 of their size.
 #[test]
 fn gradients_in_large_units() -> Test {
     let n = 50;
