@@ -4,6 +4,7 @@
 
 mod astray;
 mod climb;
+mod creeping;
 mod guesses;
 mod held;
 mod infeasible;

@@ -179,10 +179,10 @@ impl Status {
             Self::OutOfTime => f.write_str("not converged: the time was over"),
             Self::Unbounded => f.write_str("unbounded: variables grow without end"),
             Self::Infeasible { constraint, violation } => {
-                write!(f, "locally infeasible: {constraint} is violated by {violation:e}")
+                write!(f, "locally infeasible: {constraint} is violated by {violation:.2e}")
             }
             Self::InfeasibleQp { constraint, violation } => {
-                write!(f, "the QP is infeasible: {constraint} is violated by {violation:e} at least")
+                write!(f, "the QP is infeasible: {constraint} is violated by {violation:.2e} at least")
             }
             Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
             Self::NoProgress => f.write_str("no step makes progress"),
@@ -194,19 +194,21 @@ impl Status {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
             Self::MaxIterations => {
-                "; more of them (`options.max_iterations`), another guess or, instead of Gauss and Newton, exact \
-                 Hessians (`Sqp::exact`) may help"
+                "; more of them (`options.max_iterations`) or another guess may help, for `Sqp` also another \
+                 `options.globalisation`, as `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
             }
             Self::Unbounded => "; bounds of states and controls, or a cost of them, are missing",
             Self::Infeasible { .. } => {
                 "; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"
             }
             Self::InfeasibleQp { .. } => "; `options.elastic` goes on where only QPs are",
-            Self::QpFailed(QpError::NotConvex { .. }) => "; `Convexification::Reduced` adds what is missing",
+            Self::QpFailed(QpError::NotConvex { .. }) => {
+                "; another guess may help, and `Convexification::Reduced` where another one was chosen"
+            }
             Self::QpFailed(_) => "; another guess may help",
             Self::NoProgress => {
-                "; another guess may help, in sequential quadratic programming also exact Hessians (`Sqp::exact`), \
-                 another `options.globalisation` or a smaller `options.shortest_step`"
+                "; another guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
+                 a smaller `options.shortest_step`, and exact Hessians (`Sqp::exact`) where it has others"
             }
         }
     }

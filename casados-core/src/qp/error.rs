@@ -267,12 +267,12 @@ impl fmt::Display for QpError {
                 write!(
                     f,
                     "no point satisfies all constraints: at stage {stage}, element {index} of {field} misses its \
-                     {side} one by at least {violation:e}"
+                     {side} one by at least {violation:.2e}"
                 )
             }
             Self::NotConvex { stage, index, pivot } => write!(
                 f,
-                "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:e}"
+                "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:.2e}"
             ),
             Self::Coupled => f.write_str(
                 "states are periodic or controls shared: `InteriorPoint` with the feature `alloc` solves such QPs, this \

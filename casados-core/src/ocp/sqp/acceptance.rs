@@ -1,6 +1,6 @@
 //! Whether a point is good enough: merit function and filter.
 
-use super::options::{Globalisation, SqpOptions};
+use super::options::Globalisation;
 use crate::ocp::filter::{Filter, Measure, objective_decides};
 
 /// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
@@ -47,13 +47,13 @@ impl Search {
     }
 
     /// Whether a point is good enough after a step of this length.
-    pub fn accepts(&mut self, options: &SqpOptions, length: f64, line: &Line, there: &Measure) -> bool {
+    pub fn accepts(&mut self, by: Globalisation, length: f64, line: &Line, there: &Measure) -> bool {
         let Line { here, slope } = line;
         if !there.is_finite() {
             return false;
         }
         let noise = line.noise();
-        match options.globalisation {
+        match by {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;

@@ -15,6 +15,8 @@ use crate::scalar::Real;
 
 /// The regularisation of the first direction.
 const DAMPING: f64 = 1.0;
+/// A simulation that violates more than this multiple of what the guess does has gone astray.
+const FAR: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Whether a run begins again, with steps that are damped as those of Gauss and Newton are:
@@ -39,7 +41,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         self.leave_elastic(ocp, state);
-        let found = self.simulate_guess(ocp);
+        let mut found = self.simulate_guess(ocp);
         if strays && !found.is_some_and(|violation| violation < BETTER * violation_of(&row.residuals)) {
             if found.is_some() {
                 ocp.iterate.copy_from(&self.trial);
@@ -47,12 +49,16 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             state.search.linearised = None;
             return false;
         }
+        found = found.filter(|&violation| violation <= FAR * state.violation_of_guess);
         if found.is_none() {
             ocp.iterate.copy_from(&self.weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
         }
-        let (over, sizes) = (state.over.take(), state.sizes);
-        *state = State { over, again: true, damping: DAMPING, sizes, ..State::new() };
+        // The best iterate may be that of the first attempt, after the second one, too.
+        let &mut State { sizes, best_residual, best_iteration, .. } = state;
+        let over = state.over.take();
+        let best = State { best_residual, best_iteration, ..State::new() };
+        *state = State { over, again: true, damping: DAMPING, sizes, ..best };
         self.forget_weights(ocp, state);
         true
     }
@@ -78,6 +84,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// The largest violation, of equations and of inequalities.
-fn violation_of(residuals: &Residuals) -> f64 {
+pub(super) fn violation_of(residuals: &Residuals) -> f64 {
     larger(residuals.dynamics, residuals.inequalities)
 }

@@ -24,7 +24,8 @@ pub enum Globalisation {
     /// full steps are what it accepts: the linearisation there is that of the next iteration. With
     /// the Hessian of Gauss and Newton, and after a first attempt that failed, steps of a quarter
     /// or less give way to damped ones while weighted gaps are more than what the objective changes
-    /// by.
+    /// by. With exact Hessians the filter decides from then on where five steps more were a
+    /// sixteenth or less than full ones without a correction.
     #[default]
     Merit,
     /// As far as objective or violation shrink compared to all iterates before, with second-order
@@ -58,7 +59,9 @@ pub struct SqpOptions {
     /// Whether QPs begin at the solution of the one before. Default true.
     pub warm_start: bool,
     /// QPs are solved to this part of the largest residual, if that is more than the solver's own
-    /// tolerance: what the linearisation is off by is more. From 0 to 1, default 1e-4.
+    /// tolerance: what the linearisation is off by is more. They are solved to all digits where a
+    /// run begins without multipliers and this would be more than 1e-3, where no step makes
+    /// progress otherwise, and in a second attempt. From 0 to 1, default 1e-4.
     pub qp_accuracy: f64,
     /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default
     /// true.

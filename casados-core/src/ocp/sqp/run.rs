@@ -1,6 +1,7 @@
 //! The iterations.
 
 use super::Sqp;
+use super::again::violation_of;
 use super::direction::Direction;
 use super::options::Globalisation;
 use super::scaled::Way;
@@ -28,8 +29,9 @@ const ROOM: usize = 64;
 /// its curvature counts.
 const PASSING: usize = 4;
 
-/// The regularisation of directions, where no step along the one before is short enough.
-const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
+/// The regularisation of directions, where no step along the one before is short enough: at first
+/// the QP is solved again with all its digits, since it may be wrong by more than a step gains.
+const DAMPING: [f64; 5] = [0.0, 0.0, 1e-2, 1e0, MOST_DAMPING];
 const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
@@ -149,6 +151,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let begins_again = self.begin_again(ocp, &mut state, end, &row);
             if let (Some(status), false) = (end, begins_again) {
                 outcome.status = status;
+                if matches!(status, Status::Infeasible { .. }) {
+                    state.best_iteration = row;
+                }
                 break;
             }
             if observer(&row).is_break() {
@@ -197,6 +202,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 self.find_units(ocp, state);
             }
             self.forget_weights(ocp, state);
+            state.violation_of_guess = violation_of(&ocp.residuals().0);
         }
         if let Some(update) = self.curvature.update() {
             let take = match (row.iteration, state.elastic_steps) {
@@ -213,7 +219,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
         let size = self.judge(ocp, state, &residuals);
-        if size < state.best_residual || state.begins {
+        if size < state.best_residual || state.begins && !state.best_residual.is_finite() {
             (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
         }
@@ -235,6 +241,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (row.step, row.corrected) = (taken.length, taken.corrected);
         let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
         state.damp(row, curvature);
+        self.leave_merit(ocp, state, row);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
         if row.elastic && C::EXACT && (state.nearest || state.elastic_steps <= PASSING) {
             // On the way to a feasible point forces of penalties are no multipliers: curvatures
@@ -244,6 +251,21 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.forget_weights(ocp, state);
         }
         Ok(None)
+    }
+
+    /// Lets the filter decide from now on where the merit function creeps.
+    fn leave_merit<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &Iteration,
+    ) where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if C::EXACT && state.creeps(row, &self.options) {
+            state.search.filter.clear();
+            self.forget_weights(ocp, state);
+        }
     }
 
     /// The curvature of the QP along its step, of which the iterate has gone a part.
@@ -303,12 +325,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
         let damps = state.again || !C::EXACT && self.curvature.update().is_none();
-        for damping in DAMPING {
-            if damps && damping > 0.0 && damping <= state.damping {
+        for (attempt, damping) in DAMPING.into_iter().enumerate() {
+            let is_known = failure.is_some() || row.elastic || state.passing;
+            let skips = if damping > 0.0 { damps && damping <= state.damping } else { is_known };
+            if attempt > 0 && skips {
                 continue;
             }
+            state.exact = attempt > 0;
             state.passing = damps && damping.max(state.damping) < MOST_DAMPING;
-            if damping > 0.0 {
+            if attempt > 0 {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.
                     ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -317,7 +342,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 self.curvature.follow(f64::INFINITY);
                 self.linearise(ocp)?;
                 self.leave_elastic(ocp, state);
-                (row.regularisation, state.damping) = (0.0, damping);
+                row.regularisation = 0.0;
+                if damping > 0.0 {
+                    state.damping = damping;
+                }
             }
             let direction = self.direction(ocp, state, row)?;
             row.times.qp += watch.lap();
@@ -335,7 +363,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     }
                 }
                 Ok(Direction::Infeasible(worst)) => {
-                    state.best_iteration = *row;
                     return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
                 }
                 Err(QpError::Infeasible { .. }) if self.options.elastic => {}

@@ -42,7 +42,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let weighted = self.options.globalisation == Globalisation::Merit;
+        let by = state.globalisation(&self.options);
+        let weighted = by == Globalisation::Merit;
         let line = self.line(ocp, state);
         let mut written = true;
         if state.search.full {
@@ -62,7 +63,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // A point without a value is one that is not good enough.
             let there = self.measure_at(ocp, state, length);
             if let Some(there) = there
-                && state.search.accepts(&self.options, length, &line, &there)
+                && state.search.accepts(by, length, &line, &there)
             {
                 let length = self.shortened(ocp, state, &line, length, there);
                 return Ok(Some(Taken { length, corrected: false }));
@@ -86,7 +87,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Weights of violations before the first line search: those of a filter are the inverses of
     /// units and stay.
     pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
-        let weighted = self.options.globalisation == Globalisation::Merit;
+        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
         self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
         if !weighted {
             // The solution is written before it is read.
@@ -109,11 +110,17 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Whether a step that is good enough may be better where it is shorter. Hessians that are
     /// learned from differences of gradients want long steps.
-    fn shortens<P: Formulation<T>>(&self, line: &Line, length: f64, there: &Measure) -> bool
+    fn shortens<P: Formulation<T>>(
+        &self,
+        state: &State<'_, T>,
+        line: &Line,
+        length: f64,
+        there: &Measure,
+    ) -> bool
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let weighted = self.options.globalisation == Globalisation::Merit;
+        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
         weighted && self.curvature.update().is_none() && line.turns_before(length, there)
     }
 
@@ -130,7 +137,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        while self.shortens::<P>(line, length, &there) && 0.5 * length >= self.options.shortest_step {
+        while self.shortens::<P>(state, line, length, &there) && 0.5 * length >= self.options.shortest_step {
             let half = self.measure_at(ocp, state, 0.5 * length);
             let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
                 between(&ocp.iterate, &self.solution, length, &mut self.trial);
@@ -156,7 +163,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
     ) -> (Measure, f64) {
-        if self.options.globalisation != Globalisation::Merit {
+        if state.globalisation(&self.options) != Globalisation::Merit {
             let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
             return (here, slope);
@@ -193,12 +200,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let mut watch = Watch::start();
+        let by = state.globalisation(&self.options);
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
         let there = ocp.linearise(self.curvature);
         let there = there.map(|()| ocp.measure_here(&self.weights).over(state.force()));
         let seconds = watch.lap();
         let is_good = there.is_ok_and(|there| {
-            !self.shortens::<P>(line, 1.0, &there) && state.search.accepts(&self.options, 1.0, line, &there)
+            !self.shortens::<P>(state, line, 1.0, &there) && state.search.accepts(by, 1.0, line, &there)
         });
         if is_good {
             state.search.linearised = Some(seconds);
@@ -228,10 +236,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale(ocp, state, Way::Back);
         core::mem::swap(&mut self.solution, &mut self.trial);
         let Ok(statistics) = solved else { return false };
+        let by = state.globalisation(&self.options);
         row.qp_iterations += statistics.iterations;
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         let there = ocp.measure(&self.trial, &self.weights, ends).ok().map(|there| there.over(state.force()));
-        let is_good = there.is_some_and(|there| state.search.accepts(&self.options, 1.0, line, &there));
+        let is_good = there.is_some_and(|there| state.search.accepts(by, 1.0, line, &there));
         if is_good {
             core::mem::swap(&mut ocp.iterate, &mut self.trial);
         }

@@ -1,6 +1,7 @@
 //! What a run remembers.
 
 use super::acceptance::Search;
+use super::options::{Globalisation, SqpOptions};
 use crate::ocp::log::Iteration;
 use crate::ocp::units::Sizes;
 use crate::scalar::Scalar;
@@ -35,7 +36,11 @@ pub(super) struct State<'c, T> {
     pub penalty: f64,
     /// Whether a short step may be refused, because more damping can be tried.
     pub passing: bool,
-    /// The largest residual of the best iterate.
+    /// Whether QPs are solved to as many digits as there are.
+    pub exact: bool,
+    /// The largest violation of the guess.
+    pub violation_of_guess: f64,
+    /// The largest residual of the best iterate, of both attempts.
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
@@ -43,6 +48,8 @@ pub(super) struct State<'c, T> {
     pub residual: f64,
     /// Units, unless all of them are one.
     pub sizes: Option<Sizes>,
+    /// Short steps of the merit function, but for those with penalties, less full ones.
+    pub short_steps: usize,
     /// The largest change of a variable by the last full step; infinite at first.
     pub reach: f64,
     pub number: PhantomData<T>,
@@ -52,6 +59,9 @@ pub(super) struct State<'c, T> {
 /// of the step along a curvature the cube root of the part that was gone.
 const SHORT: f64 = 1.0 / 16.0;
 const GROWTH: f64 = 4.0;
+/// After so many short steps more than full ones the merit function gives way to the filter: where
+/// constraints bend more than its weights let pass, it creeps along them.
+const CREEPING: usize = 5;
 const ROOT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
@@ -75,14 +85,17 @@ impl<T> State<'_, T> {
             damping: 0.0,
             failed: 0.0,
             passing: false,
+            exact: false,
             nearest: false,
             rewritten: false,
             penalty: 0.0,
             elastic_steps: 0,
+            violation_of_guess: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
             residual: f64::INFINITY,
             sizes: None,
+            short_steps: 0,
             reach: f64::INFINITY,
             number: PhantomData,
         }
@@ -97,6 +110,28 @@ impl<T> State<'_, T> {
     /// The unit of forces.
     pub fn force(&self) -> f64 {
         self.sizes.map_or(1.0, |sizes| sizes.force)
+    }
+
+    /// How far steps go: as options say, but by the filter where the merit function creeps.
+    pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
+        match options.globalisation {
+            Globalisation::Merit if self.short_steps >= CREEPING => Globalisation::Filter,
+            given => given,
+        }
+    }
+
+    /// Counts short steps, less full ones without a correction. Whether it was the short one after
+    /// which the filter decides.
+    pub fn creeps(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
+        if options.globalisation != Globalisation::Merit || self.short_steps >= CREEPING {
+            return false;
+        }
+        if self.is_short(row) && !row.elastic {
+            self.short_steps += 1;
+        } else if row.step == 1.0 && !row.corrected {
+            self.short_steps = self.short_steps.saturating_sub(1);
+        }
+        self.short_steps == CREEPING
     }
 
     /// Whether a step was so short that damping helps.
