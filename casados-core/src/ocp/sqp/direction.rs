@@ -19,8 +19,8 @@ const FIRST: f64 = 1e-6;
 const LEAST: f64 = 1e-8;
 /// The largest one.
 const MOST: f64 = 1e10;
-/// The first QP is solved to all digits where it would be allowed to be wrong by more.
-const MOST_AT_FIRST: f64 = 1e-3;
+/// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
+const MOST_AT_FIRST: f64 = 1e-2;
 /// What it grows by where it is not enough, and shrinks by from one iteration to the next.
 const FACTOR: f64 = 4.0;
 /// It grows so many times because a QP was not solved for a reason that is not known.
@@ -129,7 +129,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
         let part = self.options.qp_accuracy * state.residual;
         // Without multipliers stationarity is the gradient, and says nothing of what is far away.
-        let begins = row.iteration == 0 && forces == T::ZERO && part > MOST_AT_FIRST;
+        let wrong = part * state.force();
+        let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
         let permitted = if begins || state.exact || state.again { 0.0 } else { part };
         self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };

@@ -60,8 +60,8 @@ pub struct SqpOptions {
     pub warm_start: bool,
     /// QPs are solved to this part of the largest residual, if that is more than the solver's own
     /// tolerance: what the linearisation is off by is more. They are solved to all digits where a
-    /// run begins without multipliers and this would be more than 1e-3, where no step makes
-    /// progress otherwise, and in a second attempt. From 0 to 1, default 1e-4.
+    /// run begins without multipliers and gradients might be wrong by more than 1e-2, where no
+    /// step makes progress otherwise, and in a second attempt. From 0 to 1, default 1e-4.
     pub qp_accuracy: f64,
     /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default
     /// true.
