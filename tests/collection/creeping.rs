@@ -5,7 +5,8 @@ use super::ocps::line;
 use super::units::fix;
 use super::{Test, solve};
 use casados::ocp::{
-    Constraint, Exact, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder, WithIntegral,
+    Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Problem, SecondOrder,
+    WithIntegral,
 };
 use casados::prelude::*;
 use casados::qp::residuals;
@@ -47,22 +48,40 @@ fn above_terrain(x: [f64; 4], _u: [f64; 2], t: f64) -> f64 {
         - 0.01
 }
 
+/// A straight line from the start to the end, without forces.
+macro_rules! ride {
+    () => {{
+        let n = 100;
+        let erk = Erk::<Alp, Rk4>::new(Options { steps: 2, ..Options::default() })?;
+        let mut ocp = Problem::new(erk)
+            .running_cost(GeneralCost::<Tires>::new())
+            .path_constraints(Constraint::<AboveTerrain>::new([0.0], [f64::INFINITY]))
+            .on(Horizon::uniform(n, 20.0 / n as f64))?;
+        let (start, end) = ([2.0, 1.0, 2.0, 1.0], [2.0, 3.0, 1.0, -2.0]);
+        ocp.fix_initial_state(&start)?;
+        fix(&mut ocp, n, &[(0, 2.0), (1, 3.0), (2, 1.0), (3, -2.0)])?;
+        line(&mut ocp, &start, &end, &[0.0, 0.0])?;
+        ocp
+    }};
+}
+
 /// The merit function follows the bend of the terrain in pairs of a short step and a damped one.
 /// IPOPT (CasADi 3.8.2, the same discretisation and guess) takes 149 iterations to 2651.8576.
 #[test]
 fn terrain_that_bends() -> Test {
-    let n = 100;
-    let erk = Erk::<Alp, Rk4>::new(Options { steps: 2, ..Options::default() })?;
-    let mut ocp = Problem::new(erk)
-        .running_cost(GeneralCost::<Tires>::new())
-        .path_constraints(Constraint::<AboveTerrain>::new([0.0], [f64::INFINITY]))
-        .on(Horizon::uniform(n, 20.0 / n as f64))?;
-    let (start, end) = ([2.0, 1.0, 2.0, 1.0], [2.0, 3.0, 1.0, -2.0]);
-    ocp.fix_initial_state(&start)?;
-    fix(&mut ocp, n, &[(0, 2.0), (1, 3.0), (2, 1.0), (3, -2.0)])?;
-    line(&mut ocp, &start, &end, &[0.0, 0.0])?;
+    let mut ocp = ride!();
     let (outcome, _) = solve(&mut ocp)?;
     assert!(outcome.is_converged() && outcome.iterations <= 149, "{outcome}");
+    assert!((outcome.objective - 2651.8576).abs() <= 1e-6 * 2651.8576, "{outcome}");
+    is_optimal(&mut ocp)
+}
+
+/// Without damping steps are 1e-4 for hundreds of iterations.
+#[test]
+fn terrain_by_the_interior_point() -> Test {
+    let mut ocp = ride!();
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{outcome}");
     assert!((outcome.objective - 2651.8576).abs() <= 1e-6 * 2651.8576, "{outcome}");
     is_optimal(&mut ocp)
 }
