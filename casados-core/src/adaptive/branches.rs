@@ -1,10 +1,22 @@
 //! The branches that a model takes at a point: which conditions of `if`, `max` or `abs` hold there,
 //! and which pieces its tables have.
 
-use super::stages::Look;
 use crate::model::{ArrayV, Dae};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
+
+/// Why the shape of a defect is looked at, the strongest reason last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Look {
+    /// Its size is unusual.
+    Unusual,
+    /// The step is watched, whatever its size is.
+    Watched,
+    /// A spline changes its piece: no lower derivative jumps than its highest.
+    Knot,
+    /// The model changes its branch: the step is rough, whatever its shape is.
+    Branch,
+}
 
 /// A number of the conditions and linear tables of a model, and one of its splines.
 #[derive(Clone, Copy, Debug, Default, Zeroable)]

@@ -14,14 +14,14 @@ mod rate;
 mod roughness;
 mod scheme;
 
-use super::branches::Branches;
+use super::branches::{Branches, Look};
 use super::control::LENIENT;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
 use super::point::variable;
-use super::stages::{Convergence, Failure, FilteredDefect, Look, MOST, Stages, Start};
+use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;

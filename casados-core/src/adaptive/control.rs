@@ -4,7 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use super::stages::Look;
+use super::branches::Look;
 use crate::scalar::{Real, Scalar};
 
 /// Where the first estimate is asked for this much less than the solution, or even less, its

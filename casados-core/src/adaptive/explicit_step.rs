@@ -1,9 +1,8 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
-use super::branches::Branches;
+use super::branches::{Branches, Look};
 use super::norm::norm;
 use super::pairs::Pair;
-use super::stages::Look;
 use crate::erk::{Grid, Own, Point, Record, Scheme};
 use crate::error::{Error, Place};
 use crate::finite::check_output;

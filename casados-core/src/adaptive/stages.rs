@@ -1,6 +1,6 @@
 //! What a run asks of a step with any number of stages.
 
-use super::branches::Branches;
+use super::branches::{Branches, Look};
 use super::defect_filter::DefectFilter;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
@@ -143,19 +143,6 @@ impl Convergence {
 
 /// An error of the states, and `(hJ)⁻²` times it.
 pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
-
-/// Why the shape of a defect is looked at, the strongest reason last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Look {
-    /// Its size is unusual.
-    Unusual,
-    /// The step is watched, whatever its size is.
-    Watched,
-    /// A spline changes its piece: no lower derivative jumps than its highest.
-    Knot,
-    /// The model changes its branch: the step is rough, whatever its shape is.
-    Branch,
-}
 
 /// A step with any number of stages.
 pub trait Stages<M: Dae, T: Real> {

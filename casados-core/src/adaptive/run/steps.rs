@@ -1,8 +1,8 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
-use crate::adaptive::branches::Branches;
-use crate::adaptive::stages::{Convergence, Look};
+use crate::adaptive::branches::{Branches, Look};
+use crate::adaptive::stages::Convergence;
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
