@@ -17,7 +17,7 @@ const MOST: f64 = 1e20;
 /// A step that goes no farther than this part of what bounds leave of it is short,
 const SHORT: f64 = 0.1;
 /// and after so many in sequence the next ones are damped,
-const PATIENCE: usize = 3;
+const PATIENCE: usize = 8;
 /// at first by this, as `δ_w` is,
 const FIRST_DAMPING: f64 = 1e-3;
 /// and not at all any more where this does not help.
