@@ -26,6 +26,17 @@ macro_rules! largest {
     }};
 }
 
+macro_rules! within_thirty_tolerances {
+    ($model:ty, $cases:expr, $exact:expr) => {{
+        let all = [
+            largest!($model, Radau, $cases.clone(), $exact),
+            largest!($model, Gauss<3>, $cases.clone(), $exact),
+            largest!($model, Gauss<4>, $cases.clone(), $exact),
+        ];
+        assert!(all.iter().all(|error| *error <= 30.0), "{all:?} tolerances");
+    }};
+}
+
 /// `z` is 2 or 0.2: of a cubic whose slope is 13 at one and 1.12 at the other.
 #[dae(nominal(z = [1.0]))]
 fn switched(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], t: f64) -> [f64; 2] {
@@ -52,12 +63,7 @@ fn switched_exactly(x0: f64, end: f64) -> [f64; 2] {
 fn algebraic_states_that_jump() -> Result<(), Error> {
     let cases = (0..6).map(|case| (vector![0.3 * f64::from(case)], 6.0 + 0.31 * f64::from(case)));
     let exact = |x0: SVector<f64, 1>, end| [switched_exactly(x0[0], end)[0]];
-    let all = [
-        largest!(Switched, Radau, cases.clone(), exact),
-        largest!(Switched, Gauss<3>, cases.clone(), exact),
-        largest!(Switched, Gauss<4>, cases.clone(), exact),
-    ];
-    assert!(all.iter().all(|error| *error <= 30.0), "{all:?} tolerances");
+    within_thirty_tolerances!(Switched, cases, exact);
     Ok(())
 }
 
@@ -97,12 +103,7 @@ fn rubbed_exactly(x0: SVector<f64, 2>, end: f64) -> [f64; 2] {
 #[test]
 fn friction_that_changes_its_sign() -> Result<(), Error> {
     let cases = (0..10).map(|case| (vector![5.0 + 0.1 * f64::from(case), 0.0], 7.0 + 1.3 * f64::from(case)));
-    let all = [
-        largest!(Rubbed, Radau, cases.clone(), rubbed_exactly),
-        largest!(Rubbed, Gauss<3>, cases.clone(), rubbed_exactly),
-        largest!(Rubbed, Gauss<4>, cases.clone(), rubbed_exactly),
-    ];
-    assert!(all.iter().all(|error| *error <= 30.0), "{all:?} tolerances");
+    within_thirty_tolerances!(Rubbed, cases, rubbed_exactly);
     Ok(())
 }
 
@@ -127,11 +128,6 @@ fn followed_exactly(_: SVector<f64, 1>, end: f64) -> [f64; 1] {
 fn a_rate_that_falls_by_four_orders_of_magnitude() -> Result<(), Error> {
     let x0 = vector![0.5 + 1.0 / FAST + 1.0 / (FAST * FAST)];
     let cases = (0..10).map(|case| (x0, 1.5 + 0.17 * f64::from(case)));
-    let all = [
-        largest!(Followed, Radau, cases.clone(), followed_exactly),
-        largest!(Followed, Gauss<3>, cases.clone(), followed_exactly),
-        largest!(Followed, Gauss<4>, cases.clone(), followed_exactly),
-    ];
-    assert!(all.iter().all(|error| *error <= 30.0), "{all:?} tolerances");
+    within_thirty_tolerances!(Followed, cases, followed_exactly);
     Ok(())
 }

@@ -216,7 +216,7 @@ pub struct Proportional {
 
 /// A step of an explicit method.
 #[derive(Clone, Copy, Debug)]
-pub struct Passed {
+pub struct ExplicitStep {
     /// Where it begins, in the direction of the run,
     pub t: f64,
     /// its length,
@@ -225,7 +225,7 @@ pub struct Passed {
     pub change: Option<Look>,
 }
 
-impl Passed {
+impl ExplicitStep {
     /// Whether it is long beside roundoff errors of the time, shortened by a factor: no shorter
     /// step helps.
     fn is_above_rounding<T: Real>(self, factor: f64) -> bool {
@@ -247,7 +247,7 @@ impl Proportional {
     /// The error of a step out of the difference of the two methods: larger before the end of a
     /// step that was refused by much, and where the model changes its branch. Of ever shorter steps
     /// over a jump one has a small difference by chance, and would be accepted.
-    pub fn error_of_difference<T: Real>(&mut self, step: Passed, difference: f64) -> f64 {
+    pub fn error_of_difference<T: Real>(&mut self, step: ExplicitStep, difference: f64) -> f64 {
         let is_over_jump = step.t < self.refused_to;
         if difference >= MUCH {
             self.refused_to = self.refused_to.max(step.t + step.h);
@@ -263,7 +263,7 @@ impl Proportional {
 
     /// The factor for the step size after a step with this error, within a range. Where the model
     /// changes its branch the error behaves like `h³` or a lower power.
-    pub fn factor<T: Real>(&mut self, step: Passed, error: f64) -> f64 {
+    pub fn factor<T: Real>(&mut self, step: ExplicitStep, error: f64) -> f64 {
         let Control { order, memory, safety, predicts, range, .. } = self.control;
         let exponent = 1.0 / order;
         let present = power(error, exponent - 0.75 * memory);

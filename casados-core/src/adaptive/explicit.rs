@@ -1,7 +1,7 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::control::{Passed, Proportional};
+use super::control::{ExplicitStep, Proportional};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
@@ -180,9 +180,10 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
-        let passed = Passed { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
-        let error = controller.error_of_difference::<T>(passed, error);
-        let factor = controller.factor::<T>(passed, error);
+        let tried_step =
+            ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
+        let error = controller.error_of_difference::<T>(tried_step, error);
+        let factor = controller.factor::<T>(tried_step, error);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;

@@ -9,7 +9,7 @@ use crate::adaptive::point::variable;
 
 /// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
 /// there is far below rounding.
-const BORDER: f64 = 1e3;
+const SHORTEST: f64 = 1e3;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Goes over a border that a step ends at whose iteration did not converge however short it
@@ -24,7 +24,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             return Ok(());
         }
         let length = (span.end - span.start).abs().max(walk.t.abs());
-        let shortest = T::from_f64(BORDER * T::EPSILON) * length;
+        let shortest = T::from_f64(SHORTEST * T::EPSILON) * length;
         let left = (span.end - walk.t).abs();
         if walk.h.abs() >= shortest || left <= T::from_f64(4.0) * shortest {
             return Ok(());
