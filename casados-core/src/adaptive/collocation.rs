@@ -21,7 +21,7 @@ use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
 use super::point::variable;
-use super::stages::{Convergence, Failure, FilteredDefect, MOST, Stages, Start};
+use super::stages::{Convergence, Failure, FilteredDefect, MOST, Sides, Stages, Start};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;
@@ -157,8 +157,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
         self.advance(start, false);
         convergence.begin(S);
-        self.compare_branches(convergence);
-        let mut passed = false;
+        convergence.moved(self.sides(convergence.branches));
         for iteration in 1..=convergence.most {
             *residuals += S;
             self.evaluate();
@@ -171,18 +170,15 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
                 let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
-            let (compared, elsewhere) = (iteration > 1 && !passed, convergence.elsewhere);
-            passed = self.compare_branches(convergence);
+            convergence.moved(self.sides(convergence.branches));
             if convergence.after(increment, tolerance)? {
-                // The rate of an earlier step holds where the matrix is exact, on this side of a
-                // border; two increments that a border is between say nothing of a rate.
                 let exact = M::STRUCTURE.constant_matrix;
-                if exact && passed && iteration < convergence.most {
+                if convergence.goes_on(exact) {
                     continue;
                 }
-                let here = !elsewhere && !convergence.elsewhere;
-                let measured = exact || compared || here && (iteration > 1 || increment <= tolerance);
-                if measured || self.confirms(tolerance / increment, convergence, residuals)? {
+                if convergence.is_measured(exact, increment <= tolerance)
+                    || self.confirms(tolerance / increment, convergence, residuals)?
+                {
                     return Ok(());
                 }
             }

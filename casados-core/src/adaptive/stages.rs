@@ -54,6 +54,15 @@ pub enum Failure {
     Rough(f64),
 }
 
+/// Where the stages are, beside borders between branches of the model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sides {
+    /// One has passed a border by the last increment.
+    pub passed: bool,
+    /// One is beyond a border from where the Jacobian was evaluated.
+    pub beyond: bool,
+}
+
 /// What is known about the convergence of the last iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Convergence {
@@ -69,9 +78,8 @@ pub struct Convergence {
     pub fresh: bool,
     /// The branches of the model where that was.
     pub branches: Branches,
-    /// Whether stages have other ones: how fast an iteration converges is to be seen then, and no
-    /// earlier step tells.
-    pub elsewhere: bool,
+    /// Where the stages are now, and where they were before the last increment.
+    sides: [Sides; 2],
     /// The last increment and the last rate.
     last: [f64; 2],
 }
@@ -86,7 +94,7 @@ impl Default for Convergence {
             factor,
             fresh: false,
             branches: Branches::default(),
-            elsewhere: false,
+            sides: [Sides::default(); 2],
             last,
         }
     }
@@ -101,8 +109,13 @@ impl Convergence {
         self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)).max(4.0) as usize;
         self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
         self.rate = FAST;
-        self.elsewhere = false;
+        self.sides = [Sides::default(); 2];
         self.last = [0.0; 2];
+    }
+
+    /// The stages were moved.
+    pub(super) fn moved(&mut self, to: Sides) {
+        self.sides = [to, self.sides[0]];
     }
 
     /// After an increment relative to what is tolerated: whether what is left is below the
@@ -112,7 +125,7 @@ impl Convergence {
     /// It does not converge, or not soon enough.
     pub(super) fn after(&mut self, increment: f64, tolerance: f64) -> Result<bool, Failure> {
         let (iteration, most, [last, last_rate]) = (self.iterations, self.most, self.last);
-        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last && !self.elsewhere {
+        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last && !self.sides[0].beyond {
             // So does what converges slowly with the Jacobian of an earlier step: the next one gets
             // its own, too.
             self.rate = 2.0 * FAST;
@@ -138,6 +151,22 @@ impl Convergence {
         }
         self.last[0] = increment.max(f64::EPSILON);
         Ok(self.factor * increment <= tolerance)
+    }
+
+    /// Whether another increment is to follow a small one: an exact matrix is that of one side of a
+    /// border, and a stage has just passed one.
+    pub(super) fn goes_on(&self, exact: bool) -> bool {
+        exact && self.sides[0].passed && self.iterations < self.most
+    }
+
+    /// Whether this step has shown how fast its iteration converges, whose last increment is
+    /// `small` or not: the matrix is exact, or two increments were compared that no border is
+    /// between. The rate of an earlier step holds on its side of a border.
+    pub(super) fn is_measured(&self, exact: bool, small: bool) -> bool {
+        let [now, before] = self.sides;
+        let compared = self.iterations > 1 && !before.passed;
+        let here = !now.beyond && !before.beyond;
+        exact || compared || here && (self.iterations > 1 || small)
     }
 }
 

@@ -22,22 +22,21 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         change
     }
 
-    /// Whether a stage has passed a border since this was asked last; notes whether one is beyond
-    /// a border from where the Jacobian was evaluated.
-    pub(super) fn compare_branches(&mut self, convergence: &mut Convergence) -> bool {
-        let mut passed = false;
+    /// Where the stages are beside borders: since this was asked last, and from where the branches
+    /// are those of the `jacobian`.
+    pub(super) fn sides(&mut self, jacobian: Branches) -> Sides {
+        let mut sides = Sides::default();
         if const { M::BRANCHES == 0 } {
-            return passed;
+            return sides;
         }
         let mut point = ArrayV::<M, T>::zeroed();
-        convergence.elsewhere = false;
         for stage in 0..S {
             take(self.memory.points[stage / GROUP].as_ref(), stage % GROUP, point.as_mut());
             let at = Branches::of::<M, T>(&point);
             let before = core::mem::replace(&mut self.memory.branches[stage], at);
-            passed |= before.change(at) == Some(Look::Branch);
-            convergence.elsewhere |= convergence.branches.change(at) == Some(Look::Branch);
+            sides.passed |= before.change(at) == Some(Look::Branch);
+            sides.beyond |= jacobian.change(at) == Some(Look::Branch);
         }
-        passed
+        sides
     }
 }

@@ -131,7 +131,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // Without multipliers stationarity is the gradient, and says nothing of what is far away.
         let wrong = part * state.force();
         let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
-        let permitted = if begins || state.exact || state.again { 0.0 } else { part };
+        let permitted = if begins || state.exact { 0.0 } else { part };
         self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };

@@ -29,9 +29,24 @@ const ROOM: usize = 64;
 /// its curvature counts.
 const PASSING: usize = 4;
 
-/// The regularisation of directions, where no step along the one before is short enough: at first
-/// the QP is solved again with all its digits, since it may be wrong by more than a step gains.
-const DAMPING: [f64; 5] = [0.0, 0.0, 1e-2, 1e0, MOST_DAMPING];
+/// What a step tries, where no step along the direction before is short enough.
+#[derive(Clone, Copy, PartialEq)]
+enum Attempt {
+    /// The QP to as many digits as the iterate deserves.
+    First,
+    /// To all of them: it may have been wrong by more than a step gains.
+    Exact,
+    /// With at least so much regularisation.
+    Damped(f64),
+}
+
+const ATTEMPTS: [Attempt; 5] = [
+    Attempt::First,
+    Attempt::Exact,
+    Attempt::Damped(1e-2),
+    Attempt::Damped(1e0),
+    Attempt::Damped(MOST_DAMPING),
+];
 const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
@@ -325,15 +340,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
         let damps = state.again || !C::EXACT && self.curvature.update().is_none();
-        for (attempt, damping) in DAMPING.into_iter().enumerate() {
-            let is_known = failure.is_some() || row.elastic || state.passing;
-            let skips = if damping > 0.0 { damps && damping <= state.damping } else { is_known };
-            if attempt > 0 && skips {
+        for attempt in ATTEMPTS {
+            let (damping, skips) = match attempt {
+                Attempt::First => (0.0, false),
+                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.passing),
+                Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
+            };
+            if skips {
                 continue;
             }
-            state.exact = attempt > 0;
+            state.exact = state.again || attempt != Attempt::First;
             state.passing = damps && damping.max(state.damping) < MOST_DAMPING;
-            if attempt > 0 {
+            if attempt != Attempt::First {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.
                     ocp.iterate.multipliers_mut().fill(T::ZERO);
