@@ -25,16 +25,17 @@ def cargo(arguments, stderr=None, **variables):
 def build(cpu, programs, **variables):
     """The programs, by name. A panic that can be reached is an undefined symbol."""
     flags = {f"CARGO_TARGET_{TARGET.upper().replace('-', '_')}_RUSTFLAGS": f"-C target-cpu={cpu}"}
-    return build_for(TARGET, cpu, programs, [], **flags, **variables)
+    return build_for(TARGET, cpu, programs, ["--release"], **flags, **variables)
 
 
 def build_for(target, name, programs, arguments, **variables):
     """With a target that is named, the desk's too: then macros and what they need are built once for all of them."""
     bins = [argument for program in programs for argument in ("--bin", program)]
-    cargo(["build", "--quiet", "--locked", "--release", "--target", target, "--target-dir", str(TARGETS), *arguments, *bins], **variables)
+    cargo(["build", "--quiet", "--locked", "--target", target, "--target-dir", str(TARGETS), *arguments, *bins], **variables)
     copies = TARGETS / name
     copies.mkdir(exist_ok=True)
-    return {program: pathlib.Path(shutil.copy(TARGETS / target / "release" / program, copies)) for program in programs}
+    profile = "release" if "--release" in arguments else "debug"
+    return {program: pathlib.Path(shutil.copy(TARGETS / target / profile / program, copies)) for program in programs}
 
 
 def emulator():
@@ -84,12 +85,11 @@ def to_copy():
 
 
 def desk(programs):
-    """What the same programs print on this machine, with the standard library's functions and its widest registers."""
+    """What the same programs print on this machine, with the standard library's functions."""
     version = subprocess.run(["rustc", "-vV"], stdout=subprocess.PIPE, text=True, check=True).stdout
     host = next(line.split()[1] for line in version.splitlines() if line.startswith("host:"))
-    # Its numbers are compared, nothing else.
-    quick = {f"CARGO_PROFILE_RELEASE_{key}": value for key, value in (("LTO", "off"), ("CODEGEN_UNITS", "16"), ("OPT_LEVEL", "1"))}
-    programs = build_for(host, "desk", programs, ["--features", "desk"], **quick)
+    # Its numbers are compared, nothing else: they need no optimiser.
+    programs = build_for(host, "desk", programs, ["--features", "desk"], CARGO_PROFILE_DEV_DEBUG="false")
     return {
         name: lines(subprocess.run([program], stdout=subprocess.PIPE, text=True, check=True).stdout)
         for name, program in programs.items()
