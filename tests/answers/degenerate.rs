@@ -12,7 +12,8 @@ const NONE: f64 = f64::INFINITY;
 
 type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Solves, and shows the log where something is not as it has to be.
+/// Solves, and shows the log where something is not as it has to be. Where no multipliers exist
+/// residuals may stay above the tolerance: such problems are solved and do not converge.
 fn run<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
     check: impl Fn(&HeapOcp<P>, &Outcome) -> bool,
@@ -30,12 +31,6 @@ fn u<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> Vec<f64> {
 
 fn near(values: &[f64], expected: &[f64], tolerance: f64) -> bool {
     values.len() == expected.len() && values.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance)
-}
-
-/// The status of a run that has ended well: where no multipliers exist, residuals may stay above
-/// the tolerance.
-fn ended(outcome: &Outcome) -> bool {
-    matches!(outcome.status, Status::Converged | Status::Acceptable)
 }
 
 /// Neither state nor time: what there is are controls. The state adds up `u[0]`.
@@ -104,7 +99,7 @@ fn d01_dependent_terminal_equations() -> Test {
         problem!(Energy).terminal_constraints(Constraint::<TwiceTheEnd>::new([1.0, 2.0], [1.0, 2.0]));
     let mut ocp = problem.on(Horizon::uniform(2, 1.0))?;
     ocp.fix_initial_state(&[0.0])?.guess(&[0.3], &[0.0, 0.4])?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
     Ok(())
 }
 
@@ -117,7 +112,7 @@ fn plane_twice(_x: [f64; 1], u: [f64; 2]) -> [f64; 2] {
 #[test]
 fn d02_dependent_path_equations() -> Test {
     let mut ocp = on_one!(problem!(Energy, PlaneTwice, [1.0, 3.0], [1.0, 3.0]), [0.9, -0.4]);
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.5, 0.5], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.5], 1e-6))?;
     Ok(())
 }
 
@@ -154,7 +149,7 @@ fn d05_complementarity_constraints() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Product, [-NONE], [0.0]), [0.8, 0.3]);
     ocp.bound("u", .., 0.0, NONE)?;
     run(&mut ocp, |ocp, outcome| {
-        ended(outcome) && (near(&u(ocp), &[1.0, 0.0], 1e-3) || near(&u(ocp), &[0.0, 1.0], 1e-3))
+        outcome.is_solved() && (near(&u(ocp), &[1.0, 0.0], 1e-3) || near(&u(ocp), &[0.0, 1.0], 1e-3))
     })?;
     Ok(())
 }
@@ -189,7 +184,7 @@ fn d07_waechter_biegler() -> Test {
     let (part, side) = (Part::PathBounds, Side::Lower);
     let expected = ConstraintName { part, stage: 0, name: "TwoSides", output: 1, side };
     run(&mut ocp, |ocp, outcome| {
-        let solved = ended(outcome) && near(&u(ocp), &[1.0, 0.0], 1e-6);
+        let solved = outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6);
         solved || (is_infeasible(outcome, expected, 1.5) && near(&u(ocp), &[-1.0, 0.0], 1e-4))
     })?;
     Ok(())
@@ -200,7 +195,7 @@ fn d07_waechter_biegler() -> Test {
 fn d08_concave_cost() -> Test {
     let mut ocp = on_one!(problem!(Concave), [0.3, 1.0]);
     ocp.bound("u[0]", .., -1.0, 2.0)?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[2.0, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[2.0, 0.0], 1e-6))?;
     Ok(())
 }
 
@@ -209,7 +204,7 @@ fn d08_concave_cost() -> Test {
 fn d09_indefinite_hessian() -> Test {
     let mut ocp = on_one!(problem!(DoubleWell), [1.0, 0.1]);
     let depth = core::f64::consts::FRAC_1_SQRT_2;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.0, depth], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.0, depth], 1e-6))?;
     Ok(())
 }
 
@@ -217,7 +212,7 @@ fn d09_indefinite_hessian() -> Test {
 #[test]
 fn d10_indefinite_but_for_constraints() -> Test {
     let mut ocp = on_one!(problem!(Concave, First, [0.5], [0.5]), [0.1, 0.9]);
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
     Ok(())
 }
 
@@ -286,7 +281,7 @@ fn d15_unbounded_concave() -> Test {
 fn d16_fixed_control() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u[0]", .., 0.7, 0.7)?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.7, 1.0], 1e-7))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.7, 1.0], 1e-7))?;
     Ok(())
 }
 
@@ -296,7 +291,9 @@ fn d17_everything_fixed() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u[0]", .., 0.7, 0.7)?.bound("u[1]", .., -0.2, -0.2)?;
     run(&mut ocp, |ocp, outcome| {
-        ended(outcome) && near(&u(ocp), &[0.7, -0.2], 1e-7) && near(ocp.stage(1).unwrap().x, &[0.7], 1e-7)
+        outcome.is_solved()
+            && near(&u(ocp), &[0.7, -0.2], 1e-7)
+            && near(ocp.stage(1).unwrap().x, &[0.7], 1e-7)
     })?;
     Ok(())
 }
@@ -305,7 +302,7 @@ fn d17_everything_fixed() -> Test {
 #[test]
 fn d18_singular_hessian() -> Test {
     let mut ocp = on_one!(problem!(OneControl), [0.0, 0.3]);
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp)[..1], &[1.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp)[..1], &[1.0], 1e-6))?;
     Ok(())
 }
 
@@ -314,7 +311,7 @@ fn d18_singular_hessian() -> Test {
 fn d19_weakly_active_bound() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u", .., -5.0, 1.0)?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[1.0, 1.0], 1e-4))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 1.0], 1e-4))?;
     Ok(())
 }
 
@@ -323,7 +320,7 @@ fn d19_weakly_active_bound() -> Test {
 fn d20_redundant_bounds() -> Test {
     let mut ocp = on_one!(problem!(FromTwo, Both, [-NONE, -NONE], [1.0, 1.0]), [0.0, 0.5]);
     ocp.bound("u[0]", .., -NONE, 1.0)?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
     Ok(())
 }
 
@@ -331,7 +328,7 @@ fn d20_redundant_bounds() -> Test {
 #[test]
 fn d21_no_interior() -> Test {
     let mut ocp = on_one!(problem!(Energy, Both, [-NONE, 1.0], [1.0, NONE]), [0.0, 0.5]);
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
     Ok(())
 }
 
@@ -353,7 +350,7 @@ fn d22_redundant_periodicity() -> Test {
     ocp.free_initial_state().periodic("x")?.guess(&[0.0, 0.3], &[0.1])?;
     run(&mut ocp, |ocp, outcome| {
         let stages = || (0..=6).filter_map(|k| ocp.stage(k).ok());
-        ended(outcome) && stages().all(|stage| near(stage.x, &[1.0, 1.6], 1e-6))
+        outcome.is_solved() && stages().all(|stage| near(stage.x, &[1.0, 1.6], 1e-6))
     })?;
     Ok(())
 }
@@ -365,7 +362,7 @@ fn d23_periodicity_of_given_states() -> Test {
     let mut ocp = problem.on(Horizon::uniform(1, 1.0))?;
     ocp.fix_initial_state(&[1.0, 1.0])?.bound("x[1]", 1.., 1.0, 1.0)?.periodic("x")?;
     ocp.guess(&[0.0, 0.3], &[0.1])?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[0.5], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5], 1e-6))?;
     Ok(())
 }
 
@@ -378,6 +375,6 @@ fn d24_shared_control_with_bounds_everywhere() -> Test {
         .shared("u[0]")?
         .bound("u[0]", .., -1.0, 1.5)?
         .guess(&[0.0], &[0.1, 0.3])?;
-    run(&mut ocp, |ocp, outcome| ended(outcome) && near(&u(ocp), &[1.5, 0.0], 1e-6))?;
+    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.5, 0.0], 1e-6))?;
     Ok(())
 }

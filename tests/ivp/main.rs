@@ -7,6 +7,7 @@ mod models {
 
 mod ends;
 mod explicit;
+mod far_below;
 mod jumps;
 mod kinks;
 mod rough;

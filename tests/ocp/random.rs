@@ -183,7 +183,7 @@ macro_rules! judge {
         assert!(all.iter().zip(&others).all(|(a, b)| a.to_bits() == b.to_bits()), "{}", $seed);
         match &found {
             Ok(outcome) => {
-                if matches!(outcome.status, Status::Converged | Status::Acceptable) {
+                if outcome.is_solved() {
                     assert!(all.iter().all(|number| number.is_finite()), "{}: {outcome}", $seed);
                 }
                 if outcome.status == Status::Converged {

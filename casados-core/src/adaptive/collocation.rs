@@ -156,7 +156,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
             }
         }
         self.advance(start, false);
-        convergence.begin(S);
+        convergence.begin(S, start.h.abs().to_f64());
         convergence.moved(self.sides(convergence.branches));
         for iteration in 1..=convergence.most {
             *residuals += S;

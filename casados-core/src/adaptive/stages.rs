@@ -80,6 +80,8 @@ pub struct Convergence {
     pub branches: Branches,
     /// Where the stages are now, and where they were before the last increment.
     sides: [Sides; 2],
+    /// The length of this step, and that of the last one whose rate was measured.
+    lengths: [f64; 2],
     /// The last increment and the last rate.
     last: [f64; 2],
 }
@@ -95,6 +97,7 @@ impl Default for Convergence {
             fresh: false,
             branches: Branches::default(),
             sides: [Sides::default(); 2],
+            lengths: [0.0; 2],
             last,
         }
     }
@@ -104,8 +107,9 @@ impl Convergence {
     /// The factor where no step tells: an increment counts as what is left after it.
     pub(super) const UNKNOWN: f64 = 1.0;
 
-    /// Before an iteration for so many stages.
-    pub(super) fn begin(&mut self, stages: usize) {
+    /// Before an iteration for so many stages, in a step of this length.
+    pub(super) fn begin(&mut self, stages: usize, length: f64) {
+        self.lengths[0] = length;
         self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)).max(4.0) as usize;
         self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
         self.rate = FAST;
@@ -159,14 +163,24 @@ impl Convergence {
         exact && self.sides[0].passed && self.iterations < self.most
     }
 
-    /// Whether this step has shown how fast its iteration converges, whose last increment is
-    /// `small` or not: the matrix is exact, or two increments were compared that no border is
-    /// between. The rate of an earlier step holds on its side of a border.
-    pub(super) fn is_measured(&self, exact: bool, small: bool) -> bool {
-        let [now, before] = self.sides;
+    /// Whether it is known how fast the iteration converges, whose last increment is `small` or
+    /// not: the matrix is exact, or two increments were compared that no border is between, which
+    /// is remembered of a step of this length. The rate of an earlier step holds on its side of a
+    /// border, and for steps that are no longer: it grows with their length.
+    pub(super) fn is_measured(&mut self, exact: bool, small: bool) -> bool {
+        let ([now, before], [length, measured]) = (self.sides, self.lengths);
         let compared = self.iterations > 1 && !before.passed;
         let here = !now.beyond && !before.beyond;
-        exact || compared || here && (self.iterations > 1 || small)
+        if compared {
+            self.lengths[1] = length;
+        }
+        exact || compared || here && (self.iterations > 1 || small && length <= measured)
+    }
+
+    /// The last increment was small, and has left this part of the residual.
+    pub(super) fn confirmed(&mut self, rate: f64) {
+        self.factor = self.factor.min(rate);
+        self.lengths[1] = self.lengths[0];
     }
 }
 

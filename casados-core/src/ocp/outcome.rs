@@ -101,10 +101,10 @@ pub enum Status {
 /// The outcome of a run. The iterate of the problem is the best one, whatever the status.
 ///
 /// Runs return it; it prints itself in a line. Whether the iterate is a solution, `is_converged`
-/// says.
+/// says, and `is_solved` by a lower standard.
 ///
 /// ```
-/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem, Status};
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem};
 /// use casados::prelude::*;
 ///
 /// #[function]
@@ -117,10 +117,8 @@ pub enum Status {
 ///     .on(Horizon::uniform(5, 1.0))?;
 /// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
 /// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
-/// match outcome.status {
-///     Status::Converged | Status::Acceptable => println!("{}", outcome.objective),
-///     status => panic!("{status}"),
-/// }
+/// assert!(outcome.is_converged(), "{outcome}");
+/// println!("{}", outcome.objective);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,10 +159,36 @@ impl Outcome {
         self.times.search += row.times.search;
     }
 
-    /// Whether the conditions of optimality hold.
+    /// Whether the conditions of optimality hold to the tolerance: then multipliers are those of
+    /// the solution, too.
     #[must_use]
     pub fn is_converged(&self) -> bool {
         self.status == Status::Converged
+    }
+
+    /// Whether states and controls are those of a solution: the conditions hold to the tolerance,
+    /// or to the acceptable one where rounding or scaling leaves no better point.
+    ///
+    /// ```
+    /// # use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem};
+    /// # use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn price(x: f64, u: f64) -> f64 { x * x + u * u }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(GeneralCost::<Price>::new())
+    /// #     .on(Horizon::uniform(5, 1.0))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    /// if !outcome.is_solved() {
+    ///     return Err(outcome.to_string().into());
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn is_solved(&self) -> bool {
+        matches!(self.status, Status::Converged | Status::Acceptable)
     }
 }
 

@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// What one iteration may leave of the residual of any equation.
+const ENOUGH: f64 = 0.1;
+
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// Whether an increment that may be so much larger than what is left after it is the last one.
     ///
@@ -14,13 +17,19 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         residuals: &mut usize,
     ) -> Result<bool, Failure> {
         let rate = self.measured_rate(residuals)?;
-        convergence.factor = convergence.factor.min(rate);
-        Ok(rate <= most * (1.0 - rate))
+        // An increment far below the tolerance may be the whole of a state that is below it, too.
+        let most = if convergence.iterations == 1 { most.min(ENOUGH) } else { most };
+        let confirmed = rate <= most * (1.0 - rate);
+        if confirmed {
+            convergence.confirmed(rate);
+        }
+        Ok(confirmed)
     }
 
     /// The residual at the last stage relative to the one before the iteration at all stages, of
     /// the worst equation: the rate of convergence, where a force or its derivatives jump in the
-    /// step. The rate of an earlier step knows nothing of that.
+    /// step, or where it is longer than those before. The rate of an earlier step knows nothing of
+    /// that.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
