@@ -137,7 +137,10 @@ impl fmt::Display for Error {
             }
             Error::StepSizeUnderflow { t, h, reason } => {
                 let reason = match reason {
-                    Refusal::Error => "the estimated error stays above the tolerance",
+                    Refusal::Error => {
+                        "the estimated error stays above the tolerance; the solution may end there, or `atol` be \
+                         far above states that decide on it"
+                    }
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
                     Refusal::NotFinite => "the model is not finite",
@@ -146,7 +149,7 @@ impl fmt::Display for Error {
                 write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
             }
             Error::TooManySteps { t, steps, stiff } => {
-                write!(f, "t = {t} was reached after {steps} steps, and more are not allowed")?;
+                write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
                 if stiff {
                     f.write_str("; the model is stiff, so that an implicit method takes fewer: Radau")?;
                 }
