@@ -171,8 +171,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let steps = ((span.end - span.start) / h).to_f64();
-        let error = attempt::<M, B, T, S>(step, run, &x, t, h, steps);
+        let error = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
