@@ -179,6 +179,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
                 if convergence.is_measured(exact, increment <= tolerance)
                     || self.confirms(tolerance / increment, convergence, residuals)?
                 {
+                    convergence.end();
                     return Ok(());
                 }
             }

@@ -198,10 +198,9 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             run.tape.push(t, h, 0, x.as_slice(), &[])?;
         }
         let end = if last { span.end } else { t + h };
-        let (start, length) = (t, h);
-        let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
-            step.interpolate(start, length, (time - start) / length, dense)
-        };
+        let (start, size) = (t, h);
+        let mut evaluate =
+            |time: T, dense: &mut Dense<M, T>| step.interpolate(start, size, (time - start) / size, dense);
         let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
         after(&mut accepted, &mut run.base.dense)?;
         if accepted.stop {

@@ -80,8 +80,10 @@ pub struct Convergence {
     pub branches: Branches,
     /// Where the stages are now, and where they were before the last increment.
     sides: [Sides; 2],
-    /// The length of this step, and that of the last one whose rate was measured.
-    lengths: [f64; 2],
+    /// The length of this step,
+    length: f64,
+    /// and that of the last one whose rate was measured.
+    measured_length: f64,
     /// The last increment and the last rate.
     last: [f64; 2],
 }
@@ -97,7 +99,8 @@ impl Default for Convergence {
             fresh: false,
             branches: Branches::default(),
             sides: [Sides::default(); 2],
-            lengths: [0.0; 2],
+            length: 0.0,
+            measured_length: 0.0,
             last,
         }
     }
@@ -109,7 +112,7 @@ impl Convergence {
 
     /// Before an iteration for so many stages, in a step of this length.
     pub(super) fn begin(&mut self, stages: usize, length: f64) {
-        self.lengths[0] = length;
+        self.length = length;
         self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)).max(4.0) as usize;
         self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
         self.rate = FAST;
@@ -164,23 +167,31 @@ impl Convergence {
     }
 
     /// Whether it is known how fast the iteration converges, whose last increment is `small` or
-    /// not: the matrix is exact, or two increments were compared that no border is between, which
-    /// is remembered of a step of this length. The rate of an earlier step holds on its side of a
-    /// border, and for steps that are no longer: it grows with their length.
-    pub(super) fn is_measured(&mut self, exact: bool, small: bool) -> bool {
-        let ([now, before], [length, measured]) = (self.sides, self.lengths);
-        let compared = self.iterations > 1 && !before.passed;
+    /// not: the matrix is exact, or two increments were compared. The rate of an earlier step holds
+    /// on its side of a border, and for steps that are no longer: it grows with their length.
+    pub(super) fn is_measured(&self, exact: bool, small: bool) -> bool {
+        let [now, before] = self.sides;
         let here = !now.beyond && !before.beyond;
-        if compared {
-            self.lengths[1] = length;
+        let known = small && self.length <= self.measured_length;
+        exact || self.is_compared() || here && (self.iterations > 1 || known)
+    }
+
+    /// Whether there are two increments that no border is between.
+    fn is_compared(&self) -> bool {
+        self.iterations > 1 && !self.sides[1].passed
+    }
+
+    /// The iteration is over.
+    pub(super) fn end(&mut self) {
+        if self.is_compared() {
+            self.measured_length = self.length;
         }
-        exact || compared || here && (self.iterations > 1 || small && length <= measured)
     }
 
     /// The last increment was small, and has left this part of the residual.
     pub(super) fn confirmed(&mut self, rate: f64) {
         self.factor = self.factor.min(rate);
-        self.lengths[1] = self.lengths[0];
+        self.measured_length = self.length;
     }
 }
 
