@@ -285,8 +285,9 @@ pub trait Widest<T> {
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
-/// A computation on slices that is compiled with this crate, once for each number type and not in
-/// each program again: [`Real::compiled`] runs it, and the macro `compiled!` makes one.
+/// A computation on slices that is compiled with this crate and not in each program again:
+/// [`Real::compiled`] runs it, and the macro `compiled!` makes one. In single precision, which few
+/// programs with `std` need, it is compiled where it is called, as all inlined functions are.
 #[doc(hidden)]
 pub trait Compiled {
     /// The computation.
@@ -310,7 +311,7 @@ macro_rules! compiled {
             fn double<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f64>) {
                 <f64 as $crate::scalar::Real>::registers(computation);
             }
-            #[cfg_attr(feature = "std", inline(never))]
+            #[cfg_attr(feature = "std", inline)]
             #[cfg_attr(not(feature = "std"), inline(always))]
             fn single<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f32>) {
                 <f32 as $crate::scalar::Real>::registers(computation);
