@@ -2,7 +2,7 @@
 
 use crate::interval::{check, options};
 use crate::models::awe::Awe;
-use crate::models::chain::{Chain, stretched};
+use crate::models::chain::Chain;
 use crate::models::pendulum::Pendulum;
 use casados::{DormandPrince5, Erk, Gauss, Irk, RadauIIA, Rk4};
 use nalgebra::SVector;
@@ -64,21 +64,6 @@ fn chain_sensitivities() {
         0.2,
     );
     check::<Chain<9>, _, 9, 3, 0>(Erk::<Chain<9>, Rk4>::new(options(2)).expect("valid"), &x0, &u, &p, 0.2);
-}
-
-/// Over no time nothing changes, nor over one whose reciprocal is infinite: also in a model so
-/// large that second derivatives are those of the adjoint in all directions.
-#[test]
-fn intervals_of_no_length() {
-    let (x0, u) = (stretched::<69>(), SVector::from([0.1, -0.2, 0.3]));
-    let lambda = SVector::from_fn(|i, _| 1.0 + (i as f64).sin());
-    let mut irk = Irk::<Chain<69>, Gauss<2>>::new(options(2)).expect("valid");
-    for h in [0.0, 1e-310, -1e-310] {
-        let end = irk.hessian(&x0, &u, h, &lambda).expect("a finite result");
-        assert_eq!(end.x, x0);
-        assert_eq!(end.grad_x0, lambda);
-        assert!(end.h_xx.iter().all(|entry| entry.abs() < 1e-300), "{h}");
-    }
 }
 
 /// One of the intervals of the optimal orbit; with an algebraic state.
