@@ -25,13 +25,7 @@ fn start() -> SVector<f64, CELLS> {
 #[test]
 fn sensitivities_of_many_cells() -> Result<(), Box<dyn std::error::Error>> {
     let p = SVector::zeros();
-    check::<Tube, _, CELLS, 1, 0>(
-        Irk::<Tube, Gauss<2>>::new(options(3))?,
-        &start(),
-        &vector![2.0],
-        &p,
-        0.1,
-    );
+    check::<Tube, _, CELLS, 1, 0>(Irk::<Tube, Gauss<2>>::new(options(3))?, &start(), &vector![2.0], &p, 0.1);
     let trapezoid = Tableau::new([[0.0, 0.0], [0.5, 0.5]], [0.5, 0.5], [0.0, 1.0])?;
     let irk = Irk::<Tube, Custom<2>>::with_tableau(options(2), trapezoid)?;
     check::<Tube, _, CELLS, 1, 0>(irk, &start(), &vector![2.0], &p, 0.1);
