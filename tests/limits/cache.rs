@@ -17,7 +17,7 @@ const COUNT: usize = 11;
 
 /// The stages of two steps of a chain of five masses fit for as many lanes as there are, its
 /// columns for none.
-const CACHE: usize = 32 << 10;
+const CACHE: usize = 40 << 10;
 
 /// Both solve the same stages to rounding; the condition of the Newton matrix is of order ten, and
 /// two steps add up.

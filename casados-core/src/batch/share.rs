@@ -16,7 +16,7 @@ use core::marker::PhantomData;
 /// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or
 /// computed one interval after the other: what does not lie in it is fetched from afar again and
 /// again.
-const WORKING_SET: f64 = 7.0 / 8.0;
+const WORKING_SET: f64 = 5.0 / 8.0;
 
 /// How many intervals are computed together: as many as the widest register has whose group fits
 /// into the cache.
