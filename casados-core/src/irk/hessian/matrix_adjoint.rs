@@ -31,10 +31,9 @@ use crate::scalar::Lanes;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
-/// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products,
-/// counted for each direction. They wait for memory, which products of panels do not: both ways are
-/// even at 0.29 to 0.43 with AVX2, and at 0.66 to 0.85 with AVX-512. Only of single numbers:
-/// registers of them leave no room for packets.
+/// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products
+/// that panels take, counted for each direction. A solve waits for memory, which products of panels
+/// do not. Only of single numbers: registers of them leave no room for packets.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
