@@ -149,7 +149,7 @@ pub use dynamics::{Dynamics, SecondOrder};
 pub use dynamics::{IntegralTerms, Interval, IntervalResult, Nodes, Sink, StageAction};
 pub use error::{ConstraintName, OcpError, Part, Text};
 #[doc(hidden)]
-pub use fits::{ConstraintsOf, CostOf};
+pub use fits::{ConstraintsOf, CostOf, HasArgumentsOf, IsConstraint, IsCost};
 pub use horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use instance::HeapOcp;

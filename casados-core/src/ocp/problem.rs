@@ -3,6 +3,7 @@
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::dynamics::{Dynamics, SecondOrder};
+use super::fits::{HasArgumentsOf, IsConstraint, IsCost};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -60,26 +61,46 @@ impl<D> Problem<D> {
 
 impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// The cost of every stage but the last, as it is.
-    pub fn stage_cost<C>(self, stage_cost: C) -> Problem<D, C, E, G, H> {
+    pub fn stage_cost<T: Real, C>(self, stage_cost: C) -> Problem<D, C, E, G, H>
+    where
+        D: Dynamics<T>,
+        C: IsCost<Functions: HasArgumentsOf<D, T>>,
+    {
         let Self { dynamics, terminal_cost, path, terminal, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running: false }
     }
     /// The cost of every stage but the last, times the length of its interval.
-    pub fn running_cost<C>(self, cost: C) -> Problem<D, C, E, G, H> {
+    pub fn running_cost<T: Real, C>(self, cost: C) -> Problem<D, C, E, G, H>
+    where
+        D: Dynamics<T>,
+        C: IsCost<Functions: HasArgumentsOf<D, T>>,
+    {
         Problem { running: true, ..self.stage_cost(cost) }
     }
     /// The cost of the last stage.
-    pub fn terminal_cost<C>(self, terminal_cost: C) -> Problem<D, L, C, G, H> {
+    pub fn terminal_cost<T: Real, C>(self, terminal_cost: C) -> Problem<D, L, C, G, H>
+    where
+        D: Dynamics<T>,
+        C: IsCost<Functions: HasArgumentsOf<D, T>>,
+    {
         let Self { dynamics, stage_cost, path, terminal, running, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
     }
     /// Constraints of every stage but the last.
-    pub fn path_constraints<C>(self, path: C) -> Problem<D, L, E, C, H> {
+    pub fn path_constraints<T: Real, C>(self, path: C) -> Problem<D, L, E, C, H>
+    where
+        D: Dynamics<T>,
+        C: IsConstraint<Functions: HasArgumentsOf<D, T>>,
+    {
         let Self { dynamics, stage_cost, terminal_cost, terminal, running, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
     }
     /// Constraints of the last stage.
-    pub fn terminal_constraints<C>(self, terminal: C) -> Problem<D, L, E, G, C> {
+    pub fn terminal_constraints<T: Real, C>(self, terminal: C) -> Problem<D, L, E, G, C>
+    where
+        D: Dynamics<T>,
+        C: IsConstraint<Functions: HasArgumentsOf<D, T>>,
+    {
         let Self { dynamics, stage_cost, terminal_cost, path, running, .. } = self;
         Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
     }

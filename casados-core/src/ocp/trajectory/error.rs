@@ -52,6 +52,19 @@ pub enum TrajectoryError {
         /// How many the problem has.
         expected: usize,
     },
+    /// A trajectory that was read has times that are not finite, or decrease.
+    Times,
+    /// A trajectory that was read has values without a time.
+    Beyond {
+        /// Of what.
+        name: String,
+        /// Which time is that of the first value.
+        first: usize,
+        /// How many values there are.
+        found: usize,
+        /// How many times the trajectory has.
+        times: usize,
+    },
     /// The problem refuses a value.
     Problem(OcpError),
 }
@@ -74,6 +87,11 @@ impl fmt::Display for TrajectoryError {
                 f,
                 "the trajectory has {found} values of `{name}`, and the problem {expected}: `guess_from` interpolates \
                  where horizons differ"
+            ),
+            Self::Times => f.write_str("the times of the trajectory have to be finite and must not decrease"),
+            Self::Beyond { name, first, found, times } => write!(
+                f,
+                "`{name}` has {found} values from time {first} on, and the trajectory has {times} times"
             ),
             Self::Problem(error) => error.fmt(f),
         }

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `collect` | the iterate of a problem as a trajectory |
 //! | `between` | the same with points between the nodes |
+//! | `read` | a trajectory from a file, checked |
 //! | `restore` | a trajectory as the iterate of a problem, or as its guess |
 //! | `csv` | a table for other programs |
 
@@ -11,6 +12,8 @@ mod between;
 mod collect;
 mod csv;
 mod error;
+#[cfg(feature = "serde")]
+mod read;
 mod restore;
 
 pub use csv::Csv;
@@ -61,7 +64,11 @@ use alloc::vec::Vec;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "read::Unchecked<T>", bound(deserialize = "T: Real + serde::Deserialize<'de>"))
+)]
 pub struct Trajectory<T = f64> {
     model: String,
     times: Vec<T>,
