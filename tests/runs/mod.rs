@@ -81,7 +81,7 @@ const VERDICTS: [(&str, &str); 5] = [
     ("no point satisfies all constraints", "Infeasible"),
     ("not solved after", "MaxIterations"),
     ("no progress after", "Stalled"),
-    ("the time was over", "OutOfTime"),
+    ("the time limit was reached", "OutOfTime"),
     ("the Hessian is not positive semidefinite", "NotConvex"),
 ];
 

@@ -229,6 +229,45 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
+    /// The reference of the stage cost at every stage, as a function of the stage and of the time of
+    /// its node, which writes it over zeros.
+    ///
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0, 1e-4]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[0.0])?.guess(&[0.0], &[0.0])?;
+    /// // `x` follows a sine, and `u` stays small.
+    /// ocp.set_references(|_stage, t, reference| reference[0] = t.sin())?;
+    /// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    /// let x = ocp.solution()?.state("x")?[10];
+    /// assert!((x - 1.0_f64.sin()).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidValue`]; then the references of the stages before are set.
+    pub fn set_references(
+        &mut self,
+        mut write: impl FnMut(usize, T, &mut [T]),
+    ) -> Result<&mut Self, OcpError> {
+        let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for (k, &mut time) in data.times.iter_mut().enumerate().take(intervals) {
+            let reference = crate::qp::part_mut(data.references, k * length, length);
+            reference.fill(T::ZERO);
+            write(k, time, reference);
+            Labels::references::<P, T>(Part::Reference, k).check_vector(reference, length)?;
+        }
+        Ok(self)
+    }
+
     /// The reference of the terminal cost; zero if never set.
     ///
     /// # Errors

@@ -320,6 +320,17 @@ pub enum OcpError {
         /// The value.
         value: f64,
     },
+    /// A derivative of the solution is not finite: numbers of the problem are too far from one.
+    NonFiniteSensitivity {
+        /// The stage.
+        stage: usize,
+        /// The state or control of the solution.
+        of: &'static str,
+        /// What it is differentiated by: a state at the start, or a parameter.
+        by: &'static str,
+        /// The value.
+        value: f64,
+    },
     /// An interval has no result.
     Integration {
         /// Which.

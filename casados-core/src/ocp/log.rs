@@ -73,7 +73,7 @@ pub struct Iteration {
     pub residuals: Residuals,
     /// The part of the step that was taken; zero in the last iteration.
     pub step: f64,
-    /// Iterations of QPs.
+    /// Iterations of QPs; of an interior point, which has none, zero, and `-` in the table.
     pub qp_iterations: usize,
     /// What was added to the diagonal of the Hessian because the QP was not convex
     /// ([`Convexification::Reduced`](super::Convexification)).
@@ -122,7 +122,7 @@ impl fmt::Display for Iteration {
         };
         write!(
             f,
-            "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:8.1e} {:6} {:8.3} {:8.3} {:10.3}",
+            "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:8.1e} ",
             self.iteration,
             self.objective,
             stationarity,
@@ -131,11 +131,14 @@ impl fmt::Display for Iteration {
             complementarity,
             self.step,
             self.regularisation,
-            self.qp_iterations,
-            1e3 * self.times.linearise,
-            1e3 * self.times.qp,
-            1e3 * self.times.search,
-        )
+        )?;
+        // An interior point has steps of Newton's method in the place of QPs.
+        match self.barrier > 0.0 {
+            true => f.write_str("     -")?,
+            false => write!(f, "{:6}", self.qp_iterations)?,
+        }
+        let Times { linearise, qp, search } = self.times;
+        write!(f, " {:8.3} {:8.3} {:10.3}", 1e3 * linearise, 1e3 * qp, 1e3 * search)
     }
 }
 
@@ -190,6 +193,17 @@ mod tests {
     /// What stands below the rows.
     fn marks(rows: &[Iteration]) -> Vec<alloc::string::String> {
         Log(rows).to_string().lines().skip(1 + rows.len()).map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn an_interior_point_has_no_iterations_of_qps() {
+        let plain = Iteration::default();
+        let row = |row: Iteration| row.to_string().split_whitespace().nth(8).map(ToString::to_string);
+        assert_eq!(row(Iteration { qp_iterations: 7, ..plain }).as_deref(), Some("7"));
+        assert_eq!(row(Iteration { barrier: 1e-9, ..plain }).as_deref(), Some("-"));
+        // Columns stay where they are.
+        let length = |row: Iteration| row.to_string().len();
+        assert_eq!(length(plain), length(Iteration { barrier: 0.1, ..plain }));
     }
 
     #[test]

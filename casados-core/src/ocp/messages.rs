@@ -159,6 +159,11 @@ impl fmt::Display for OcpError {
                 }
                 write!(f, " is {value}: {ELSEWHERE}")
             }
+            Self::NonFiniteSensitivity { stage, of, by, value } => write!(
+                f,
+                "stage {stage}: the derivative of the solution `{of}` by `{by}` is {value}: other units of states, \
+                 controls and costs may help"
+            ),
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
             Self::Integrator(error) => error.fmt(f),
             #[cfg(feature = "alloc")]

@@ -180,4 +180,4 @@ pub use single::{IntegralCost, WithIntegral};
 pub use sqp::HeapSqp;
 pub use sqp::{Globalisation, Sqp, SqpOptions};
 #[cfg(feature = "alloc")]
-pub use trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError};
+pub use trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};

@@ -45,11 +45,11 @@ pub enum Status {
     /// The conditions of optimality hold to the acceptable tolerance, and no better point was
     /// found.
     Acceptable,
-    /// The iterations were used up.
+    /// The maximum number of iterations was reached.
     MaxIterations,
     /// The observer stopped it.
     Stopped,
-    /// The time was over.
+    /// The time limit was reached.
     OutOfTime,
     /// Variables grow without end at points that satisfy all constraints: something is missing that
     /// bounds the objective. [`Ipm`](super::Ipm) says so.
@@ -198,9 +198,9 @@ impl Status {
         match self {
             Self::Converged => f.write_str("converged"),
             Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
-            Self::MaxIterations => f.write_str("not converged: the iterations were used up"),
+            Self::MaxIterations => f.write_str("not converged: the maximum number of iterations was reached"),
             Self::Stopped => f.write_str("stopped by the observer"),
-            Self::OutOfTime => f.write_str("not converged: the time was over"),
+            Self::OutOfTime => f.write_str("not converged: the time limit was reached"),
             Self::Unbounded => f.write_str("unbounded: variables grow without end"),
             Self::Infeasible { constraint, violation } => {
                 write!(f, "locally infeasible: {constraint} is violated by {violation:.2e}")
@@ -218,8 +218,9 @@ impl Status {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
             Self::MaxIterations => {
-                "; more of them (`options.max_iterations`) or another guess may help, for `Sqp` also another \
-                 `options.globalisation`, as `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
+                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; a larger \
+                 `options.max_iterations` or another guess may help, for `Sqp` also another `options.globalisation`, as \
+                 `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
             }
             Self::Unbounded => "; bounds of states and controls, or a cost of them, are missing",
             Self::Infeasible { .. } => {
@@ -231,7 +232,8 @@ impl Status {
             }
             Self::QpFailed(_) => "; another guess may help",
             Self::NoProgress => {
-                "; another guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
+                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; another \
+                 guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
                  a smaller `options.shortest_step`, and exact Hessians (`Sqp::exact`) where it has others"
             }
         }

@@ -36,7 +36,7 @@ pub struct IpmOptions {
     /// [`Status::MaxIterations`](crate::ocp::Status::MaxIterations). With zero the start is judged
     /// alone. Default 500: from starts far away a few hundred are taken.
     pub max_iterations: usize,
-    /// The first barrier parameter `μ`, in units of forces. Default 0.1.
+    /// The first barrier parameter `μ`, in units of forces: at most 1e10. Default 0.1.
     pub start_mu: f64,
     /// The last one: what is solved is the barrier problem with this `μ`, whose solutions are
     /// smooth functions of the data. Default 0, the problem itself.
@@ -68,7 +68,7 @@ pub struct IpmOptions {
     /// makes progress, and then get penalties beside the objective. Default true.
     pub elastic: bool,
     /// The first of these penalties, linear, in units of forces over those of what is bounded; they
-    /// grow by factors of ten up to ten thousand times that. Default 1e2.
+    /// grow by factors of ten up to ten thousand times that. At most 1e10. Default 1e2.
     pub elastic_penalty: f64,
 }
 
@@ -101,20 +101,21 @@ impl IpmOptions {
 
     /// The first barrier parameter.
     pub(super) fn first_mu(&self, force: f64) -> f64 {
-        (self.start_mu * force).max(self.final_mu)
+        (self.start_mu * force).clamp(self.final_mu, f64::MAX)
     }
 
     /// Finds values that no run can have.
     pub(super) fn check(&self) -> Result<(), OcpError> {
-        let positive = [
-            ("tolerance", self.tolerance),
-            ("acceptable_tolerance", self.acceptable_tolerance),
-            ("start_mu", self.start_mu),
-            ("elastic_penalty", self.elastic_penalty),
-        ];
+        let positive = [("tolerance", self.tolerance), ("acceptable_tolerance", self.acceptable_tolerance)];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "positive and finite" });
+            }
+        }
+        // Products with units of the problem are finite.
+        for (name, value) in [("start_mu", self.start_mu), ("elastic_penalty", self.elastic_penalty)] {
+            if !(value > 0.0 && value <= 1e10) {
+                return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 1e10" });
             }
         }
         let last = self.final_mu;

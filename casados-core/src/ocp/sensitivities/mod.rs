@@ -20,11 +20,14 @@ pub use answers::{SolutionAdjoint, ValueHessian};
 pub use factors::SolutionFactors;
 
 use super::curvature::Curvature;
+use super::dynamics::Dynamics;
 use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
+use super::names::Names;
 use super::problem::Formulation;
 use crate::qp::{StageDims, assign, part_mut, zeros};
 use crate::scalar::Real;
+use crate::shape::Shape;
 use alloc::vec::Vec;
 
 /// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback
@@ -134,6 +137,19 @@ impl<T: Real> Sensitivities<T> {
         factors.column = column;
     }
 
+    /// A derivative that is not finite: the stage, which of `(x, u)` is differentiated by which of
+    /// `(x₀, p)`, and its value.
+    fn not_finite(&self) -> Option<(usize, usize, usize, f64)> {
+        let [nx, nu, np] = self.factors.dims;
+        let all = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
+        let by_parameters = [(&self.x_p, [0, nx], [nx, np]), (&self.u_p, [nx, nu], [nx, np])];
+        all.into_iter().chain(by_parameters).find_map(|(list, [row, rows], [column, columns])| {
+            let index = list.iter().position(|value| !value.is_finite())?;
+            let (i, j) = (index % rows, index / rows % columns);
+            Some((index / (rows * columns), row + i, column + j, list.get(index)?.to_f64()))
+        })
+    }
+
     fn by_parameters(&mut self) {
         let Self { factors, x_p, u_p, .. } = self;
         let ([nx, nu, np], n) = (factors.dims, factors.intervals);
@@ -166,7 +182,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// the same quality.
     ///
     /// # Errors
-    /// Those of [`Ocp::factorise`].
+    /// Those of [`Ocp::factorise`]; [`OcpError::NonFiniteSensitivity`]
     pub fn differentiate<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -175,7 +191,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.factorise(curvature, &mut result.factors)?;
         result.by_initial_state();
         result.by_parameters();
-        Ok(())
+        match result.not_finite() {
+            Some((stage, of, by, value)) => {
+                let Names { x, u, p, .. } = <P::Dynamics as Dynamics<T>>::NAMES;
+                let name = |names: &[&'static str], i: usize| names.get(i).copied().unwrap_or("");
+                let nx = P::Shape::NX;
+                let of = if of < nx { name(x, of) } else { name(u, of - nx) };
+                let by = if by < nx { name(x, by) } else { name(p, by - nx) };
+                Err(OcpError::NonFiniteSensitivity { stage, of, by, value })
+            }
+            None => Ok(()),
+        }
     }
 
     /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of

@@ -7,6 +7,7 @@
 //! | `read` | a trajectory from a file, checked |
 //! | `restore` | a trajectory as the iterate of a problem, or as its guess |
 //! | `csv` | a table for other programs |
+//! | `violations` | which bounds a trajectory is beyond |
 
 mod between;
 mod collect;
@@ -15,9 +16,11 @@ mod error;
 #[cfg(feature = "serde")]
 mod read;
 mod restore;
+mod violations;
 
 pub use csv::Csv;
 pub use error::TrajectoryError;
+pub use violations::Violation;
 
 use crate::record::Record;
 use crate::scalar::Real;
