@@ -1,6 +1,9 @@
 //! Every mistake in a problem, and what can go wrong where it is evaluated; `messages` say it.
 
 use super::names::Names;
+#[cfg(feature = "alloc")]
+use crate::batch::BatchError;
+use crate::constrained::Inconsistent;
 use crate::error::Error;
 use crate::qp::{QpError, QpField, Side};
 use core::fmt;
@@ -165,7 +168,7 @@ pub struct ConstraintName {
 /// assert!(matches!(ocp.bound("u", .., 1.0, -1.0), Err(OcpError::CrossedBounds { .. })));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 #[non_exhaustive]
 pub enum OcpError {
     /// No state or control has this name.
@@ -324,8 +327,15 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
-    /// States are periodic or controls shared: the gains of a feedback would hold these as they
-    /// are. [`Ocp::differentiate`](super::Ocp::differentiate) has `du/dx₀`, in which they follow.
+    /// An integrator beside the problem, as that of a simulation, has no result.
+    Integrator(Error),
+    /// A batch beside the problem was given slices of different lengths.
+    #[cfg(feature = "alloc")]
+    Batch(BatchError),
+    /// There are no consistent states to start from.
+    Inconsistent(Inconsistent),
+    /// States are periodic or controls shared: feedback gains are not defined.
+    /// [`Ocp::differentiate`](super::Ocp::differentiate) has `du/dx₀`.
     Coupled,
     /// An option of the solver is out of its range.
     InvalidOption {
@@ -351,5 +361,32 @@ impl From<QpError> for OcpError {
             QpError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
             error => Self::Qp(error),
         }
+    }
+}
+
+impl From<Error> for OcpError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
+            error => Self::Integrator(error),
+        }
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl From<BatchError> for OcpError {
+    fn from(error: BatchError) -> Self {
+        match error {
+            BatchError::Intervals { first, error, .. } => Self::Integration { interval: first, error },
+            BatchError::Integrator(error) => error.into(),
+            BatchError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
+            error @ BatchError::Length { .. } => Self::Batch(error),
+        }
+    }
+}
+
+impl From<Inconsistent> for OcpError {
+    fn from(error: Inconsistent) -> Self {
+        Self::Inconsistent(error)
     }
 }

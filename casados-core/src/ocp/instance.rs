@@ -93,7 +93,7 @@ pub struct Ocp<P, T, D, M> {
 /// A function of one's own returns it by what it can do:
 ///
 /// ```
-/// use casados::ocp::{Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Problem, SecondOrder};
+/// use casados::ocp::{ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, OcpError, Problem};
 /// use casados::prelude::*;
 ///
 /// #[ode]
@@ -101,10 +101,8 @@ pub struct Ocp<P, T, D, M> {
 /// #[function]
 /// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
 ///
-/// /// To a place in a second. `SecondOrder` is what exact Hessians need.
-/// fn travel(
-///     place: f64,
-/// ) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>> {
+/// /// To a place in a second. `ExactFormulation` is what solvers with exact Hessians take.
+/// fn travel(place: f64) -> Result<HeapOcp<impl ExactFormulation<f64>>, OcpError> {
 ///     let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?)
 ///         .running_cost(GeneralCost::<Effort>::new())
 ///         .on(Horizon::uniform(10, 0.1))?;

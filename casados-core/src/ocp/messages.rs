@@ -160,9 +160,13 @@ impl fmt::Display for OcpError {
                 write!(f, " is {value}: {ELSEWHERE}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Integrator(error) => error.fmt(f),
+            #[cfg(feature = "alloc")]
+            Self::Batch(error) => error.fmt(f),
+            Self::Inconsistent(error) => error.fmt(f),
             Self::Coupled => f.write_str(
-                "states are periodic or controls shared, and gains hold these as they are: \
-                 `Ocp::differentiate` has `du/dx₀`, in which they follow",
+                "feedback gains are not defined for periodic states or shared controls: use `du/dx₀` of \
+                 `Ocp::differentiate`",
             ),
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")
@@ -199,10 +203,15 @@ fn list(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
     Ok(())
 }
 
+debug_is_display!(OcpError);
+
 impl core::error::Error for OcpError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            Self::Integration { error, .. } => Some(error),
+            Self::Integration { error, .. } | Self::Integrator(error) => Some(error),
+            #[cfg(feature = "alloc")]
+            Self::Batch(error) => Some(error),
+            Self::Inconsistent(error) => Some(error),
             Self::Qp(error) => Some(error),
             _ => None,
         }

@@ -165,7 +165,7 @@ pub use names::Names;
 pub use outcome::{Outcome, Status};
 #[cfg(feature = "casadi")]
 pub(crate) use pattern::{Entry, Origin};
-pub use problem::{Formulation, Problem};
+pub use problem::{ExactFormulation, Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;
 pub use real_time::{Feedback, Prepared, RealTime};

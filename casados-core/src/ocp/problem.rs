@@ -2,7 +2,7 @@
 
 use super::constraint::Constraints;
 use super::cost::Cost;
-use super::dynamics::Dynamics;
+use super::dynamics::{Dynamics, SecondOrder};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -146,6 +146,37 @@ pub trait Formulation<T: Real> {
         &self,
     ) -> &Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
 }
+
+/// A [`Formulation`] whose dynamics have second derivatives: what every solver takes.
+///
+/// Short for `Formulation<T, Dynamics: SecondOrder<T>> + Clone`, and implemented for all of these.
+///
+/// ```
+/// use casados::ocp::{ExactFormulation, GeneralCost, HeapIpm, HeapOcp, Horizon, OcpError, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// /// From rest to a place in a second.
+/// fn travel(place: f64) -> Result<HeapOcp<impl ExactFormulation<f64>>, OcpError> {
+///     let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?)
+///         .running_cost(GeneralCost::<Effort>::new())
+///         .on(Horizon::uniform(10, 0.1))?;
+///     ocp.fix_initial_state(&[0.0; 2])?.bound("x[0]", 10.., place, place)?.guess(&[0.0; 2], &[0.0])?;
+///     Ok(ocp)
+/// }
+///
+/// let mut ocp = travel(1.0)?;
+/// assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// # Ok::<(), OcpError>(())
+/// ```
+pub trait ExactFormulation<T: Real>: Formulation<T, Dynamics: SecondOrder<T>> + Clone {}
+
+#[diagnostic::do_not_recommend]
+impl<T: Real, P: Formulation<T, Dynamics: SecondOrder<T>> + Clone> ExactFormulation<T> for P {}
 
 impl<T: Real, D, L, E, G, H> Formulation<T> for Problem<D, L, E, G, H>
 where

@@ -8,7 +8,7 @@ use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
 use super::single::{names, origin};
-use crate::batch::{Answer, BatchError, Integrator, Intervals, Single};
+use crate::batch::{Answer, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::qp::room;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
@@ -147,7 +147,7 @@ impl<I: Single> Shooting<I> {
         let nu = (of_algebraic && !nu.is_empty()).then_some(&nu[..]);
         let outcome = batch.each(&intervals, (lambda, nu), &mut results, sink);
         *place(self) = results;
-        outcome.map_err(failed)?;
+        outcome.map_err(OcpError::from)?;
         self.solved = true;
         Ok(())
     }
@@ -172,17 +172,6 @@ fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -
 fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
     Ok(room(list, length)?)
-}
-
-fn failed(error: BatchError) -> OcpError {
-    match error {
-        BatchError::Intervals { first, error, .. } => OcpError::Integration { interval: first, error },
-        BatchError::OutOfMemory { bytes } => OcpError::OutOfMemory { bytes },
-        // Lengths are those of one horizon.
-        BatchError::Length { length, intervals, .. } => {
-            OcpError::Length { part: super::Part::Memory, stage: 0, expected: intervals, found: length }
-        }
-    }
 }
 
 impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {

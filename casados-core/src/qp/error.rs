@@ -114,7 +114,7 @@ pub enum Side {
 /// assert!(matches!(outcome, Err(QpError::Infeasible { .. })));
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
     /// A length is not what the dimensions ask for.
@@ -294,5 +294,7 @@ impl fmt::Display for QpError {
         }
     }
 }
+
+debug_is_display!(QpError);
 
 impl core::error::Error for QpError {}

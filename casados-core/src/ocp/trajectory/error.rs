@@ -24,7 +24,7 @@ use core::fmt;
 /// assert!(matches!(error, TrajectoryError::Unknown { .. }));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 #[non_exhaustive]
 pub enum TrajectoryError {
     /// Nothing is called so.
@@ -88,6 +88,8 @@ fn list(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
     Ok(())
 }
 
+debug_is_display!(TrajectoryError);
+
 impl core::error::Error for TrajectoryError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
@@ -97,8 +99,8 @@ impl core::error::Error for TrajectoryError {
     }
 }
 
-impl From<OcpError> for TrajectoryError {
-    fn from(error: OcpError) -> Self {
-        Self::Problem(error)
+impl<E: Into<OcpError>> From<E> for TrajectoryError {
+    fn from(error: E) -> Self {
+        Self::Problem(error.into())
     }
 }
