@@ -8,8 +8,8 @@ mod processes;
 mod robots;
 mod textbook;
 
-use crate::{Entry, Failure};
-use casados::ocp::{Formulation, HeapOcp, Horizon, OcpError, SecondOrder};
+use crate::Entry;
+use casados::ocp::{Formulation, HeapOcp, Horizon, OcpError};
 use casados::{Erk, Error, Ode, Options, Rk4};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -18,7 +18,14 @@ pub const FREE: f64 = f64::INFINITY;
 
 /// A problem on its grid.
 macro_rules! made {
-    () => { Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> };
+    () => {
+        Result<
+            casados::ocp::HeapOcp<
+                impl casados::ocp::Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>,
+            >,
+            crate::Failure,
+        >
+    };
 }
 pub(crate) use made;
 
