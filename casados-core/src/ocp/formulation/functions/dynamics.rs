@@ -307,7 +307,8 @@ pub trait Dynamics<T: Real> {
 
 /// Dynamics with second derivatives.
 ///
-/// Users write it in bounds, or [`ExactFormulation`](crate::ocp::ExactFormulation) of a whole problem.
+/// Users write it in bounds, or [`ExactFormulation`](crate::ocp::ExactFormulation) of a whole
+/// problem.
 ///
 /// ```
 /// use casados::ocp::{HeapIpm, Horizon, OcpError, Problem, SecondOrder};
