@@ -324,6 +324,28 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
+    /// The simulation of a guess ends in an interval
+    /// ([`Ocp::guess_by_simulation`](super::Ocp::guess_by_simulation)).
+    Simulation {
+        /// Which.
+        interval: usize,
+        /// The largest state at its start.
+        state: &'static str,
+        /// Its value.
+        value: f64,
+        /// Why.
+        error: Error,
+    },
+    /// Stages of intervals are variables, as of `Collocation`: a simulation needs an integrator,
+    /// `Ocp::guess_by_simulation_with`.
+    NoIntegrator,
+    /// Data say nothing of a variable, or of a combination that it is part of: it has no variance.
+    NotIdentifiable {
+        /// The state or control.
+        name: &'static str,
+        /// The stage.
+        stage: usize,
+    },
     /// States are periodic or controls shared: the gains of a feedback would hold these as they
     /// are. [`Ocp::differentiate`](super::Ocp::differentiate) has `du/dx₀`, in which they follow.
     Coupled,

@@ -160,6 +160,22 @@ impl fmt::Display for OcpError {
                 write!(f, " is {value}: {ELSEWHERE}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Simulation { interval, state, value, error } => write!(
+                f,
+                "the simulation of the guess ends in interval {interval}, where `{state}` is {value:e}: {error}; \
+                 another first state or other controls may help, or an adaptive integrator \
+                 (`Ocp::guess_by_simulation_with`)"
+            ),
+            Self::NoIntegrator => f.write_str(
+                "collocation has no integrator for a simulation of the guess: give one to \
+                 `Ocp::guess_by_simulation_with`",
+            ),
+            Self::NotIdentifiable { name, stage } => write!(
+                f,
+                "`{name}` at stage {stage} is not identifiable and has no variance: see \
+                 `Covariance::unidentifiable` for what data cannot tell, and add an arrival cost, other \
+                 samples or a bound"
+            ),
             Self::Coupled => f.write_str(
                 "states are periodic or controls shared, and gains hold these as they are: \
                  `Ocp::differentiate` has `du/dx₀`, in which they follow",
@@ -202,7 +218,7 @@ fn list(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
 impl core::error::Error for OcpError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            Self::Integration { error, .. } => Some(error),
+            Self::Integration { error, .. } | Self::Simulation { error, .. } => Some(error),
             Self::Qp(error) => Some(error),
             _ => None,
         }

@@ -84,6 +84,7 @@ mod check;
 #[cfg(feature = "alloc")]
 mod collocation;
 mod constraint;
+mod contraction;
 mod convex;
 mod convexify;
 mod cost;
@@ -97,6 +98,7 @@ mod filter;
 mod fits;
 mod guess;
 mod horizon;
+mod inertia;
 #[cfg(feature = "alloc")]
 mod inside;
 mod instance;
@@ -110,6 +112,8 @@ mod log;
 mod map;
 mod memory;
 mod messages;
+#[cfg(feature = "alloc")]
+mod multi_start;
 mod names;
 mod outcome;
 mod pattern;
@@ -140,6 +144,7 @@ mod wrapped;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};
+pub use contraction::{Contraction, ContractionTest, Convergence};
 pub use convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
@@ -161,6 +166,8 @@ pub use kept_jacobians::{Adjoints, KeptJacobians};
 pub use least_squares::LeastSquaresCost;
 pub use log::{Iteration, Log, Times};
 pub use map::Map;
+#[cfg(feature = "alloc")]
+pub use multi_start::{MultiStart, StartOutcome};
 pub use names::Names;
 pub use outcome::{Outcome, Status};
 #[cfg(feature = "casadi")]
@@ -168,11 +175,13 @@ pub(crate) use pattern::{Entry, Origin};
 pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;
-pub use real_time::{Feedback, Prepared, RealTime};
+pub use real_time::{Fallback, Feedback, Prepared, RealTime};
 #[cfg(feature = "alloc")]
 pub use return_map::ReturnMap;
 #[cfg(feature = "alloc")]
-pub use sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
+pub use sensitivities::{
+    Covariance, Sensitivities, SolutionAdjoint, SolutionFactors, Unidentifiable, ValueHessian,
+};
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
 pub use single::{IntegralCost, WithIntegral};

@@ -6,17 +6,20 @@
 //! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
 //! | `column`, `border` | solutions by its factors, and what couples stages |
 //! | `parameters` | what parameters change of the conditions |
+//! | `covariance` | the covariance of an estimate, and what data say nothing of |
 
 mod active;
 mod answers;
 mod border;
 mod column;
+mod covariance;
 mod factors;
 mod parameters;
 mod recursion;
 
 use crate::qp::element::get;
 pub use answers::{SolutionAdjoint, ValueHessian};
+pub use covariance::{Covariance, Unidentifiable};
 pub use factors::SolutionFactors;
 
 use super::curvature::Curvature;
