@@ -101,12 +101,19 @@ impl fmt::Display for Error {
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, started, singular } => {
                 write!(
                     f,
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
+                if let Some(unknown) = singular {
+                    write!(
+                        f,
+                        "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \
+                         equations may have lost their solution"
+                    )?;
+                }
                 match started {
                     Some(Started { unknown, value }) => write!(
                         f,
@@ -138,6 +145,13 @@ impl fmt::Display for Error {
             }
             Error::StepSizeUnderflow { t, h, reason } => {
                 let reason = match reason {
+                    Refusal::SingularAlgebraic { unknown } => {
+                        return write!(
+                            f,
+                            "the step size falls to {h:e} at t = {t}: ∂f/∂z becomes singular there along `{unknown}`, \
+                             where the algebraic equations lose their solution"
+                        );
+                    }
                     Refusal::Error => {
                         "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
                          too large for some states"
