@@ -140,6 +140,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             }
         }
         let (t, h) = (start.to_f64(), length.to_f64());
-        Err(Error::StepSizeUnderflow { t, h, reason: Refusal::NotConverged })
+        Err(Error::StepSizeUnderflow { t, h, reason: Refusal::NotConverged, unsettled: None })
     }
 }
