@@ -2,6 +2,8 @@
 
 mod display;
 
+use crate::tableau::TableauError;
+
 /// Why there is no result: what, where, and the values that say so.
 ///
 /// After an error the integrator is usable, and its warm start is as it was before the call.
@@ -23,7 +25,7 @@ mod display;
 /// assert!(irk.solve(&vector![1.0], &vector![1.0], 0.1).is_ok()); // the integrator stays usable
 /// # Ok::<(), casados::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// An option has a value that makes no sense.
@@ -35,6 +37,8 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A tableau makes no sense.
+    Tableau(TableauError),
     /// The tableau that was given to an explicit integrator is implicit.
     NotExplicit {
         /// The stage that needs itself or a later one.
@@ -252,6 +256,12 @@ pub enum Error {
         /// Its size; the largest number if that is not even a number.
         bytes: usize,
     },
+}
+
+impl From<TableauError> for Error {
+    fn from(error: TableauError) -> Self {
+        Self::Tableau(error)
+    }
 }
 
 /// Why a step was refused.

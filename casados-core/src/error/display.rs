@@ -51,6 +51,7 @@ impl fmt::Display for Error {
             Error::InvalidOption { option, value, reason } => {
                 write!(f, "the option `{option}` is {value}, but {reason}")
             }
+            Error::Tableau(error) => error.fmt(f),
             Error::NotExplicit { stage } => {
                 write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
             }
@@ -138,8 +139,8 @@ impl fmt::Display for Error {
             Error::StepSizeUnderflow { t, h, reason, unsettled } => {
                 let reason = match reason {
                     Refusal::Error => {
-                        "the estimated error stays above the tolerance; the solution may end there, or `atol` be \
-                         far above states that decide on it"
+                        "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
+                         too large for some states"
                     }
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
@@ -203,7 +204,7 @@ impl fmt::Display for Error {
             ),
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which it has no derivatives here: add the time as a state"
+                "{function} depends on the time, by which derivatives over events are not known: add the time as a state"
             ),
             Error::Intervals { controls, ends } => {
                 write!(
@@ -218,12 +219,21 @@ impl fmt::Display for Error {
             Error::NotProjected { equation, derivative, residual } => write!(
                 f,
                 "the end of the interval cannot be projected: derivative {derivative} of the constraint of equation \
-                 {equation} is violated by {residual:e}, and there are no states near that satisfy all constraints, or \
-                 these depend on each other there; take shorter steps"
+                 {equation} is violated by {residual:e}, and no consistent state was found nearby, or the constraints \
+                 are redundant there; take shorter steps"
             ),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }
     }
 }
 
-impl core::error::Error for Error {}
+debug_is_display!(Error);
+
+impl core::error::Error for Error {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Tableau(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -114,7 +114,7 @@ pub enum Side {
 /// assert!(matches!(outcome, Err(QpError::Infeasible { .. })));
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
     /// A length is not what the dimensions ask for.
@@ -179,14 +179,14 @@ pub enum QpError {
     /// States are periodic or controls shared, and this solver has no such conditions:
     /// [`InteriorPoint`](super::InteriorPoint) has, with the feature `alloc`.
     Coupled,
-    /// The iterations were used up.
+    /// The maximum number of iterations was reached.
     MaxIterations {
         /// How many.
         iterations: usize,
         /// What they reached.
         residuals: Residuals,
     },
-    /// The time was over.
+    /// The time limit was reached.
     OutOfTime {
         /// The iterations.
         iterations: usize,
@@ -282,7 +282,7 @@ impl fmt::Display for QpError {
                 write!(f, "not solved after {iterations} iterations: {residuals}")
             }
             Self::OutOfTime { iterations, residuals } => {
-                write!(f, "the time was over after {iterations} iterations: {residuals}")
+                write!(f, "the time limit was reached after {iterations} iterations: {residuals}")
             }
             Self::Stalled { iterations, residuals } => {
                 write!(f, "no progress after {iterations} iterations: {residuals}")
@@ -294,5 +294,7 @@ impl fmt::Display for QpError {
         }
     }
 }
+
+debug_is_display!(QpError);
 
 impl core::error::Error for QpError {}

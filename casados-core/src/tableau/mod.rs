@@ -228,7 +228,7 @@ impl<const S: usize> Tableau<S> {
 /// let weight = Tableau::new([[f64::NAN]], [1.0], [0.5]);
 /// println!("{}", weight.unwrap_err());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum TableauError {
     /// There are no stages.
@@ -263,5 +263,7 @@ impl fmt::Display for TableauError {
         }
     }
 }
+
+debug_is_display!(TableauError);
 
 impl core::error::Error for TableauError {}

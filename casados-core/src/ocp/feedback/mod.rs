@@ -1,0 +1,3 @@
+//! Feedback in real time.
+
+pub(in crate::ocp) mod real_time;
