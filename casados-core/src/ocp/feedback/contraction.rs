@@ -19,8 +19,8 @@ use crate::scalar::Real;
 ///
 /// `v̄` is the plan that was linearised, `v` the solution of its QP with the multipliers `λ`, both
 /// with the state and the parameters of this sample. `φ` is the exact merit function of `l₁` type,
-/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract have
-/// a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near a
+/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract
+/// have a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near a
 /// solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of active
 /// constraints, the contraction rate, is above one. A disturbance, noise and a reference that moves
 /// lengthen steps, and do not change what a step gains.
@@ -85,7 +85,8 @@ pub enum Contraction {
     /// Iterations gain what their QPs predict, or there is nothing left to be gained.
     Contracting,
     /// Iterations do not gain what their QPs predict. Exact Hessians
-    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what moves.
+    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what
+    /// moves.
     Diverging,
 }
 
@@ -193,8 +194,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Convergence { residuals, step_size, reduction_ratio, contraction }
     }
 
-    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of the
-    /// plan before.
+    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of
+    /// `before`.
     pub fn judge(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

@@ -88,8 +88,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Simulation`] where the simulation ends before the horizon: states up to that
-    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those of
-    /// [`Ocp::check`].
+    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those
+    /// of [`Ocp::check`].
     ///
     /// # Example
     /// ```
