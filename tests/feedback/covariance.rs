@@ -167,8 +167,8 @@ fn a_product_is_not_identifiable() -> Test {
     Ok(())
 }
 
-/// Estimates from other noise: `Σ (x₀ − x̂)ᵀ C⁻¹ (x₀ − x̂)` has the distribution χ² with five degrees
-/// of freedom a repetition, but for what is not linear: noise of 1 % leaves that small.
+/// Estimates from other noise: `Σ (x₀ − x̂)ᵀ C⁻¹ (x₀ − x̂)` has the distribution χ² with five
+/// degrees of freedom a repetition, but for what is not linear: noise of 1 % leaves that small.
 #[test]
 fn monte_carlo() -> Test {
     const REPETITIONS: usize = 120;

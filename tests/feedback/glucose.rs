@@ -1,6 +1,6 @@
-//! Bergman's minimal model of glucose and insulin: parameters from the intravenous glucose tolerance
-//! test of G. Pacini, R. N. Bergman, "MINMOD", Comput. Methods Programs Biomed. 23 (1986), from a
-//! guess by simulation; against an implementation that has nothing in common with this one.
+//! Bergman's minimal model of glucose and insulin: parameters from the intravenous glucose
+//! tolerance test of G. Pacini, R. N. Bergman, "MINMOD", Comput. Methods Programs Biomed. 23
+//! (1986), from a guess by simulation; against an implementation that has nothing in common with this one.
 
 use crate::Test;
 use casados::ocp::{GaussNewton, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem};
@@ -38,8 +38,8 @@ const BASAL: [f64; 2] = [92.0, 11.0];
 /// mg/dl
 const SIGMA: f64 = 5.0;
 
-/// x = [glucose mg/dl, insulin action 1/min, ln p₁, ln p₂, ln p₃]; p = [weight, sample, insulin above
-/// its basal value].
+/// x = [glucose mg/dl, insulin action 1/min, ln p₁, ln p₂, ln p₃]; p = [weight, sample, insulin
+/// above its basal value].
 #[ode]
 fn minimal(x: [f64; 5], p: [f64; 3]) -> [f64; 5] {
     let [glucose, action, p1, p2, p3] = x;

@@ -19,9 +19,9 @@ use crate::scalar::Real;
 ///
 /// `v̄` is the plan that was linearised, `v` the solution of its QP with the multipliers `λ`, both
 /// with the state and the parameters of this sample. `φ` is the exact merit function of `l₁` type,
-/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract have
-/// a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near a
-/// solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of active
+/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract
+/// have a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near
+/// a solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of active
 /// constraints, the contraction rate, is above one. A disturbance, noise and a reference that moves
 /// lengthen steps, and do not change what a step gains.
 ///
@@ -85,7 +85,8 @@ pub enum Contraction {
     /// Iterations gain what their QPs predict, or there is nothing left to be gained.
     Contracting,
     /// Iterations do not gain what their QPs predict. Exact Hessians
-    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what moves.
+    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what
+    /// moves.
     Diverging,
 }
 
@@ -137,9 +138,12 @@ pub(in crate::ocp) struct Monitor<P, T, D, M> {
     count: usize,
     residuals: Residuals,
     measure: fn(&mut Ocp<P, T, D, M>) -> Residuals,
-    size: fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64,
+    size: StepSize<P, T, D, M>,
     reductions: Reductions<P, T, D, M>,
 }
+
+/// The largest change from the plan to the solution of its QP.
+type StepSize<P, T, D, M> = fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64;
 
 /// The actual and the predicted reduction of the step from the plan to the solution of its QP, and
 /// the size of the merit function.
@@ -193,8 +197,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Convergence { residuals, step_size, reduction_ratio, contraction }
     }
 
-    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of the
-    /// plan before.
+    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of
+    /// `before`.
     pub fn judge(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -240,7 +244,7 @@ fn measure<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
     ocp.residuals().0
 }
 
-/// The largest change from the iterate to a solution of its QP.
+/// See [`StepSize`].
 fn size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,

@@ -175,8 +175,9 @@ where
     }
 
     /// As [`Prepared::feedback_until`], with more iterations of sequential quadratic programming
-    /// for the same state: until residuals are within [`ContractionTest::tolerance`](crate::ocp::ContractionTest::tolerance), there were `max_iterations`, or the time is over. The plan is that of
-    /// the last iteration that was complete.
+    /// for the same state: until residuals are within the tolerance of the
+    /// [`ContractionTest`](crate::ocp::ContractionTest), there were `max_iterations`, or the time
+    /// is over. The plan is that of the last iteration that was complete.
     ///
     /// # Errors
     /// As [`Prepared::feedback_until`], of the first iteration.

@@ -189,9 +189,10 @@ impl<P: Formulation<T>, C, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, C, T> 
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
-    /// The same with a monitor of its convergence: [`Feedback::convergence`](crate::ocp::Feedback::convergence) has residuals, the size
-    /// of the step and whether iterations contract. It takes a simulation of the horizon in each
-    /// sample, between two feedbacks.
+    /// The same with a monitor of its convergence:
+    /// [`Feedback::convergence`](crate::ocp::Feedback::convergence) has residuals, the size of the
+    /// step and whether iterations contract. It takes a simulation of the horizon in each sample,
+    /// between two feedbacks.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]

@@ -342,7 +342,7 @@ pub enum OcpError {
     /// ([`Ocp::guess_by_simulation`](crate::ocp::Ocp::guess_by_simulation)).
     Simulation {
         /// Which.
-        interval: usize,
+        interval: u32,
         /// The largest state at its start.
         state: &'static str,
         /// Its value.

@@ -88,8 +88,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Simulation`] where the simulation ends before the horizon: states up to that
-    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those of
-    /// [`Ocp::check`].
+    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those
+    /// of [`Ocp::check`].
     ///
     /// # Example
     /// ```
@@ -209,6 +209,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let largest = names.iter().zip(x).fold(("", T::ZERO), |largest, (&name, &value)| {
             if largest.0.is_empty() || value.abs() > largest.1.abs() { (name, value) } else { largest }
         });
+        let interval = u32::try_from(interval).unwrap_or(u32::MAX);
         OcpError::Simulation { interval, state: largest.0, value: largest.1.to_f64(), error }
     }
 }

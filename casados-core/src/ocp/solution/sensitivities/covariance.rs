@@ -159,7 +159,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise); [`OcpError::Qp`] if the Hessian on
-    /// the null space has a negative eigenvalue: the iterate is no minimum; [`OcpError::OutOfMemory`]
+    /// the null space has a negative eigenvalue: the iterate is no minimum;
+    /// [`OcpError::OutOfMemory`]
     ///
     /// # Example
     /// Of two parameters only the product is seen.

@@ -1,5 +1,5 @@
-//! What an estimate is found by, and how all variables follow from it: columns of a basis of the null
-//! space of dynamics.
+//! What an estimate is found by, and how all variables follow from it: columns of a basis of the
+//! null space of dynamics.
 
 use crate::linalg::axpy;
 use crate::ocp::formulation::error::OcpError;
