@@ -16,7 +16,7 @@ where
 {
     let name = format!("{name}{}", variation.name);
     let source = "examples/models/ocps";
-    let facts = Facts { name, source, published: None, tolerance: 0.0, tags: &["tuned on"] };
+    let facts = Facts { name, source, published: None, precision: 0.0, tags: &["tuned on"] };
     Entry::new(facts, move || {
         let mut ocp = make(variation.grid)?;
         variation.apply(&mut ocp)?;

@@ -3,7 +3,7 @@
 //! ```text
 //! cargo run --manifest-path benches/Cargo.toml -p public-problems --bin public_problems -- \
 //!     [--held-out] [--set collection] [--only part] [--solver Sqp] [--repetitions 3] [--refine 2] \
-//!     [--log] [--ipopt] [--json file]
+//!     [--limit 20] [--log] [--ipopt] [--json file]
 //! ```
 //!
 //! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python that
@@ -15,6 +15,7 @@ use public_problems::table::{self, Sums};
 use public_problems::{Entry, Failure, families, sets};
 use serde_json::json;
 use std::io::Write;
+use std::time::Duration;
 
 /// What is asked for.
 struct Arguments {
@@ -25,6 +26,7 @@ struct Arguments {
     refinement: usize,
     log: bool,
     ipopt: bool,
+    limit: Duration,
     json: Option<String>,
 }
 
@@ -39,6 +41,7 @@ impl Arguments {
             refinement: 1,
             log: false,
             ipopt: false,
+            limit: Duration::from_secs(20),
             json: None,
         };
         while let Some(argument) = given.next() {
@@ -53,6 +56,7 @@ impl Arguments {
                 }
                 "--repetitions" => arguments.repetitions = value()?.parse()?,
                 "--refine" => arguments.refinement = value()?.parse()?,
+                "--limit" => arguments.limit = Duration::from_secs_f64(value()?.parse()?),
                 "--log" => arguments.log = true,
                 "--ipopt" => arguments.ipopt = true,
                 "--json" => arguments.json = Some(value()?),
@@ -73,14 +77,13 @@ fn median(mut runs: Vec<Made>) -> Option<Made> {
 /// All solvers on a problem, by turns.
 fn solve(entry: &Entry, arguments: &Arguments) -> Vec<Made> {
     let mut runs = vec![Vec::new(); arguments.solvers.len() + usize::from(arguments.ipopt)];
-    let limit = Task::new(Solver::Ipm).limit;
-    let mut ipopt = arguments
-        .ipopt
-        .then(|| Ipopt::start(&entry.facts.name, arguments.refinement, limit.as_secs_f64()));
+    let limit = arguments.limit;
+    let mut ipopt =
+        arguments.ipopt.then(|| Ipopt::start(&entry.facts.name, arguments.refinement, limit.as_secs_f64()));
     for repetition in 0..arguments.repetitions.max(1) {
         for (solver, runs) in arguments.solvers.iter().zip(&mut runs) {
             let log = arguments.log && repetition == 0;
-            runs.push(entry.solve(&Task { log, ..Task::new(*solver) }));
+            runs.push(entry.solve(&Task { log, limit, ..Task::new(*solver) }));
         }
         if let (Some(ipopt), Some(runs)) = (&mut ipopt, runs.last_mut()) {
             let answer = ipopt.as_mut().map_err(|error| error.clone()).and_then(Ipopt::solve);
@@ -97,7 +100,11 @@ fn main() -> Result<(), Failure> {
     names.extend(arguments.ipopt.then_some("IPOPT"));
     let mut sums = vec![Sums::default(); names.len()];
     let mut file = arguments.json.as_ref().map(std::fs::File::create).transpose()?;
-    println!("| problem | published | {} |\n| --- | --- |{}", names.join(" | "), " --- |".repeat(names.len()));
+    println!(
+        "| problem | published | {} |\n| --- | --- |{}",
+        names.join(" | "),
+        " --- |".repeat(names.len())
+    );
     for entry in sets::named(&arguments.set)? {
         if !entry.facts.name.contains(&arguments.only) {
             continue;
