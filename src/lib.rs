@@ -65,8 +65,8 @@ pub mod prelude {
     #[doc(no_inline)]
     pub use crate::{
         Butcher6, Custom, Dae, DormandPrince5, DormandPrince8, Erk, Error, Euler, Function, Gauss, Heun,
-        Inline, Irk, LeastSquares, Midpoint, Ode, Options, Quadrature, RadauIIA, Rk4, Tableau, dae, function,
-        ode,
+        Inline, Irk, LeastSquares, Midpoint, Ode, Options, Quadrature, RadauIIA, Record, Rk4, Tableau, dae,
+        function, ode,
     };
 }
 

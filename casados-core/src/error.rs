@@ -2,6 +2,8 @@
 
 mod display;
 
+use crate::tableau::TableauError;
+
 /// Why there is no result: what, where, and the values that say so.
 ///
 /// After an error the integrator is usable, and its warm start is as it was before the call.
@@ -23,7 +25,7 @@ mod display;
 /// assert!(irk.solve(&vector![1.0], &vector![1.0], 0.1).is_ok()); // the integrator stays usable
 /// # Ok::<(), casados::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// An option has a value that makes no sense.
@@ -35,6 +37,8 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A tableau makes no sense.
+    Tableau(TableauError),
     /// The tableau that was given to an explicit integrator is implicit.
     NotExplicit {
         /// The stage that needs itself or a later one.
@@ -112,6 +116,10 @@ pub enum Error {
         /// An algebraic state of these, and its start value; if there is one, and the start was no
         /// continuation of a solution.
         started: Option<Started>,
+        /// The algebraic state along which `∂f/∂z` becomes singular between the start values and
+        /// where the iteration led to, if it does: the equations may have lost their solution at a
+        /// fold.
+        singular: Option<&'static str>,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.
@@ -234,6 +242,12 @@ pub enum Error {
     },
 }
 
+impl From<TableauError> for Error {
+    fn from(error: TableauError) -> Self {
+        Self::Tableau(error)
+    }
+}
+
 /// Why a step was refused.
 ///
 /// ```
@@ -261,6 +275,12 @@ pub enum Refusal {
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
+    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
+    /// equations meet there, and none is beyond (a fold).
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+    },
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
     /// The interval is shorter than the distance of the time from the next number.

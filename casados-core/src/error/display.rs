@@ -51,6 +51,7 @@ impl fmt::Display for Error {
             Error::InvalidOption { option, value, reason } => {
                 write!(f, "the option `{option}` is {value}, but {reason}")
             }
+            Error::Tableau(error) => error.fmt(f),
             Error::NotExplicit { stage } => {
                 write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
             }
@@ -100,12 +101,19 @@ impl fmt::Display for Error {
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, started, singular } => {
                 write!(
                     f,
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
+                if let Some(unknown) = singular {
+                    write!(
+                        f,
+                        "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \
+                         equations may have lost their solution"
+                    )?;
+                }
                 match started {
                     Some(Started { unknown, value }) => write!(
                         f,
@@ -137,9 +145,16 @@ impl fmt::Display for Error {
             }
             Error::StepSizeUnderflow { t, h, reason } => {
                 let reason = match reason {
+                    Refusal::SingularAlgebraic { unknown } => {
+                        return write!(
+                            f,
+                            "the step size falls to {h:e} at t = {t}: ∂f/∂z becomes singular there along `{unknown}`, \
+                             where the algebraic equations lose their solution"
+                        );
+                    }
                     Refusal::Error => {
-                        "the estimated error stays above the tolerance; the solution may end there, or `atol` be \
-                         far above states that decide on it"
+                        "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
+                         too large for some states"
                     }
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
@@ -174,7 +189,7 @@ impl fmt::Display for Error {
             }
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which it has no second derivatives: carry a clock among the states"
+                "{function} depends on the time, by which events have no second derivatives: add the time as a state"
             ),
             Error::Intervals { controls, ends } => {
                 write!(
@@ -189,12 +204,21 @@ impl fmt::Display for Error {
             Error::NotProjected { equation, derivative, residual } => write!(
                 f,
                 "the end of the interval cannot be projected: derivative {derivative} of the constraint of equation \
-                 {equation} is violated by {residual:e}, and there are no states near that satisfy all constraints, or \
-                 these depend on each other there; take shorter steps"
+                 {equation} is violated by {residual:e}, and no consistent state was found nearby, or the constraints \
+                 are redundant there; take shorter steps"
             ),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }
     }
 }
 
-impl core::error::Error for Error {}
+debug_is_display!(Error);
+
+impl core::error::Error for Error {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Tableau(error) => Some(error),
+            _ => None,
+        }
+    }
+}
