@@ -65,7 +65,7 @@ impl Facts {
     /// How far the optimum of the discretised problem may be from the published one: twice the
     /// difference between this grid and one with twice as many intervals (Richardson's
     /// extrapolation, order one or more) by IPOPT, as `grids.json` has them, the precision of what
-    /// is published, and what a solver's tolerance leaves; a hundredth where IPOPT has no solution.
+    /// is published, and what a solver's tolerance leaves; a hundredth where there is no entry.
     #[must_use]
     pub fn tolerance(&self) -> f64 {
         let Some(published) = self.published else { return f64::INFINITY };

@@ -8,12 +8,15 @@
 //!
 //! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python that
 //! `CASADOS_PYTHON` names, and the library that `cargo build` makes beside this program.
+//! `--grids` writes `grids.json` instead: IPOPT's objectives on the grids of problems and on those
+//! with twice as many intervals.
 
 use public_problems::ipopt::Ipopt;
 use public_problems::run::{Made, Solver, Task};
 use public_problems::table::{self, Sums};
 use public_problems::{Entry, Failure, families, sets};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::Duration;
 
@@ -26,6 +29,7 @@ struct Arguments {
     refinement: usize,
     log: bool,
     ipopt: bool,
+    grids: bool,
     limit: Duration,
     json: Option<String>,
 }
@@ -41,6 +45,7 @@ impl Arguments {
             refinement: 1,
             log: false,
             ipopt: false,
+            grids: false,
             limit: Duration::from_secs(20),
             json: None,
         };
@@ -59,6 +64,7 @@ impl Arguments {
                 "--limit" => arguments.limit = Duration::from_secs_f64(value()?.parse()?),
                 "--log" => arguments.log = true,
                 "--ipopt" => arguments.ipopt = true,
+                "--grids" => arguments.grids = true,
                 "--json" => arguments.json = Some(value()?),
                 _ => return Err(format!("{argument} is not known").into()),
             }
@@ -93,8 +99,27 @@ fn solve(entry: &Entry, arguments: &Arguments) -> Vec<Made> {
     runs.into_iter().filter_map(median).collect()
 }
 
+/// Writes what tolerances are derived from.
+fn write_grids(limit: Duration) -> Result<(), Failure> {
+    let mut grids = BTreeMap::new();
+    for entry in sets::public() {
+        let on = |refinement| {
+            let made = Ipopt::start(&entry.facts.name, refinement, limit.as_secs_f64())?.solve()?;
+            Ok::<_, String>(made.converged.then_some(made.objective))
+        };
+        if let (Some(coarse), Some(fine)) = (on(1)?, on(2)?) {
+            grids.insert(entry.facts.name, [coarse, fine]);
+        }
+    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/grids.json");
+    Ok(std::fs::write(path, serde_json::to_string_pretty(&grids)? + "\n")?)
+}
+
 fn main() -> Result<(), Failure> {
     let arguments = Arguments::read()?;
+    if arguments.grids {
+        return write_grids(arguments.limit);
+    }
     families::refine(arguments.refinement);
     let mut names: Vec<_> = arguments.solvers.iter().map(|solver| solver.name()).collect();
     names.extend(arguments.ipopt.then_some("IPOPT"));

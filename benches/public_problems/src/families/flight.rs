@@ -341,7 +341,7 @@ pub fn all() -> Vec<Entry> {
             goddard_in_feet,
         ),
         Entry::new(
-            facts("single_stage", "dymos, ssto_earth", 143.0, 0.5, &["free time", "units"]),
+            facts("single_stage", "dymos, ssto_earth", 143.0, 1.0, &["free time", "units"]),
             single_stage,
         ),
         Entry::new(
