@@ -1,4 +1,4 @@
-//! The sets: problems of public collections, the twenty of `examples/models/ocps`, their variations.
+//! The sets: public problems, the twenty of `examples/models/ocps`, and variations of these.
 
 use crate::ocps::{self, Failure, Grid};
 use crate::variations::{GIVEN, VARIATIONS, Variation};

@@ -6,8 +6,8 @@
 //!     [--limit 20] [--log] [--ipopt] [--json file]
 //! ```
 //!
-//! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python that
-//! `CASADOS_PYTHON` names, and the library that `cargo build` makes beside this program.
+//! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python of
+//! `CASADOS_PYTHON`, and the library that `cargo build` makes beside this program.
 //! `--grids` writes `grids.json` instead: IPOPT's objectives on the grids of problems and on those
 //! with twice as many intervals.
 

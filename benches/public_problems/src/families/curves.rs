@@ -43,7 +43,7 @@ fn dubins_length(x: [f64; 4], _u: [f64; 1]) -> f64 {
     x[3]
 }
 
-/// The shortest path to a pose with the same heading and curvature up to one: left, straight, right.
+/// The shortest path to a pose with the same heading, curvature up to one: left, straight, right.
 fn dubins() -> made!() {
     let n = intervals(40);
     let mut ocp = Problem::new(rk4::<DubinsCar>(1)?)
