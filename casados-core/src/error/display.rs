@@ -1,6 +1,6 @@
 //! What errors say.
 
-use super::{Argument, Error, Place, Quantity, Refusal, Started};
+use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
 /// How other start values are given.
@@ -101,12 +101,19 @@ impl fmt::Display for Error {
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, started, singular } => {
                 write!(
                     f,
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
+                if let Some(unknown) = singular {
+                    write!(
+                        f,
+                        "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \
+                         equations may have lost their solution"
+                    )?;
+                }
                 match started {
                     Some(Started { unknown, value }) => write!(
                         f,
@@ -136,8 +143,15 @@ impl fmt::Display for Error {
             Error::NonFiniteFunction { function, output, value, at } => {
                 write!(f, "output {output} of the function {function} is {value} at {at}")
             }
-            Error::StepSizeUnderflow { t, h, reason } => {
+            Error::StepSizeUnderflow { t, h, reason, unsettled } => {
                 let reason = match reason {
+                    Refusal::SingularAlgebraic { unknown } => {
+                        return write!(
+                            f,
+                            "the step size falls to {h:e} at t = {t}: ∂f/∂z becomes singular there along `{unknown}`, \
+                             where the algebraic equations lose their solution"
+                        );
+                    }
                     Refusal::Error => {
                         "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
                          too large for some states"
@@ -147,7 +161,25 @@ impl fmt::Display for Error {
                     Refusal::NotFinite => "the model is not finite",
                     Refusal::Resolution => "the time does not resolve it",
                 };
-                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
+                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")?;
+                let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
+                    return Ok(());
+                };
+                write!(
+                    f,
+                    "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
+                     is {value:e} at this time, does not settle: "
+                )?;
+                f.write_str(match algebraic {
+                    true => {
+                        "the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
+                         declare an event"
+                    }
+                    false => {
+                        "the solution may end there, or the model jump: then declare an event, or write the condition as \
+                         `if` or `max`"
+                    }
+                })
             }
             Error::TooManySteps { t, steps, stiff } => {
                 write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
@@ -164,6 +196,12 @@ impl fmt::Display for Error {
                 "the times are not in order: element {index} is {t}, and not between the one before it, {before}, and the \
                  end, {end}"
             ),
+            Error::AccumulatingEvents { t, function, event, events } => write!(
+                f,
+                "events accumulate at t = {t}: event {event}, of the function {function}, happens sooner and sooner after \
+                 itself, {events} events so far; end the integration before, by a terminal event, or go on with a model \
+                 of what is at rest"
+            ),
             Error::TooManyEvents { t, events } => {
                 write!(f, "t = {t} was reached after {events} events, and more are not allowed")
             }
@@ -173,9 +211,14 @@ impl fmt::Display for Error {
                     "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
                 )
             }
+            Error::GuardOfAlgebraicStates { function } => write!(
+                f,
+                "the function {function} of an event looks at algebraic states: over it there are first derivatives, and no \
+                 second ones; write it in terms of x, u and p"
+            ),
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which events have no second derivatives: add the time as a state"
+                "{function} depends on the time, by which derivatives over events are not known: add the time as a state"
             ),
             Error::Intervals { controls, ends } => {
                 write!(
