@@ -139,7 +139,10 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn new<P: Formulation<T>>(ocp: &super::HeapOcp<P, T>) -> Result<Self, OcpError> {
-        Self::with_solver(ocp, HeapInteriorPoint::new())
+        let mut solver = HeapInteriorPoint::new();
+        // QPs come in units.
+        solver.options.scaling = false;
+        Self::with_solver(ocp, solver)
     }
 }
 
