@@ -65,8 +65,8 @@ pub mod prelude {
     #[doc(no_inline)]
     pub use crate::{
         Butcher6, Custom, Dae, DormandPrince5, DormandPrince8, Erk, Error, Euler, Function, Gauss, Heun,
-        Inline, Irk, LeastSquares, Midpoint, Ode, Options, Quadrature, RadauIIA, Rk4, Tableau, dae, function,
-        ode,
+        Inline, Irk, LeastSquares, Midpoint, Ode, Options, Quadrature, RadauIIA, Record, Rk4, Tableau, dae,
+        function, ode,
     };
 }
 
@@ -110,7 +110,7 @@ pub mod options {
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub mod error {
-    pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started};
+    pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started, Unsettled};
 }
 
 /// Vectors and matrices of a model, and what is known about it before it runs.

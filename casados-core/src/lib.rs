@@ -29,6 +29,18 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+/// `Debug` of an error is its text: a `main` that returns `Result` prints `Debug`, and so does
+/// `unwrap`.
+macro_rules! debug_is_display {
+    ($error:ty) => {
+        impl core::fmt::Debug for $error {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                core::fmt::Display::fmt(self, f)
+            }
+        }
+    };
+}
+
 #[cfg(not(any(feature = "std", feature = "libm")))]
 compile_error!(
     "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"

@@ -246,6 +246,12 @@ pub trait Shape: 'static {
 
     /// `[T; NX]`
     type ArrayX<T: Plain>: Array<T>;
+    /// `[T; NZ]`
+    type ArrayZ<T: Plain>: Array<T>;
+    /// `[T; NU]`
+    type ArrayU<T: Plain>: Array<T>;
+    /// `[T; NP]`
+    type ArrayP<T: Plain>: Array<T>;
     /// `[T; NK]`
     type ArrayK<T: Plain>: Array<T>;
     /// `[T; NV]`
@@ -345,6 +351,9 @@ impl<
         NC
     };
     type ArrayX<T: Plain> = [T; NX];
+    type ArrayZ<T: Plain> = [T; NZ];
+    type ArrayU<T: Plain> = [T; NU];
+    type ArrayP<T: Plain> = [T; NP];
     type ArrayK<T: Plain> = [T; NK];
     type ArrayV<T: Plain> = [T; NV];
     type ArrayW<T: Plain> = [T; NW];

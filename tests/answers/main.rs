@@ -2,6 +2,7 @@
 //! none or several, errors and what they say.
 
 mod coupled_derivatives;
+mod debug;
 mod degenerate;
 mod errors;
 mod failing_intervals;

@@ -21,8 +21,7 @@ fn deviation(x: [f64; 2], u: f64) -> [f64; 2] {
 }
 
 fn problem(weights: [f64; 2], horizon: Horizon<'_, f64>) -> Result<HeapOcp<impl Formulation<f64>>, OcpError> {
-    let irk = Irk::<Cart, Gauss<2>>::new(Options::default());
-    let irk = irk.map_err(|error| OcpError::Integration { interval: 0, error })?;
+    let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
     Problem::new(irk).stage_cost(LeastSquaresCost::<Deviation>::diagonal(&weights)).on(horizon)
 }
 

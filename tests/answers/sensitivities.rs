@@ -303,3 +303,32 @@ fn stages_that_there_are_not() -> Test {
     }
     Ok(())
 }
+
+/// An unstable chain that nothing but its controls costs: it is left alone, and grows beyond all
+/// numbers.
+#[function]
+fn steep(x: f64, u: f64, _p: f64) -> f64 {
+    1e100 * x + u
+}
+#[function]
+fn little(_x: f64, u: f64, p: f64) -> f64 {
+    u - p
+}
+
+#[test]
+fn derivatives_that_are_not_finite() -> Test {
+    let mut ocp = Problem::new(Map::<Steep, f64>::new())
+        .stage_cost(LeastSquaresCost::<Little>::diagonal(&[1.0]))
+        .on(Horizon::uniform(5, 1.0))?;
+    ocp.fix_initial_state(&[0.0])?.set_parameters(.., &[0.0])?.guess(&[0.0], &[0.0])?;
+    let mut result = Sensitivities::<f64>::new(&ocp)?;
+    // Three intervals make 1e300 of a one, four no number.
+    let error = ocp.differentiate(GaussNewton::default(), &mut result).expect_err("1e400");
+    assert!(matches!(error, OcpError::NonFiniteSensitivity { stage: 4, of: "x", by: "x", .. }), "{error}");
+    assert!((result.dx(3)[0] / 1e300 - 1.0).abs() < 1e-12);
+    assert_eq!(
+        error.to_string(),
+        "stage 4: the derivative of the solution `x` by `x` is inf: other units of states, controls and costs may help"
+    );
+    Ok(())
+}

@@ -209,6 +209,74 @@ fn saved_and_read() -> Test {
     Ok(())
 }
 
+/// What no problem writes is refused where it is read, by name.
+#[test]
+fn spoiled_and_read() -> Test {
+    let mut ocp = solved()?;
+    let sound = serde_json::to_value(ocp.solution()?)?;
+    let read = |value: serde_json::Value| {
+        let found = serde_json::from_value::<Trajectory>(value);
+        found.map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    assert_eq!(read(sound.clone()), "");
+    let times = sound["times"].as_array().ok_or("a list")?.len();
+    let spoiled = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut value = sound.clone();
+        change(&mut value);
+        read(value)
+    };
+    for first in [1, u64::MAX] {
+        let said = spoiled(&|value| value["series"][0]["first"] = first.into());
+        assert!(said.ends_with(&format!(
+            "{times} values from time {first} on, and the trajectory has {times} times"
+        )));
+    }
+    let order = "the times of the trajectory have to be finite and must not decrease";
+    assert_eq!(spoiled(&|value| value["times"][1] = (-1.0).into()), order);
+    let cut = |list: &'static str| {
+        move |value: &mut serde_json::Value| {
+            value["series"][0][list].as_array_mut().map(Vec::pop);
+        }
+    };
+    for list in ["lower", "upper", "lower_multipliers", "upper_multipliers", "costates"] {
+        assert!(spoiled(&cut(list)).starts_with("the trajectory has "), "{list}");
+    }
+    Ok(())
+}
+
+/// Bounds that contradict each other over several stages are named, whatever the solver says.
+#[test]
+fn violations_by_name() -> Test {
+    let mut ocp = solved()?;
+    ocp.bound("x[0]", 2..5, 7.0, 8.0)?.bound("x[1]", 2..5, -1e-3, 1e-3)?.guess(&[0.0; 2], &[0.0])?;
+    let mut sqp = HeapSqp::new(&ocp)?;
+    sqp.options.max_iterations = 3;
+    let outcome = sqp.solve(&mut ocp)?;
+    let solution = ocp.solution()?;
+    let violations = solution.violations(1e-6);
+    assert!(!outcome.is_solved() && !violations.is_empty(), "{outcome}");
+    for (violation, next) in violations.iter().zip(&violations[1..]) {
+        assert!(violation.amount >= next.amount);
+    }
+    for violation in &violations {
+        let series = solution.get(violation.name)?;
+        let index = violation.stage - series.first;
+        assert_eq!(series.violations()[index], violation.amount);
+        let text = violation.to_string();
+        assert!(
+            text.contains(violation.name) && text.contains(&format!("stage {}", violation.stage)),
+            "{text}"
+        );
+    }
+    // Each of those in question is there, or holds.
+    for (stage, name) in (2..5).flat_map(|stage| [(stage, "x[0]"), (stage, "x[1]")]) {
+        let amount = solution.get(name)?.violations()[stage];
+        let found = violations.iter().any(|violation| (violation.name, violation.stage) == (name, stage));
+        assert_eq!(found, amount > 1e-6);
+    }
+    Ok(())
+}
+
 /// A guess on a finer grid: states on straight lines, controls held.
 #[test]
 fn guesses_from_other_grids() -> Test {

@@ -339,7 +339,23 @@ fn axes_of_a_column_begin_at_the_same_place() -> Test {
 
 #[test]
 fn whatever_is_drawn_the_file_is_well_formed() -> Test {
-    let hostile = "a < b & \"c\" > d";
+    let hostile = "a < b & \"c\" > d \0 \u{1b}[31m \u{b} \u{ffff} \t \r\n";
+    // From the least denormal number to the largest, and what a logarithmic axis has no place for.
+    let extreme = [5e-324, 1e-310, 1e300, f64::MAX, 0.0, -0.0, -1.0, f64::MIN, -5e-324, f64::NAN];
+    let pairs = || extreme.into_iter().flat_map(|x| extreme.map(|y| (x, y)));
+    let wide = || Panel::new("").line("line", pairs()).dots("dots", pairs()).text((0.0, -1.0), "none");
+    let denormal = || Panel::new("").line("", [(5e-324, 1e-320), (1e-322, 1e-310)]);
+    let large = || Panel::new("").line("", [(1e299, 1e300), (1e308, f64::MAX)]).limit(1e-300).limit(0.0);
+    let axes: [fn(Panel) -> Panel; 6] = [
+        |panel| panel,
+        Panel::log_x,
+        |panel| panel.log_x().log_y(),
+        |panel| panel.log_y().equal(),
+        |panel| panel.log_x().x_range(-1.0..1e300).y_range(0.0..5e-324),
+        |panel| panel.log_y().y_range(1e-320..1e308).x_range(f64::MIN..f64::MAX),
+    ];
+    let panels = axes.into_iter().flat_map(|axes| [wide(), denormal(), large()].map(axes));
+    let extremes = Figure::new().with_all(panels);
     let strange =
         [(0.0, f64::NAN), (f64::INFINITY, 1.0), (1.0, -f64::INFINITY), (2.0, f64::MAX), (3.0, f64::MIN)];
     let figures = [
@@ -355,15 +371,25 @@ fn whatever_is_drawn_the_file_is_well_formed() -> Test {
             .with(Space::new(hostile).seen_from(f64::NAN, 400.0).line(hostile, [[f64::NAN, 0.0, 1.0]])),
         Figure::new().with(Space::new("").coloured("", [([1.0; 3], f64::NAN)])),
         Figure::new().with(Panel::new("").motion([vec![(0.0, 1.0)], vec![]]).outline([])),
+        Figure::new().with(Panel::new("").with(Curve::line("", strange).width(f64::NAN))),
+        extremes,
     ];
     for figure in figures {
         let svg = figure.to_svg();
         let document = Document::parse(&svg)?;
+        // Parsers are lenient: what XML 1.0 calls a character, of what is drawn here.
+        let is_character = |c: char| "\t\n\r".contains(c) || (c >= ' ' && c != '\u{ffff}');
+        assert!(svg.chars().all(is_character));
         assert_eq!(document.root_element().tag_name().name(), "svg");
-        let numbers = ["x", "y", "width", "height", "cx", "cy", "points"];
-        for attribute in document.descendants().flat_map(|node| node.attributes()) {
-            let is_number = numbers.contains(&attribute.name());
-            assert!(!is_number || !attribute.value().contains(['N', 'i']), "{attribute:?}");
+        let numbers =
+            ["x", "y", "width", "height", "cx", "cy", "r", "points", "stroke-width", "d", "transform"];
+        let attributes = document.descendants().flat_map(|node| node.attributes());
+        for attribute in attributes.filter(|attribute| numbers.contains(&attribute.name())) {
+            let value = attribute.value().trim_start_matches("rotate").replace('%', "");
+            // Programs read attributes in single precision.
+            let is_short =
+                |text: &str| text.is_empty() || text.parse::<f64>().is_ok_and(|number| number.abs() < 1e7);
+            assert!(value.split([' ', ',', 'M', 'L', '(', ')']).all(is_short), "{attribute:?}");
         }
     }
     Ok(())

@@ -76,8 +76,25 @@ impl fmt::Display for Counts {
     }
 }
 
-/// The name of the variant of an error.
+/// What solvers of QPs say first, and the variant of the error.
+const VERDICTS: [(&str, &str); 5] = [
+    ("no point satisfies all constraints", "Infeasible"),
+    ("not solved after", "MaxIterations"),
+    ("no progress after", "Stalled"),
+    ("the time limit was reached", "OutOfTime"),
+    ("the Hessian is not positive semidefinite", "NotConvex"),
+];
+
+/// The variant of a verdict; of other errors their text before the first number or name.
 pub fn kind(error: &impl Debug) -> String {
     let text = format!("{error:?}");
-    text.chars().take_while(|c| c.is_alphanumeric()).collect()
+    match VERDICTS.iter().find(|(text_of, _)| text.starts_with(text_of)) {
+        Some((_, variant)) => (*variant).into(),
+        None => text
+            .split(|c: char| c.is_ascii_digit() || "`({".contains(c))
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .into(),
+    }
 }

@@ -21,7 +21,7 @@ use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
 use super::point::variable;
-use super::stages::{Convergence, Failure, FilteredDefect, MOST, Sides, Stages, Start};
+use super::stages::{Convergence, Culprit, Failure, FilteredDefect, MOST, Sides, Stages, Start};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;
@@ -29,7 +29,7 @@ use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispat
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
-use crate::shape::{Plain, Shape};
+use crate::shape::{Array, Plain, Shape};
 use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -92,6 +92,48 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn set_pivoted(&mut self, pivoted: bool) {
         self.memory.factors.set_pivoted(pivoted);
+    }
+
+    fn factors_hold(&self, start: &Start<'_, M, T>) -> bool {
+        let factors = &self.memory.factors;
+        if !factors.are_planned() {
+            return true;
+        }
+        let units = ArrayK::<M, T>::from_fn(|unknown| {
+            let unit = T::ONE / start.scale[unknown];
+            if unknown < M::Shape::NX { unit / start.h.abs() } else { unit }
+        });
+        let error = factors.backward_error(&units);
+        error * error <= T::EPSILON
+    }
+
+    fn culprit(&self, start: &Start<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit {
+        let Memory { rows, f, .. } = &*self.memory;
+        let (mut culprit, mut largest, nx) = (Culprit::default(), 0.0, M::Shape::NX);
+        for (unknown, ([[row]], scale)) in rows.as_ref().iter().zip(start.scale.as_ref()).enumerate() {
+            let unit = if unknown < nx { start.h.abs() * *scale } else { *scale };
+            let increment = row.parts.iter().fold(0.0f64, |most, part| most.max(part.abs().to_f64()));
+            // Written so that the first one that is not finite counts.
+            let increment = increment * unit.to_f64();
+            if increment > largest || increment.is_nan() && largest < f64::INFINITY {
+                largest = if increment.is_nan() { f64::INFINITY } else { increment };
+                culprit.unknown = unknown;
+            }
+        }
+        let mut terms: ArrayK<M, T> = Zeroable::zeroed();
+        for (entry, value) in jacobian.as_ref().iter().enumerate() {
+            let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
+            terms[equation] = terms[equation] + (*value * start.point[variable]).abs();
+        }
+        for (equation, terms) in terms.as_ref().iter().enumerate() {
+            let all = f.iter().flat_map(|group| &group[equation]);
+            let residual = all.fold(0.0f64, |most, f| most.max(f.abs().to_f64()));
+            let relative = residual / (residual + terms.to_f64());
+            if relative > culprit.residual {
+                (culprit.equation, culprit.residual) = (equation, relative);
+            }
+        }
+        culprit
     }
 
     fn begin(&mut self, point: &ArrayV<M, T>) {

@@ -284,7 +284,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let end = self.start + h;
         if end == self.start && h != T::ZERO {
             let (t, h) = (self.start.to_f64(), h.to_f64());
-            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution });
+            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution, unsettled: None });
         }
         Ok(end)
     }

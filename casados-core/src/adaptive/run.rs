@@ -67,6 +67,14 @@ pub struct Base<M: Dae, T: Plain> {
     noise: f64,
 }
 
+impl<M: Dae, T: Real> Base<M, T> {
+    /// The step that is tried, from where the run is.
+    fn step(&self, walk: &Walk<T>) -> Start<'_, M, T> {
+        let Self { point, scale, asked, finer, .. } = self;
+        Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h }
+    }
+}
+
 /// An interval.
 #[derive(Clone, Copy)]
 pub struct Span<T> {
@@ -150,7 +158,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             self.check_step(walk.t, walk.h, walk.refusal)?;
             walk.tried += 1;
-            match self.attempt(stages, &mut walk) {
+            let attempt = self.attempt(stages, &mut walk);
+            if self.blames_pivots(stages, &mut walk, &attempt) {
+                continue;
+            }
+            match attempt {
                 Err(failure) => {
                     match failure {
                         Failure::Rough(_) => self.statistics.rejected += 1,
@@ -158,6 +170,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     }
                     walk.fail(failure);
                     self.cross(&mut walk, span)?;
+                    self.check_convergence(levels.get::<B>(walk.order.level)?, &walk, span)?;
                 }
                 Ok(error) => {
                     let factor = walk.factor(error, stages.count());

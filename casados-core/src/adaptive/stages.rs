@@ -54,6 +54,17 @@ pub enum Failure {
     Rough(f64),
 }
 
+/// What keeps an iteration from converging.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Culprit {
+    /// The unknown with the largest increment.
+    pub unknown: usize,
+    /// The equation with the largest residual relative to its terms,
+    pub equation: usize,
+    /// and this residual.
+    pub residual: f64,
+}
+
 /// Where the stages are, beside borders between branches of the model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sides {
@@ -207,8 +218,14 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// The unknown for which there is no pivot.
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize>;
+    /// What kept the last iteration from converging, with the terms of each equation at the start of
+    /// the step.
+    fn culprit(&self, start: &Start<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit;
     /// From now on, whether every matrix is to be pivoted as a whole.
     fn set_pivoted(&mut self, pivoted: bool);
+    /// Whether planned factors solve the systems that they are of; pivoted ones are as good as can
+    /// be.
+    fn factors_hold(&self, start: &Start<'_, M, T>) -> bool;
     /// Starts from the same `ẋ` and `z` at all stages, those of the start of the step.
     fn begin(&mut self, point: &ArrayV<M, T>);
     /// Starts from the polynomial of the last accepted step, whose size is given relative to this

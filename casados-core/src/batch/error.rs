@@ -20,7 +20,7 @@ use core::fmt;
 /// assert!(matches!(error, Err(BatchError::Length { .. })));
 /// # Ok::<(), casados::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum BatchError {
     /// A slice has not one element for each interval (nor one for all, where that is allowed).
@@ -42,6 +42,8 @@ pub enum BatchError {
         /// Why.
         error: Error,
     },
+    /// The integrator could not be made: an option, or its tableau. Nothing was computed.
+    Integrator(Error),
     /// The memory could not be allocated. Nothing was computed.
     OutOfMemory {
         /// Its size.
@@ -97,16 +99,28 @@ impl fmt::Display for BatchError {
             Self::Intervals { failed, first, error } => {
                 write!(f, "{failed} intervals failed, the first of them interval {first}: {error}")
             }
+            Self::Integrator(error) => error.fmt(f),
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes could not be allocated"),
         }
     }
 }
 
+debug_is_display!(BatchError);
+
 impl core::error::Error for BatchError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            Self::Intervals { error, .. } => Some(error),
+            Self::Intervals { error, .. } | Self::Integrator(error) => Some(error),
             _ => None,
+        }
+    }
+}
+
+impl From<Error> for BatchError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
+            error => Self::Integrator(error),
         }
     }
 }

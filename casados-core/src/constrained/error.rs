@@ -28,7 +28,7 @@ use core::fmt;
 /// println!("{error}");
 /// # Ok::<(), casados::Inconsistent>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Inconsistent {
     /// No state has this name.
@@ -118,5 +118,7 @@ impl fmt::Display for Inconsistent {
         }
     }
 }
+
+debug_is_display!(Inconsistent);
 
 impl core::error::Error for Inconsistent {}

@@ -1,6 +1,6 @@
 //! What errors say.
 
-use super::{Argument, Error, Place, Quantity, Refusal, Started};
+use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
 /// How other start values are given.
@@ -51,6 +51,7 @@ impl fmt::Display for Error {
             Error::InvalidOption { option, value, reason } => {
                 write!(f, "the option `{option}` is {value}, but {reason}")
             }
+            Error::Tableau(error) => error.fmt(f),
             Error::NotExplicit { stage } => {
                 write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
             }
@@ -142,7 +143,7 @@ impl fmt::Display for Error {
             Error::NonFiniteFunction { function, output, value, at } => {
                 write!(f, "output {output} of the function {function} is {value} at {at}")
             }
-            Error::StepSizeUnderflow { t, h, reason } => {
+            Error::StepSizeUnderflow { t, h, reason, unsettled } => {
                 let reason = match reason {
                     Refusal::SingularAlgebraic { unknown } => {
                         return write!(
@@ -152,15 +153,33 @@ impl fmt::Display for Error {
                         );
                     }
                     Refusal::Error => {
-                        "the estimated error stays above the tolerance; the solution may end there, or `atol` be \
-                         far above states that decide on it"
+                        "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
+                         too large for some states"
                     }
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
                     Refusal::NotFinite => "the model is not finite",
                     Refusal::Resolution => "the time does not resolve it",
                 };
-                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
+                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")?;
+                let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
+                    return Ok(());
+                };
+                write!(
+                    f,
+                    "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
+                     is {value:e} at this time, does not settle: "
+                )?;
+                f.write_str(match algebraic {
+                    true => {
+                        "the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
+                         declare an event"
+                    }
+                    false => {
+                        "the solution may end there, or the model jump: then declare an event, or write the condition as \
+                         `if` or `max`"
+                    }
+                })
             }
             Error::TooManySteps { t, steps, stiff } => {
                 write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
@@ -177,6 +196,12 @@ impl fmt::Display for Error {
                 "the times are not in order: element {index} is {t}, and not between the one before it, {before}, and the \
                  end, {end}"
             ),
+            Error::AccumulatingEvents { t, function, event, events } => write!(
+                f,
+                "events accumulate at t = {t}: event {event}, of the function {function}, happens sooner and sooner after \
+                 itself, {events} events so far; end the integration before, by a terminal event, or go on with a model \
+                 of what is at rest"
+            ),
             Error::TooManyEvents { t, events } => {
                 write!(f, "t = {t} was reached after {events} events, and more are not allowed")
             }
@@ -186,9 +211,14 @@ impl fmt::Display for Error {
                     "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
                 )
             }
+            Error::GuardOfAlgebraicStates { function } => write!(
+                f,
+                "the function {function} of an event looks at algebraic states: over it there are first derivatives, and no \
+                 second ones; write it in terms of x, u and p"
+            ),
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which it has no second derivatives: carry a clock among the states"
+                "{function} depends on the time, by which derivatives over events are not known: add the time as a state"
             ),
             Error::Intervals { controls, ends } => {
                 write!(
@@ -203,12 +233,21 @@ impl fmt::Display for Error {
             Error::NotProjected { equation, derivative, residual } => write!(
                 f,
                 "the end of the interval cannot be projected: derivative {derivative} of the constraint of equation \
-                 {equation} is violated by {residual:e}, and there are no states near that satisfy all constraints, or \
-                 these depend on each other there; take shorter steps"
+                 {equation} is violated by {residual:e}, and no consistent state was found nearby, or the constraints \
+                 are redundant there; take shorter steps"
             ),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }
     }
 }
 
-impl core::error::Error for Error {}
+debug_is_display!(Error);
+
+impl core::error::Error for Error {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Tableau(error) => Some(error),
+            _ => None,
+        }
+    }
+}

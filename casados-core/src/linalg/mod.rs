@@ -30,7 +30,7 @@ pub(crate) use kernel::{
     double_double::{displaced, dot_compensated, two_product},
     prefetch::Ahead,
     unroll::{AtRow, each_row, is_long, is_short},
-    vector::{are_finite, axpy},
+    vector::{are_finite, axpy, dot},
 };
 pub use newton_matrix::{Factors, kinematic, slot};
 pub(crate) use sparse_lu::{

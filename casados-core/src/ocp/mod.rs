@@ -76,108 +76,63 @@
 //! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
 //! are dynamics too.
 
-mod algebraic;
-mod arrival;
-mod begin;
-mod bounds;
-mod check;
-#[cfg(feature = "alloc")]
-mod collocation;
-mod constraint;
-mod convex;
-mod convexify;
-mod cost;
-mod coupling;
-mod curvature;
-mod data;
+mod assembly;
 mod dynamics;
-mod elastic;
-mod error;
-mod filter;
-mod fits;
-mod guess;
-mod horizon;
-#[cfg(feature = "alloc")]
-mod inside;
-mod instance;
-mod ipm;
-mod kept_jacobians;
-mod kkt;
-mod labels;
-mod least_squares;
-mod linearise;
-mod log;
-mod map;
-mod memory;
-mod messages;
-mod names;
-mod outcome;
-mod pattern;
-mod point;
-mod print;
-mod problem;
-#[cfg(feature = "alloc")]
-mod program;
-mod real_time;
-#[cfg(feature = "alloc")]
-mod return_map;
-#[cfg(feature = "alloc")]
-mod sensitivities;
-#[cfg(feature = "alloc")]
-mod shooting;
-mod simulation;
-mod single;
-mod soften;
-mod sqp;
-#[cfg(feature = "alloc")]
-mod trajectory;
-mod transfer;
-mod units;
-mod watch;
-mod weights;
-mod wrapped;
+mod feedback;
+mod formulation;
+mod nlp;
+mod solution;
 
+pub use assembly::convexify::Convexification;
+pub use assembly::curvature::{Curvature, Exact, GaussNewton, Secant, Update};
+pub use assembly::kept_jacobians::KeptJacobians;
+pub use dynamics::adjoints::Adjoints;
 #[cfg(feature = "alloc")]
-pub use collocation::Collocation;
-pub use constraint::{Constraint, Constraints};
-pub use convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
-pub use convexify::Convexification;
-pub use cost::{Cost, GeneralCost};
-pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
-pub use dynamics::{Dynamics, SecondOrder};
+pub use dynamics::collocation::Collocation;
+pub use dynamics::map::Map;
+#[cfg(feature = "alloc")]
+pub use dynamics::return_map::ReturnMap;
+#[cfg(feature = "alloc")]
+pub use dynamics::shooting::Shooting;
+pub use dynamics::single::{IntegralCost, WithIntegral};
+pub use feedback::contraction::{Contraction, ContractionTest, Convergence};
+pub use feedback::phases::{Fallback, Feedback, Prepared};
+#[cfg(feature = "alloc")]
+pub use feedback::real_time::HeapRealTime;
+pub use feedback::real_time::RealTime;
+pub use formulation::error::{ConstraintName, OcpError, Part, Text};
+pub use formulation::functions::constraint::{Constraint, Constraints};
+pub use formulation::functions::convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
+pub use formulation::functions::cost::{Cost, GeneralCost};
+pub use formulation::functions::dynamics::{Dynamics, SecondOrder};
 #[doc(hidden)]
-pub use dynamics::{IntegralTerms, Interval, IntervalResult, Nodes, Sink, StageAction};
-pub use error::{ConstraintName, OcpError, Part, Text};
+pub use formulation::functions::dynamics::{
+    IntegralTerms, Interval, IntervalResult, Nodes, Sink, StageAction,
+};
 #[doc(hidden)]
-pub use fits::{ConstraintsOf, CostOf};
-pub use horizon::Horizon;
-#[cfg(feature = "alloc")]
-pub use instance::HeapOcp;
-pub use instance::Ocp;
-#[cfg(feature = "alloc")]
-pub use ipm::HeapIpm;
-pub use ipm::{Barrier, Ipm, IpmOptions};
-pub use kept_jacobians::{Adjoints, KeptJacobians};
-pub use least_squares::LeastSquaresCost;
-pub use log::{Iteration, Log, Times};
-pub use map::Map;
-pub use names::Names;
-pub use outcome::{Outcome, Status};
+pub use formulation::functions::fits::{ConstraintsOf, CostOf, HasArgumentsOf, IsConstraint, IsCost};
+pub use formulation::functions::least_squares::LeastSquaresCost;
 #[cfg(feature = "casadi")]
-pub(crate) use pattern::{Entry, Origin};
-pub use problem::{Formulation, Problem};
+pub(crate) use formulation::functions::pattern::{Entry, Origin};
+pub use formulation::horizon::Horizon;
 #[cfg(feature = "alloc")]
-pub use real_time::HeapRealTime;
-pub use real_time::{Feedback, Prepared, RealTime};
+pub use formulation::instance::HeapOcp;
+pub use formulation::instance::Ocp;
+pub use formulation::names::Names;
+pub use formulation::problem::{ExactFormulation, Formulation, Problem};
 #[cfg(feature = "alloc")]
-pub use return_map::ReturnMap;
+pub use nlp::ipm::HeapIpm;
+pub use nlp::ipm::{Barrier, Ipm, IpmOptions};
 #[cfg(feature = "alloc")]
-pub use sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
+pub use nlp::multi_start::{MultiStart, StartOutcome};
 #[cfg(feature = "alloc")]
-pub use shooting::Shooting;
-pub use single::{IntegralCost, WithIntegral};
+pub use nlp::sqp::HeapSqp;
+pub use nlp::sqp::{Globalisation, Sqp, SqpOptions};
+pub use solution::log::{Iteration, Log, Times};
+pub use solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
-pub use sqp::HeapSqp;
-pub use sqp::{Globalisation, Sqp, SqpOptions};
+pub use solution::sensitivities::{
+    Covariance, Sensitivities, SolutionAdjoint, SolutionFactors, Unidentifiable, ValueHessian,
+};
 #[cfg(feature = "alloc")]
-pub use trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError};
+pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};

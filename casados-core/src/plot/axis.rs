@@ -47,7 +47,12 @@ impl Axis {
                     .map(place)
                     .filter(|value| value.is_finite())
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-                (low - room * (high - low), high + room * (high - low))
+                // Half of the length: the whole may be beyond the range of numbers.
+                let more = 2.0 * room * (0.5 * high - 0.5 * low);
+                match low <= high {
+                    true => ((low - more).max(f64::MIN), (high + more).min(f64::MAX)),
+                    false => (low, high),
+                }
             }
         };
         let (low, high) = sensible(low, high);
@@ -73,31 +78,37 @@ impl Scale {
     /// The pixel of a number; not finite if it has none.
     pub fn at(&self, value: f64) -> f64 {
         let value = if self.is_log { value.log10() } else { value };
-        self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
+        self.from + self.share(value) * (self.to - self.from)
+    }
+
+    /// Where a number, or an exponent, lies between both ends: in halves, whose difference is a
+    /// number.
+    fn share(&self, value: f64) -> f64 {
+        (0.5 * value - 0.5 * self.low) / (0.5 * self.high - 0.5 * self.low)
     }
 
     /// The number at a pixel.
     pub fn value(&self, pixel: f64) -> f64 {
-        let value = self.low + (pixel - self.from) / (self.to - self.from) * (self.high - self.low);
+        let share = (pixel - self.from) / (self.to - self.from);
+        let value = (1.0 - share) * self.low + share * self.high;
         if self.is_log { 10f64.powf(value) } else { value }
     }
 
     /// Whether a number is on the axis.
     pub fn contains(&self, value: f64) -> bool {
         let value = if self.is_log { value.log10() } else { value };
-        let room = 1e-9 * (self.high - self.low);
-        (self.low - room..=self.high + room).contains(&value)
+        (-1e-9..=1.0 + 1e-9).contains(&self.share(value))
     }
 
     /// Makes the range so long that a pixel is worth `unit`.
     pub fn widen(&mut self, unit: f64) {
         let (half, middle) = (0.5 * unit * (self.to - self.from).abs(), 0.5 * (self.low + self.high));
-        (self.low, self.high) = (middle - half, middle + half);
+        (self.low, self.high) = ((middle - half).max(f64::MIN), (middle + half).min(f64::MAX));
     }
 
     /// What a pixel is worth.
     pub fn unit(&self) -> f64 {
-        (self.high - self.low) / (self.to - self.from).abs().max(1.0)
+        (0.5 * self.high - 0.5 * self.low) / (0.5 * (self.to - self.from).abs().max(1.0))
     }
 
     /// About `count` numbers to be written, with their texts.
@@ -105,18 +116,20 @@ impl Scale {
         if !self.is_log {
             return ticks(self.low, self.high, count);
         }
-        let (first, last) = (self.low.ceil() as i32, self.high.floor() as i32);
+        // Exponents of numbers, of which the least ones are denormal.
+        let exponent = |value: f64| value.clamp(-323.0, 308.0) as i32;
+        let (first, last) = (exponent(self.low.ceil()), exponent(self.high.floor()));
         let decades = last - first + 1;
         if decades >= 3 {
             let every = (decades as usize).div_ceil(count.max(2)) as i32;
             let shown = (first..=last).filter(|exponent| exponent.rem_euclid(every) == 0);
-            return shown.map(|exponent| (10f64.powi(exponent), power(exponent))).collect();
+            return shown.map(|exponent| (decade(exponent), power(exponent))).collect();
         }
         let mut all = Vec::new();
         for exponent in first - 1..=last + 1 {
             for digit in [1.0, 2.0, 5.0] {
-                let value = digit * 10f64.powi(exponent);
-                if self.contains(value) {
+                let value = digit * decade(exponent);
+                if value.is_finite() && self.contains(value) {
                     all.push((value, short(value)));
                 }
             }
@@ -125,9 +138,14 @@ impl Scale {
     }
 }
 
+/// A power of ten, also where it is denormal: `powi` divides by its inverse, which is infinite.
+fn decade(exponent: i32) -> f64 {
+    if exponent < -300 { 10f64.powf(f64::from(exponent)) } else { 10f64.powi(exponent) }
+}
+
 /// Multiples of 1, 2 or 5 times a power of ten.
 pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
-    let raw = (high - low) / count.max(1) as f64;
+    let raw = high / count.max(1) as f64 - low / count.max(1) as f64;
     let decade = 10f64.powf(raw.log10().floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * decade >= 0.999 * raw).unwrap_or(10.0);
     let step = factor * decade;
@@ -235,7 +253,8 @@ mod tests {
 
     #[test]
     fn a_range_has_a_length_whatever_the_data() {
-        for data in [&[][..], &[3.0], &[f64::NAN, f64::INFINITY], &[0.0, 0.0], &[-1e300, 1e300]] {
+        let wide = [f64::MIN, f64::MAX];
+        for data in [&[][..], &[3.0], &[f64::NAN, f64::INFINITY], &[0.0, 0.0], &[-1e300, 1e300], &wide] {
             let scale = Axis::default().scale(data.iter().copied(), 0.0..100.0, 0.05);
             assert!(scale.high > scale.low && scale.ticks(5).len() < 20, "{data:?}: {scale:?}");
         }

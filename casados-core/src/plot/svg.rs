@@ -121,15 +121,27 @@ pub(super) struct Canvas {
     text: String,
 }
 
-/// With a tenth of a pixel.
+/// With a tenth of a pixel, not farther from the picture than what programs read as a number.
 fn number(value: f64) -> String {
+    const FAR: f64 = 1e6;
+    let value = if value.is_nan() { 0.0 } else { value.clamp(-FAR, FAR) };
     let text = format!("{value:.1}");
     let short = text.strip_suffix(".0").unwrap_or(&text);
     if short == "-0" { "0".to_string() } else { short.to_string() }
 }
 
+fn is_finite(point: &Point) -> bool {
+    point.0.is_finite() && point.1.is_finite()
+}
+
+/// Text as XML 1.0 has it, which knows no control characters but three.
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    let is_none = |c: char| (c < ' ' && !"\t\n\r".contains(c)) || ['\u{fffe}', '\u{ffff}'].contains(&c);
+    text.replace(is_none, "\u{fffd}")
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 impl Canvas {
@@ -177,7 +189,6 @@ impl Canvas {
 
     /// A line through points; what is not finite interrupts it.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
-        let is_finite = |point: &Point| point.0.is_finite() && point.1.is_finite();
         for piece in points.split(|point| !is_finite(point)) {
             self.piece(piece, stroke);
         }
@@ -214,7 +225,7 @@ impl Canvas {
     /// Strokes of one look, with round ends: one of no length is a dot.
     pub fn strokes(&mut self, strokes: &[[Point; 2]], stroke: Stroke) {
         let mut path = String::new();
-        for [from, to] in strokes {
+        for [from, to] in strokes.iter().filter(|ends| ends.iter().all(is_finite)) {
             let [x, y, end_x, end_y] = [from.0, from.1, to.0, to.1].map(number);
             let _ = write!(path, "M{x},{y}L{end_x},{end_y}");
         }
@@ -225,7 +236,7 @@ impl Canvas {
     }
 
     pub fn dot(&mut self, at: Point, radius: f64, colour: Colour) {
-        if at.0.is_finite() && at.1.is_finite() {
+        if is_finite(&at) {
             let (x, y, r) = (number(at.0), number(at.1), number(radius));
             self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{colour}\"/>"));
         }
@@ -257,7 +268,7 @@ impl Canvas {
     }
 
     fn styled(&mut self, at: Point, text: &str, anchor: Anchor, more: &str) {
-        if text.is_empty() {
+        if text.is_empty() || !is_finite(&at) {
             return;
         }
         let anchor = match anchor {

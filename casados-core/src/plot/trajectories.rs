@@ -68,7 +68,7 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
         .map(|(k, value)| {
             let multipliers = series.lower_multipliers.get(k).zip(series.upper_multipliers.get(k));
             Point {
-                time: times.get(series.first + k).map_or(f64::NAN, |time| time.to_f64()),
+                time: times.get(series.first.saturating_add(k)).map_or(f64::NAN, |time| time.to_f64()),
                 value: value.to_f64(),
                 bounds: [
                     of(&series.lower, k).unwrap_or(f64::NEG_INFINITY),

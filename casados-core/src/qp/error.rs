@@ -4,6 +4,20 @@ use super::statistics::Residuals;
 use core::fmt;
 
 /// A part of a QP or of its solution.
+///
+/// ```
+/// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpField, QpSolver, QpStart, StageDims};
+///
+/// let mut dims = [StageDims::new(1, 1, 0); 2];
+/// dims[1].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// qp.stages_mut().next().unwrap().a_mut().set(0, 0, f64::NAN);
+/// qp.fix_initial_state(&[0.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// let error = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut()).unwrap_err();
+/// assert!(matches!(error, QpError::InvalidValue { field: QpField::A, stage: 0, .. }));
+/// # Ok::<(), QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QpField {
@@ -114,7 +128,7 @@ pub enum Side {
 /// assert!(matches!(outcome, Err(QpError::Infeasible { .. })));
 /// # Ok::<(), casados::qp::QpError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
     /// A length is not what the dimensions ask for.
@@ -179,14 +193,14 @@ pub enum QpError {
     /// States are periodic or controls shared, and this solver has no such conditions:
     /// [`InteriorPoint`](super::InteriorPoint) has, with the feature `alloc`.
     Coupled,
-    /// The iterations were used up.
+    /// The maximum number of iterations was reached.
     MaxIterations {
         /// How many.
         iterations: usize,
         /// What they reached.
         residuals: Residuals,
     },
-    /// The time was over.
+    /// The time limit was reached.
     OutOfTime {
         /// The iterations.
         iterations: usize,
@@ -282,7 +296,7 @@ impl fmt::Display for QpError {
                 write!(f, "not solved after {iterations} iterations: {residuals}")
             }
             Self::OutOfTime { iterations, residuals } => {
-                write!(f, "the time was over after {iterations} iterations: {residuals}")
+                write!(f, "the time limit was reached after {iterations} iterations: {residuals}")
             }
             Self::Stalled { iterations, residuals } => {
                 write!(f, "no progress after {iterations} iterations: {residuals}")
@@ -294,5 +308,7 @@ impl fmt::Display for QpError {
         }
     }
 }
+
+debug_is_display!(QpError);
 
 impl core::error::Error for QpError {}

@@ -75,8 +75,12 @@ impl Display for Reduction {
         }
         let [singular, points] = self.singular;
         if singular > 0 {
-            title(f, "  singular")?;
-            writeln!(f, "at {singular} of {points} sample points, where the constraints lose rank")?;
+            title(f, "  rank")?;
+            writeln!(
+                f,
+                "full at {} of {points} sample points, which need not satisfy the constraints",
+                points - singular
+            )?;
         }
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Cubic pieces by values and slopes at their ends, and the slopes of splines.
 
+use super::points::check_slopes;
 use crate::scalar::Scalar;
 
 /// The weights with which a derivative of a cubic piece is made of `[f₀, f₁, f₀′, f₁′]`: of order
@@ -61,6 +62,12 @@ pub enum Ends {
 /// The matrix is tridiagonal, and no pivots have to be looked for: it is diagonally dominant, but
 /// for the rows of ends that are no knots, whose pivots are positive too.
 pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends) -> [f64; N] {
+    let slopes = solve(points, values, ends);
+    check_slopes(&slopes);
+    slopes
+}
+
+const fn solve<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends) -> [f64; N] {
     if let (Ends::NotAKnot, 3) = (ends, N) {
         return parabola(points, values);
     }

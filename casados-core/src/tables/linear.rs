@@ -1,6 +1,6 @@
 //! Linear tables.
 
-use super::points::{check, check_values, interval, pair};
+use super::points::{check, check_lines, check_values, interval, pair};
 use super::{KINKS, Table, cell};
 use crate::scalar::{Real, Rows, Scalar};
 
@@ -24,12 +24,13 @@ impl<const N: usize> Linear<N> {
     /// A table of values at increasing points.
     ///
     /// # Panics
-    /// Where points do not increase or a number is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
         check_values(&values);
+        check_lines(&points, &values);
         Self { points, values }
     }
 
@@ -89,8 +90,8 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
     /// A table of values on a grid of increasing points.
     ///
     /// # Panics
-    /// Where points do not increase or a number is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check(&x);
@@ -98,7 +99,19 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
         let mut i = 0;
         while i < N {
             check_values(&values[i]);
+            check_lines(&y, &values[i]);
             i += 1;
+        }
+        let mut j = 0;
+        while j < M {
+            let mut column = [0.0; N];
+            let mut i = 0;
+            while i < N {
+                column[i] = values[i][j];
+                i += 1;
+            }
+            check_lines(&x, &column);
+            j += 1;
         }
         Self { x, y, values }
     }

@@ -22,6 +22,29 @@ pub const fn check_values<const N: usize>(values: &[f64; N]) {
     }
 }
 
+/// Stops the compiler where slopes of straight lines between points are not finite.
+pub const fn check_lines<const N: usize>(points: &[f64; N], values: &[f64; N]) {
+    let mut slopes = [0.0; N];
+    let mut i = 1;
+    while i < N {
+        slopes[i] = (values[i] - values[i - 1]) / (points[i] - points[i - 1]);
+        i += 1;
+    }
+    check_slopes(&slopes);
+}
+
+/// Stops the compiler where slopes are not finite.
+pub const fn check_slopes<const N: usize>(slopes: &[f64; N]) {
+    let mut i = 0;
+    while i < N {
+        assert!(
+            slopes[i].is_finite(),
+            "the slopes of a table have to be finite: its points are too close for its values"
+        );
+        i += 1;
+    }
+}
+
 /// The interval from this point to the next one is that of `x`; outside of all, the nearest.
 #[inline(always)]
 pub fn interval<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {

@@ -359,6 +359,24 @@ fn slopes_have_to_be_finite() {
 }
 
 #[test]
+#[should_panic(expected = "too close for its values")]
+fn points_have_to_be_apart() {
+    let _ = Spline::natural([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0]);
+}
+
+#[test]
+#[should_panic(expected = "too close for its values")]
+fn points_of_a_grid_have_to_be_apart() {
+    let _ = Spline2::natural([0.0, 1.0, 2.0], [0.0, 1e-300, 1.0], [[0.0, 1.0, 4.0]; 3]);
+}
+
+#[test]
+#[should_panic(expected = "too close for its values")]
+fn points_of_lines_have_to_be_apart() {
+    let _ = Linear::new([0.0, 1e-310, 1.0], [0.0, 1.0, 0.0]);
+}
+
+#[test]
 #[should_panic(expected = "at least two points")]
 fn one_point_is_no_table() {
     let _ = Linear::new([0.0], [0.0]);

@@ -68,7 +68,9 @@ fn of_reduction(analysis: &Analysis) -> Option<String> {
     let [singular, points] = reduction.singular;
     if singular > 0 {
         text += &format!(
-            " Constraints lose rank: the matrix `∂f/∂(ẋ, z)` is singular at {singular} of {points} sample points."
+            " The matrix `∂f/∂(ẋ, z)` has full rank at {} of {points} sample points, which need not satisfy the \
+             constraints.",
+            points - singular
         );
     }
     Some(text)

@@ -128,6 +128,16 @@ class Exported:
         return h, np.vstack([block("adj_x0_adj_xf"), block("adj_u_adj_xf")]).T
 
 
+def zeros_of_seed(solver, nx, nu):
+    """What follows the seed of the end: nothing in today's acados, `nu` zeros in earlier ones."""
+    try:
+        solver.set("seed_adj", np.zeros(nx))
+    except Exception:  # noqa: BLE001: acados raises no class of its own
+        solver.set("seed_adj", np.zeros(nx + nu))
+        return np.zeros(nu)
+    return np.zeros(0)
+
+
 class Acados:
     """acados' implicit integrator by its Python interface; `ACADOS_SOURCE_DIR` says where it is."""
 
@@ -147,12 +157,13 @@ class Acados:
         sim.code_gen_options.json_file = os.path.join(folder, name + ".json")
         self.nx, self.nu = x.numel(), u.numel()
         self.solver = AcadosSimSolver(sim, verbose=False)
+        self.zeros = zeros_of_seed(self.solver, self.nx, self.nu)
 
     def solve(self, x, u, seed=None):
         self.solver.set("x", x.ravel())
         self.solver.set("u", u.ravel())
         if seed is not None:
-            self.solver.set("seed_adj", np.append(seed.ravel(), np.zeros(self.nu)))
+            self.solver.set("seed_adj", np.append(seed.ravel(), self.zeros))
         if self.solver.solve():
             raise RuntimeError("acados' integrator failed")
         return self.solver.get

@@ -194,12 +194,4 @@ def run(masses, setting, rounds, seconds, leave_out=()):
     problem, makers = runners(masses, setting)
     print(f"chain of {masses} masses, {setting}")
     with environment([*problem.rest, *problem.x0]):
-        made = {}
-        for name, make in makers.items():
-            if name in leave_out:
-                continue
-            try:
-                made[name] = make()
-            except Exception as error:  # noqa: BLE001: it is left out, with a message
-                print(f"  {name}: {str(error).strip().splitlines()[-1]}")
-        return race(made, rounds, seconds)
+        return race({name: make for name, make in makers.items() if name not in leave_out}, rounds, seconds)

@@ -127,25 +127,40 @@ def environment(numbers):
     yield
 
 
-def race(runners, rounds, seconds):
-    """Runs all of them by turns, each as often as its seconds allow: medians of times.
+def message(error):
+    """The last line of an error, which says what was wrong."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
-    What cannot be run is left out, with a message."""
+
+def race(makers, rounds, seconds):
+    """Makes runners and runs all of them by turns, each as often as its seconds allow: medians of
+    times; of what raises the message, in the place of its row."""
+    runners, errors = {}, {}
+
+    def attempt(name, action):
+        try:
+            return action()
+        except Exception as error:  # noqa: BLE001: whatever it is, the page is to say so
+            errors[name] = message(error)
+            print(f"  {name}: {errors[name]}")
+
+    for name, make in makers.items():
+        runners[name] = attempt(name, make)
     results, spent = {name: [] for name in runners}, dict.fromkeys(runners, 0.0)
     for _ in range(rounds):
         for name, run in runners.items():
-            if spent[name] > seconds:
+            if spent[name] > seconds or name in errors:
                 continue
             begin = time.perf_counter()
-            try:
-                results[name].append(run())
-            except Exception as error:  # noqa: BLE001: whatever it is, the page is to say so
-                print(f"  {name}: {str(error).strip().splitlines()[-1]}")
-                spent[name] = np.inf
+            found = attempt(name, run)
+            if name not in errors:
+                results[name].append(found)
             spent[name] += time.perf_counter() - begin
     medians = {}
     for name, runs in results.items():
-        if runs:
+        if name in errors:
+            medians[name] = {"error": errors[name]}
+        elif runs:
             middle = {key: statistics.median(run[key] for run in runs) for key in ["total", "functions"]}
             medians[name] = {**runs[-1], **middle, "runs": len(runs)}
             print(f"  {name}: {json.dumps(medians[name])}", flush=True)

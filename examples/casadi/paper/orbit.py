@@ -137,7 +137,7 @@ def solve(rounds, seconds):
         "casados interior point": lambda: lambda: own(path, 2),
     }
     with environment(orbit.numbers()):
-        return race({name: make() for name, make in makers.items()}, rounds, seconds)
+        return race(makers, rounds, seconds)
 
 
 def implicit(plugin, **options):

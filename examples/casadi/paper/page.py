@@ -30,6 +30,22 @@ def per_iteration(run, key):
     return run[key] / max(run["iterations"], 1)
 
 
+def ran(runs):
+    """Those that did not raise."""
+    return {name: run for name, run in runs.items() if "error" not in run}
+
+
+def failures(runs):
+    """A line for each that raised, under the table: `runs` has those of each column."""
+    said = {}
+    for column, rows in runs.items():
+        for name, run in rows.items():
+            if "error" in run:
+                said.setdefault((name, run["error"]), []).append(str(column))
+    where = lambda columns: f" ({', '.join(columns)})" if any(columns) else ""
+    return "\n".join(f"- {name}{where(columns)} raised `{error}`" for (name, error), columns in said.items())
+
+
 def draw(chains, setting):
     """Milliseconds of an iteration over masses, of all that took part."""
     masses = sorted(int(key.split()[0]) for key in chains if key.endswith(setting))
@@ -39,7 +55,9 @@ def draw(chains, setting):
     for axes, key, title in zip(both, ["total", "functions"], ["an iteration", "its functions"]):
         for index, name in enumerate(names):
             points = [(m, chains[f"{m} {setting}"].get(name)) for m in masses]
-            points = [(m, 1e3 * per_iteration(run, key)) for m, run in points if run]
+            points = [(m, 1e3 * per_iteration(run, key)) for m, run in points if run and "error" not in run]
+            if not points:
+                continue
             style = {"casados": "-", "direct": ":", "acados": "-."}.get(name.split()[0].strip(","), "--")
             axes.plot(*zip(*points), style, marker="osv^D<>px*"[index % 10], markersize=4, label=name)
         axes.set(yscale="log", xlabel="masses", xticks=masses, title=f"milliseconds of {title}")
@@ -59,19 +77,24 @@ def chain(chains, setting):
     def cell(run):
         if run is None:
             return ""
+        if "error" in run:
+            return "raised"
         mark = "" if run["complete"] else "*"
         total, functions = (milliseconds(per_iteration(run, key)) for key in ["total", "functions"])
         return f"{total} ({functions}) · {run['iterations']}{mark}"
 
     rows = [[name] + [cell(runs[m].get(name)) for m in masses] for name in names]
-    return table(["ms of an iteration (of its functions) · iterations", *[f"{m} masses" for m in masses]], rows)
+    head = ["ms of an iteration (of its functions) · iterations", *[f"{m} masses" for m in masses]]
+    said = failures({f"{m} masses": run for m, run in runs.items()})
+    return "\n\n".join(filter(None, [table(head, rows), said]))
 
 
 def agreement(chains, setting):
     """The largest relative difference of objectives of the same discrete problem."""
     worst = 0.0
     for key, runs in chains.items():
-        if key.endswith(setting):
+        runs = ran(runs)
+        if key.endswith(setting) and WHOLE in runs:
             same = [runs[name]["objective"] for name in [WHOLE, HORIZON, INTERVALS, THEIRS] if name in runs]
             worst = max(worst, (max(same) - min(same)) / abs(max(same)))
     return worst
@@ -81,8 +104,8 @@ def goals(chains, orbit, intervals):
     """What was to be reached, and what was."""
     rows = []
     for key in sorted(chains, key=lambda key: (key.split()[1], key)):
-        runs, (masses, setting) = chains[key], key.split()
-        if THEIRS not in runs or INTERVALS not in runs:
+        runs, (masses, setting) = ran(chains[key]), key.split()
+        if not {THEIRS, INTERVALS, WHOLE, INTERIOR} <= runs.keys():
             continue
         ratio = lambda one, other, part: f"{runs[one][part] / runs[other][part]:.3g}"
         rows.append(
@@ -105,10 +128,14 @@ def goals(chains, orbit, intervals):
 def orbits(runs):
     rows = []
     for name, run in runs.items():
+        if "error" in run:
+            rows.append([name, "raised", "", "", "", ""])
+            continue
         step = run["total"] - run["functions"]
         times = [milliseconds(value) for value in [run["total"], run["functions"], step]]
         rows.append([name, *times, run["iterations"], f"{run['objective']:.9f}"])
-    return table(["", "total, ms", "functions", "step computation", "iterations", "objective"], rows)
+    head = ["", "total, ms", "functions", "step computation", "iterations", "objective"]
+    return "\n\n".join(filter(None, [table(head, rows), failures({"": runs})]))
 
 
 # Table of the paper: casados through a call-back, CasADi 3.5.5, on a laptop of 2022; milliseconds.
@@ -138,8 +165,9 @@ def write(results, path):
         parts += [words, chain(chains, setting), AGREE.format(agreement(chains, setting))]
     parts += [GOALS, goals(chains, orbit, intervals)]
     if orbit:
-        share = orbit[WHOLE]["total"] / orbit[DIRECT]["total"]
-        parts += [ORBIT, orbits(orbit), SHARE.format(share)]
+        parts += [ORBIT, orbits(orbit)]
+        if {WHOLE, DIRECT} <= ran(orbit).keys():
+            parts.append(SHARE.format(orbit[WHOLE]["total"] / orbit[DIRECT]["total"]))
     if intervals:
         parts += [INTERVAL, *[interval(rows, mode) for mode, rows in intervals.items()], DIFFERENCES]
     if results.get("calls"):

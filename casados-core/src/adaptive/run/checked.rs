@@ -1,7 +1,14 @@
 //! What a step needs, and errors where it is not there: a finite Jacobian, a length.
 
+use super::cross::shortest;
+use super::walk::Walk;
 use super::*;
+use crate::error::Unsettled;
 use crate::irk::{eliminate, unknown_name};
+
+/// A step that is this much shorter than others of the run, and still not solved, stands for all
+/// shorter ones.
+const SHRUNK: f64 = 1e-6;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// At the point that was reached, or in the middle of the step.
@@ -23,6 +30,35 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(())
     }
 
+    /// After an iteration that did not converge: whether a shorter step is worth an attempt.
+    ///
+    /// # Errors
+    /// [`Error::StepSizeUnderflow`], with what does not settle.
+    pub(super) fn check_convergence(
+        &self,
+        stages: &dyn Stages<M, T>,
+        walk: &Walk<T>,
+        span: Span<T>,
+    ) -> Result<(), Error> {
+        let size = walk.h.abs();
+        let is_short = size < shortest(span, walk.t) && size < T::from_f64(SHRUNK) * walk.longest_so_far;
+        if !(walk.is_unsolved() && is_short) {
+            return Ok(());
+        }
+        let culprit = stages.culprit(&self.base.step(walk), &self.base.jacobian);
+        let (nx, unknown) = (M::Shape::NX, culprit.unknown);
+        let unsettled = Unsettled {
+            equation: culprit.equation,
+            residual: culprit.residual,
+            unknown: unknown_name::<M>(unknown),
+            value: self.base.point[nx + unknown].to_f64(),
+            algebraic: unknown >= nx,
+        };
+        let reason = self.singular_algebraic(Refusal::NotConverged).unwrap_or(Refusal::NotConverged);
+        let (t, h) = (walk.t.to_f64(), walk.h.to_f64());
+        Err(Error::StepSizeUnderflow { t, h, reason, unsettled: Some(unsettled) })
+    }
+
     /// # Errors
     /// [`Error::StepSizeUnderflow`]
     pub(in crate::adaptive) fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
@@ -32,7 +68,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let part = if tenth == T::ZERO { h } else { tenth };
         if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + part == t {
             let reason = self.singular_algebraic(reason).unwrap_or(reason);
-            return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
+            return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason, unsettled: None });
         }
         Ok(())
     }

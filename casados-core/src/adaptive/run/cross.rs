@@ -7,9 +7,14 @@ use super::*;
 use crate::adaptive::branches::Branches;
 use crate::adaptive::point::variable;
 
-/// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
-/// there is far below rounding.
-const SHORTEST: f64 = 1e3;
+/// A step of so many roundoff errors of the interval, 1e-12 of it, is as short as any: what an Euler
+/// step misses there is far below rounding.
+const SHORTEST: f64 = 5e3;
+
+/// The length of a step that is as short as any.
+pub(super) fn shortest<T: Real>(span: Span<T>, t: T) -> T {
+    T::from_f64(SHORTEST * T::EPSILON) * (span.end - span.start).abs().max(t.abs())
+}
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Goes over a border that a step ends at whose iteration did not converge however short it
@@ -23,8 +28,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if const { M::BRANCHES == 0 } || !walk.is_unsolved() {
             return Ok(());
         }
-        let length = (span.end - span.start).abs().max(walk.t.abs());
-        let shortest = T::from_f64(SHORTEST * T::EPSILON) * length;
+        let shortest = shortest(span, walk.t);
         let left = (span.end - walk.t).abs();
         if walk.h.abs() >= shortest || left <= T::from_f64(4.0) * shortest {
             return Ok(());

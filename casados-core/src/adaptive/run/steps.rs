@@ -66,9 +66,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if walk.need < Need::Factors {
             return Ok(!walk.keeps_matrix(B::LEVELS));
         }
-        stages.set_pivoted(walk.pivoted);
-        self.statistics.factorizations += 1;
-        match stages.factor(&self.base.jacobian, walk.h) {
+        let mut factored = self.factor_with(stages, walk);
+        if walk.verifies_pivots && !walk.pivoted && !stages.factors_hold(&self.base.step(walk)) {
+            walk.pivoted = true;
+            factored = self.factor_with(stages, walk);
+        }
+        match factored {
             Ok(planned) => {
                 walk.singular = 0;
                 self.statistics.dense += usize::from(!planned);
@@ -90,6 +93,37 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
     }
 
+    /// Factors by the plan, or with pivots.
+    fn factor_with(&mut self, stages: &mut dyn Stages<M, T>, walk: &Walk<T>) -> Result<bool, usize> {
+        stages.set_pivoted(walk.pivoted);
+        self.statistics.factorizations += 1;
+        stages.factor(&self.base.jacobian, walk.h)
+    }
+
+    /// Whether an attempt failed because the planned elimination lost its digits: its pivots are
+    /// judged before the program runs, and may vanish where it leads. Then the matrix is pivoted,
+    /// and the same step is tried again; the factors of later steps are tested before they are used.
+    pub(super) fn blames_pivots(
+        &mut self,
+        stages: &dyn Stages<M, T>,
+        walk: &mut Walk<T>,
+        attempt: &Result<f64, Failure>,
+    ) -> bool {
+        let may_be = match attempt {
+            Ok(error) => *error >= 1.0,
+            Err(failure) => matches!(failure, Failure::Slow(_) | Failure::Diverges | Failure::NotFinite),
+        };
+        if !may_be || walk.pivoted || stages.factors_hold(&self.base.step(walk)) {
+            return false;
+        }
+        self.statistics.failed += 1;
+        (walk.pivoted, walk.verifies_pivots) = (true, true);
+        walk.need = Need::Factors;
+        // The rate of this iteration says nothing of the next one.
+        (walk.convergence.rate, walk.convergence.factor) = (FAST, Convergence::UNKNOWN);
+        true
+    }
+
     /// The Jacobian in the middle of the step, as far as that is foreseen: nearer to all stages
     /// than the start is. Where the step fails, at the start.
     ///
@@ -99,10 +133,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         walk.current = walk.is_careful();
         walk.convergence.fresh = true;
         if !walk.current {
-            let Base { point, scale, asked, finer, middle, .. } = &mut *self.base;
-            let start =
-                Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
-            stages.predict(&start, middle);
+            let mut middle = self.base.middle;
+            stages.predict(&self.base.step(walk), &mut middle);
+            self.base.middle = middle;
             walk.current = self.evaluate_jacobian(true, walk.tried).is_err();
         }
         if walk.current {
@@ -123,8 +156,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         stages: &mut dyn Stages<M, T>,
         walk: &mut Walk<T>,
     ) -> Result<f64, Failure> {
-        let Base { point, scale, asked, finer, u, parameters, tight, rtol, atol, .. } = &*self.base;
-        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+        let Base { point, u, parameters, tight, rtol, atol, .. } = &*self.base;
+        let start = self.base.step(walk);
         let residuals = &mut self.statistics.residuals;
         let solved = stages.solve(&start, self.base.newton_tolerance, &mut walk.convergence, residuals);
         self.statistics.iterations += walk.convergence.iterations;
@@ -162,8 +195,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         walk: &mut Walk<T>,
         error: f64,
     ) -> Result<(), Failure> {
-        let Base { point, scale, asked, finer, noise, .. } = &*self.base;
-        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+        let Base { finer, noise, .. } = &*self.base;
+        let start = self.base.step(walk);
         let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *finer / ROUGH_OVER_ERROR;
         let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
@@ -207,7 +240,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ) -> Result<bool, Error> {
         let (t, h, nx) = (walk.t, walk.h, M::Shape::NX);
         self.statistics.steps += 1;
-        (walk.troubles, walk.pivoted) = (0, false);
+        walk.pivoted = false;
         walk.refusals.accepted();
         stages.accept();
         if let Some(sensitivities) = &mut self.sensitivities {

@@ -16,8 +16,6 @@ const SETTLED: usize = 5;
 const WORTHWHILE: f64 = 1.2;
 /// A run still looks for its step size while each step is longer than the last by this factor.
 const LONGER: f64 = 2.0;
-/// After so many iterations in a row that did not converge the planned elimination may be to blame.
-const TROUBLES: usize = 3;
 
 /// What has to be done before a step can be tried.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
@@ -77,6 +75,8 @@ pub(super) struct Walk<T> {
     pub last: bool,
     /// The length of the last accepted step.
     pub accepted: Option<T>,
+    /// The longest step that was accepted, or the first one.
+    pub longest_so_far: T,
     /// Whether the run still looks for its step size.
     pub starting: bool,
     pub need: Need,
@@ -96,12 +96,12 @@ pub(super) struct Walk<T> {
     pub refusal: Refusal,
     /// How many steps were tried.
     pub tried: usize,
-    /// How many matrices in a row were singular,
+    /// How many matrices in a row were singular.
     pub singular: usize,
-    /// and how many iterations did not converge,
-    pub troubles: usize,
-    /// so that every matrix is pivoted as a whole.
+    /// Whether the matrices of this step are pivoted as a whole.
     pub pivoted: bool,
+    /// Whether the planned elimination has lost its digits before.
+    pub verifies_pivots: bool,
 }
 
 impl<T: Real> Walk<T> {
@@ -115,6 +115,7 @@ impl<T: Real> Walk<T> {
             h: length,
             last: false,
             accepted: None,
+            longest_so_far: T::ZERO,
             starting: true,
             need: Need::Jacobian,
             current: false,
@@ -129,8 +130,8 @@ impl<T: Real> Walk<T> {
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
-            troubles: 0,
             pivoted: false,
+            verifies_pivots: false,
         }
     }
 
@@ -140,6 +141,7 @@ impl<T: Real> Walk<T> {
         if self.beyond(self.h * T::from_f64(1.0001)) >= 0.0 {
             (self.h, self.last) = (self.span.end - self.t, true);
         }
+        self.longest_so_far = self.h.abs();
     }
 
     /// How far a step leads beyond the end of the interval.
@@ -202,12 +204,10 @@ impl<T: Real> Walk<T> {
             }
             Failure::Rough(factor) => factor,
             Failure::Diverges | Failure::NotFinite => {
-                self.troubles += 1;
                 self.order.unexpected = true;
                 0.5
             }
         };
-        self.pivoted = self.troubles >= TROUBLES;
         self.again(factor);
     }
 
@@ -239,6 +239,7 @@ impl<T: Real> Walk<T> {
         let size = self.h.to_f64().abs();
         self.starting = self.starting && factor > LONGER;
         self.accepted = Some(self.h);
+        self.longest_so_far = self.longest_so_far.max(self.h.abs());
         (self.t, self.current) = (end, false);
         self.convergence.fresh = false;
         let mut next = (size * factor).min(self.longest);

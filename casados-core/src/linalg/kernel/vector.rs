@@ -1,6 +1,6 @@
 //! The inner loops.
 
-use crate::scalar::{Field, Lanes};
+use crate::scalar::{Field, Lanes, Real};
 
 /// `y += a x`
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -8,6 +8,24 @@ pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y = *y + a * *x;
     }
+}
+
+/// `aᵀ b`
+#[inline(always)]
+pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    // Four sums, which the compiler may compute side by side.
+    let mut sums = [T::ZERO; 4];
+    let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
+    let (chunks, rest) = a.as_chunks::<4>();
+    let (others, more) = b.as_chunks::<4>();
+    for (a, b) in chunks.iter().zip(others) {
+        for ((sum, &a), &b) in sums.iter_mut().zip(a).zip(b) {
+            *sum = *sum + a * b;
+        }
+    }
+    let [a0, a1, a2, a3] = sums;
+    let sum = (a0 + a1) + (a2 + a3);
+    rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
 }
 
 /// `x /= a`

@@ -92,7 +92,7 @@ macro_rules! widest_register {
 pub(crate) use widest_register;
 
 /// Runs a computation on slices in a function that is compiled for the registers. These functions
-/// are long: each number type has them for the registers that pay (record 0089).
+/// are long: each number type has them for the registers that pay.
 macro_rules! packed_registers {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline]

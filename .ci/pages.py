@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+"""Links of Markdown pages lead to files and headings, and every decision record is listed.
+
+Links to other sites are left out.
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)", re.MULTILINE)
+FENCE = re.compile(r"^ *```.*?^ *```", re.MULTILINE | re.DOTALL)
+
+
+def anchors(text):
+    """The fragments of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", FENCE.sub("", text), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def broken(path):
+    """Links of the page that lead nowhere."""
+    text = FENCE.sub("", path.read_text())
+    for link in (first or second for first, second in LINK.findall(text)):
+        if re.match(r"[a-z]+:", link) or link.startswith("crate::"):
+            continue
+        file, _, fragment = link.partition("#")
+        target = path.parent / file if file else path
+        if not target.exists():
+            yield link
+        elif fragment and target.suffix == ".md" and fragment not in anchors(target.read_text()):
+            yield link
+
+
+def main():
+    listed = subprocess.run(["git", "ls-files", "*.md"], check=True, capture_output=True, text=True)
+    bad = [f"{name}: {link}" for name in listed.stdout.split() for link in broken(Path(name))]
+    index = Path("docs/decisions/README.md").read_text()
+    bad += [f"{record} is not listed" for record in Path("docs/decisions").glob("0*.md") if record.name not in index]
+    print("\n".join(bad), end="\n" if bad else "")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

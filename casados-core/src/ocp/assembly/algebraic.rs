@@ -1,0 +1,186 @@
+//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the
+//! integrator, `z = ζ(x, u, p)`.
+//!
+//! With `L = l + μᵀg` and `ν = ∂L/∂z`:
+//!
+//! ```text
+//! ∇L = L_v + Zᵀν        ∇²L = [I; Z]ᵀ L'' [I; Z] + Σ_j ν_j ∇²ζ_j        v = (x, u), Z = ∂ζ/∂v
+//! ```
+//!
+//! The last term comes from the integrator, which is told `ν` for it, as it is told `π` for that of
+//! the dynamics.
+
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::{At, Cost};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::functions::point::Cross;
+use crate::ocp::formulation::functions::point::{Terms, read};
+use crate::ocp::formulation::instance::data::{Node, inputs, is_algebraic, kept, sizes, split};
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::element::get;
+use crate::qp::{StageDims, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+/// Keeps what an interval says about the algebraic states at its start.
+pub(in crate::ocp) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &IntervalResult<'_, T>) {
+    let [n, nz] = sizes::<S>();
+    if nz == 0 {
+        return;
+    }
+    let (z, rows) = part_mut(all, k * kept::<S>(), kept::<S>()).split_at_mut_checked(nz).unwrap_or_default();
+    crate::qp::assign(z, step.z);
+    let [dx, du, _] = step.dz;
+    for (j, column) in dx.chunks_exact(nz).chain(du.chunks_exact(nz)).enumerate() {
+        for (i, &value) in column.iter().enumerate() {
+            if let Some(element) = rows.get_mut(i * n + j) {
+                *element = value;
+            }
+        }
+    }
+}
+
+/// What was kept of a stage: nothing of the last one.
+pub(in crate::ocp) fn at<S: Shape, T>(all: &[T], k: usize) -> (&[T], &[T]) {
+    part(all, k * kept::<S>(), kept::<S>()).split_at_checked(S::NZ).unwrap_or_default()
+}
+
+/// Derivatives of a stage over `(x, u, z)`.
+pub(in crate::ocp) struct Extended<'a, T> {
+    pub(in crate::ocp) terms: Terms<'a, T>,
+    /// Of the constraints, `ld` apart as columns of the Hessian are.
+    pub(in crate::ocp) columns: &'a mut [T],
+}
+
+impl<'a, T: Real> Extended<'a, T> {
+    /// Zeros; nothing if there are no algebraic states.
+    pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T]) -> Self {
+        memory.fill(T::ZERO);
+        let [n, nz] = sizes::<S>();
+        let ld = n + nz;
+        let (gradient, rest) = memory.split_at_mut_checked(ld).unwrap_or_default();
+        let (hessian, columns) = rest.split_at_mut_checked(ld * ld).unwrap_or_default();
+        Self { terms: Terms { gradient, hessian, ld }, columns }
+    }
+
+    /// An element of the symmetric Hessian.
+    fn hessian(&self, i: usize, j: usize) -> T {
+        get(self.terms.hessian, i.min(j) * self.terms.ld + i.max(j))
+    }
+
+    /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of
+    /// the constraints it is all there is.
+    pub(in crate::ocp) fn fold<S: Shape>(
+        &self,
+        dz: &[T],
+        to: &mut Terms<'_, T>,
+        columns: &mut [T],
+        ld: usize,
+    ) {
+        let [n, _] = sizes::<S>();
+        let rows = || dz.chunks_exact(n.max(1)).enumerate();
+        // `a_j + Σ_i a_zi ∂z_i/∂v_j`
+        let total = |a: &dyn Fn(usize) -> T, j: usize| {
+            rows().fold(a(j), |sum, (i, row)| sum + a(n + i) * get(row, j))
+        };
+        for j in 0..n {
+            to.slope(j, total(&|i| get(self.terms.gradient, i), j));
+            for i in j..n {
+                // Column j of `H [I; Z]`, and then row i of `[I Zᵀ]` times it.
+                let column = |row: usize| total(&|l| self.hessian(row, l), j);
+                to.curve(i, j, total(&column, i));
+            }
+        }
+        let mine = self.columns.chunks_exact(self.terms.ld.max(1));
+        for (mine, column) in mine.zip(columns.chunks_exact_mut(ld.max(1))) {
+            for (j, element) in column.iter_mut().enumerate().take(n) {
+                *element = total(&|i| get(mine, i), j);
+            }
+        }
+    }
+
+    /// Adds what parameters do through `z` as well: `dz` as in [`Extended::fold`], `dp` the columns
+    /// of `∂z/∂p`, `direct` what they do over `(x, u, z)` where `z` stays, and `slopes` the rows of
+    /// `∂g/∂p`.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn fold_parameters<S: Shape>(
+        &self,
+        [dz, dp]: [&[T]; 2],
+        direct: &[T],
+        to: &mut Cross<'_, T>,
+        slopes: &mut [T],
+    ) {
+        let [n, nz] = sizes::<S>();
+        let parameters = || direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate();
+        for (p, (direct, dp)) in parameters() {
+            let through = |i: usize| {
+                dp.iter().enumerate().fold(get(direct, i), |sum, (l, &dp)| sum + self.hessian(i, n + l) * dp)
+            };
+            for (l, &slope) in dp.iter().enumerate() {
+                to.slope(p, get(self.terms.gradient, n + l) * slope);
+            }
+            for (q, (other, dq)) in parameters() {
+                let products = dq.iter().zip(dp).enumerate();
+                let sum = products
+                    .fold(T::ZERO, |sum, (l, (&dq, &dp))| sum + dq * through(n + l) + get(other, n + l) * dp);
+                to.curve(q, p, sum);
+            }
+            for j in 0..n {
+                let rows = dz.chunks_exact(n.max(1)).enumerate();
+                to.add(j, p, rows.fold(through(j), |sum, (i, row)| sum + through(n + i) * get(row, j)));
+            }
+            let mine = self.columns.chunks_exact(self.terms.ld.max(1));
+            for (mine, slopes) in mine.zip(slopes.chunks_exact_mut(S::NP.max(1))) {
+                if let Some(slope) = slopes.get_mut(p) {
+                    *slope = dp.iter().enumerate().fold(*slope, |sum, (l, &dp)| sum + get(mine, n + l) * dp);
+                }
+            }
+        }
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states
+    /// themselves are simulated for them, where they are not known from a line search. Nothing
+    /// where nothing depends on these.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub(in crate::ocp) fn weigh(&mut self) -> Result<(), OcpError> {
+        if const { !is_algebraic::<P, T>() } {
+            return Ok(());
+        }
+        let intervals = self.intervals();
+        let (n, nz) = (inputs::<P::Shape>(), P::Shape::NZ);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
+        let (v, multipliers) = self.iterate.vectors();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = Nodes { step_length: self.step_length, ..nodes };
+        if !core::mem::take(&mut self.has_algebraic) {
+            dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
+        }
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, _) = at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [stage.x, z, stage.u, node.p], node.time);
+            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
+            let place = At { stage: k, factor: node.factor, exact: false, from: &[] };
+            stage_cost.add(&point, node.reference, place, &mut terms)?;
+            path.linearise(&point, &mut [], columns, terms.ld, k)?;
+            for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
+                *nu = get(terms.gradient, n + j);
+                let mu = stage.g_upper.iter().zip(stage.g_lower);
+                for ((&upper, &lower), column) in mu.zip(columns.chunks_exact(terms.ld.max(1))) {
+                    *nu = *nu + (upper - lower) * get(column, n + j);
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,275 @@
+//! Hessians of stages made positive definite, each for itself: what the Riccati recursion needs
+//! keeps its structure.
+
+use crate::qp::part_mut;
+use crate::scalar::Real;
+
+/// What is done with the Hessian of a stage that is not positive definite.
+///
+/// ```
+/// use casados::ocp::{Convexification, Exact, GaussNewton};
+///
+/// assert_eq!(Exact::default().convexification, Convexification::Reduced);
+/// assert_eq!(GaussNewton::default().convexification, Convexification::Project);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Convexification {
+    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and
+    /// bounds leave, a multiple of the identity is added to all of them, as little as it takes (A.
+    /// Wächter, L. T. Biegler, "On the implementation of an interior-point filter line-search
+    /// algorithm for large-scale nonlinear programming", Math. Program. 106, 2006, section 3.1).
+    /// Near a solution with second-order sufficient conditions nothing is added, and convergence is
+    /// quadratic. This is what [`Sqp`](crate::ocp::Sqp) does; a QP without it is that of `None`.
+    Reduced,
+    /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP
+    /// says if it is not.
+    None,
+    /// Eigenvalues that are too small become a small positive number.
+    #[default]
+    Project,
+    /// Eigenvalues get the sign plus.
+    Mirror,
+    /// A multiple of the identity is added, as large as it takes (Levenberg and Marquardt).
+    LevenbergMarquardt,
+}
+
+/// Eigenvalues are at least this, relative to the largest element.
+const LEAST: f64 = 1e-6;
+/// Sweeps of Jacobi's method; it converges quadratically.
+const SWEEPS: usize = 30;
+
+/// Makes a matrix positive definite, whose lower triangle lies column after column, `ld` apart.
+/// `scratch` has room for two such matrices and a vector.
+pub(in crate::ocp) fn convexify<T: Real>(
+    method: Convexification,
+    h: &mut [T],
+    ld: usize,
+    n: usize,
+    scratch: &mut [T],
+) {
+    if matches!(method, Convexification::None | Convexification::Reduced) || n == 0 {
+        return;
+    }
+    let mut largest = T::ZERO;
+    for (j, column) in h.chunks_exact(ld.max(1)).take(n).enumerate() {
+        for &value in column.get(j..n).unwrap_or_default() {
+            largest = value.abs().max(largest);
+        }
+    }
+    let least = T::from_f64(LEAST) * if largest > T::ZERO { largest } else { T::ONE };
+    let (work, rest) = scratch.split_at_mut_checked(n * ld).unwrap_or_default();
+    if is_positive(h, ld, n, least, work) {
+        return;
+    }
+    if method == Convexification::LevenbergMarquardt {
+        let mut shift = least;
+        // The shift cannot be more than the sum of a row, which `n` times the largest element
+        // bounds.
+        while !is_positive_shifted(h, ld, n, least, shift, work) {
+            shift = shift * T::from_f64(4.0);
+            if !shift.is_finite() {
+                return;
+            }
+        }
+        for j in 0..n {
+            if let Some(d) = h.get_mut(j * ld + j) {
+                *d = *d + shift;
+            }
+        }
+        return;
+    }
+    let vectors = part_mut(rest, 0, n * ld);
+    for (j, (column, to)) in h.chunks_exact(ld).take(n).zip(work.chunks_exact_mut(ld)).enumerate() {
+        for (to, &value) in to.iter_mut().zip(column).skip(j) {
+            *to = value;
+        }
+    }
+    for j in 0..n {
+        for i in 0..j {
+            let value = get(work, ld, j, i);
+            set(work, ld, i, j, value);
+        }
+    }
+    vectors.fill(T::ZERO);
+    (0..n).for_each(|j| set(vectors, ld, j, j, T::ONE));
+    diagonalise(work, vectors, ld, n);
+    for (j, column) in h.chunks_exact_mut(ld).take(n).enumerate() {
+        for target in column.iter_mut().take(n).skip(j) {
+            *target = T::ZERO;
+        }
+    }
+    for k in 0..n {
+        let value = get(work, ld, k, k);
+        let value = if method == Convexification::Mirror { value.abs() } else { value };
+        let value = if value > least { value } else { least };
+        let vector = vectors.get(k * ld..).unwrap_or_default();
+        for (j, (column, &vj)) in h.chunks_exact_mut(ld).zip(vector.iter().take(n)).enumerate() {
+            for (target, &vi) in column.iter_mut().zip(vector).take(n).skip(j) {
+                *target = *target + value * vi * vj;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn get<T: Real>(a: &[T], ld: usize, row: usize, column: usize) -> T {
+    a.get(column * ld + row).copied().unwrap_or(T::ZERO)
+}
+
+#[inline(always)]
+fn set<T: Real>(a: &mut [T], ld: usize, row: usize, column: usize, value: T) {
+    if let Some(element) = a.get_mut(column * ld + row) {
+        *element = value;
+    }
+}
+
+fn is_positive<T: Real>(h: &[T], ld: usize, n: usize, least: T, work: &mut [T]) -> bool {
+    is_positive_shifted(h, ld, n, least, T::ZERO, work)
+}
+
+/// Whether the pivots of Cholesky's factorisation of `H + shift I` are no smaller than that.
+fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T, work: &mut [T]) -> bool {
+    for (j, (column, to)) in h.chunks_exact(ld).take(n).zip(work.chunks_exact_mut(ld)).enumerate() {
+        for (i, (to, &value)) in to.iter_mut().zip(column).enumerate().take(n).skip(j) {
+            *to = if i == j { value + shift } else { value };
+        }
+    }
+    for k in 0..n {
+        let pivot = get(work, ld, k, k);
+        // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for
+        // rounding.
+        let is_positive = pivot > T::from_f64(0.5) * least;
+        if !is_positive {
+            return false;
+        }
+        let Some((left, right)) = work.split_at_mut_checked((k + 1) * ld) else { return true };
+        let column = left.get(k * ld..).unwrap_or_default();
+        for (j, target) in right.chunks_exact_mut(ld).enumerate().take(n - k - 1) {
+            let j = k + 1 + j;
+            let factor = column.get(j).map_or(T::ZERO, |&c| c / pivot);
+            if factor == T::ZERO {
+                continue;
+            }
+            for (target, &c) in target.iter_mut().zip(column).take(n).skip(j) {
+                *target = *target - factor * c;
+            }
+        }
+    }
+    true
+}
+
+/// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its
+/// eigenvectors.
+pub(in crate::ocp) fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
+    let small = T::from_f64(T::EPSILON);
+    for _ in 0..SWEEPS {
+        let mut off = T::ZERO;
+        let mut diagonal = T::ZERO;
+        for j in 0..n {
+            diagonal = get(a, ld, j, j).abs().max(diagonal);
+            for i in 0..j {
+                off = get(a, ld, i, j).abs().max(off);
+            }
+        }
+        let is_full = off > small * diagonal;
+        if !is_full {
+            return;
+        }
+        for q in 1..n {
+            for p in 0..q {
+                let apq = get(a, ld, p, q);
+                if apq == T::ZERO {
+                    continue;
+                }
+                let theta = (get(a, ld, q, q) - get(a, ld, p, p)) / (apq + apq);
+                let t = T::ONE / (theta.abs() + (theta * theta + T::ONE).sqrt());
+                let t = if theta < T::ZERO { -t } else { t };
+                let c = T::ONE / (t * t + T::ONE).sqrt();
+                rotate_columns(a, ld, n, [p, q], [c, t * c]);
+                rotate_rows(a, ld, n, [p, q], [c, t * c]);
+                rotate_columns(vectors, ld, n, [p, q], [c, t * c]);
+            }
+        }
+    }
+}
+
+fn rotate_columns<T: Real>(a: &mut [T], ld: usize, n: usize, [p, q]: [usize; 2], [c, s]: [T; 2]) {
+    let Some((left, right)) = a.split_at_mut_checked(q * ld) else { return };
+    let first = left.get_mut(p * ld..).unwrap_or_default();
+    for (x, y) in first.iter_mut().zip(right).take(n) {
+        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
+    }
+}
+
+fn rotate_rows<T: Real>(a: &mut [T], ld: usize, n: usize, [p, q]: [usize; 2], [c, s]: [T; 2]) {
+    for column in a.chunks_exact_mut(ld).take(n) {
+        let (Some(&x), Some(&y)) = (column.get(p), column.get(q)) else { return };
+        if let Some(target) = column.get_mut(p) {
+            *target = c * x - s * y;
+        }
+        if let Some(target) = column.get_mut(q) {
+            *target = s * x + c * y;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SMatrix;
+
+    const N: usize = 5;
+    const LD: usize = 8;
+
+    /// Symmetric, with eigenvalues that are known.
+    fn matrix(values: [f64; N]) -> SMatrix<f64, N, N> {
+        let a = SMatrix::<f64, N, N>::from_fn(|i, j| ((3 * i + 7 * j * j + 1) as f64).sin());
+        let q = a.qr().q();
+        q * SMatrix::from_diagonal(&values.into()) * q.transpose()
+    }
+
+    fn run(method: Convexification, a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+        // What is not the lower triangle must not be read.
+        let mut h = [f64::NAN; N * LD];
+        for j in 0..N {
+            for i in j..N {
+                h[j * LD + i] = a[(i, j)];
+            }
+        }
+        let mut scratch = [0.0; (2 * N + 1) * LD];
+        convexify(method, &mut h, LD, N, &mut scratch);
+        SMatrix::from_fn(|i, j| h[i.min(j) * LD + i.max(j)])
+    }
+
+    /// Rotations of 5×5 matrices of size 4: some hundred roundings of 1e-15.
+    const TOLERANCE: f64 = 1e-13;
+
+    #[test]
+    fn positive_definite_matrices_stay_as_they_are() {
+        let a = matrix([4.0, 3.0, 2.0, 1.0, 0.5]);
+        for method in [Convexification::Project, Convexification::Mirror, Convexification::LevenbergMarquardt]
+        {
+            // Both triangles of what was given: it is symmetric but for rounding.
+            let lower = SMatrix::<f64, N, N>::from_fn(|i, j| a[(i.max(j), i.min(j))]);
+            assert_eq!(run(method, &a), lower);
+        }
+    }
+
+    #[test]
+    fn eigenvalues_are_projected_mirrored_or_shifted() {
+        let values = [4.0, -2.0, 1.0, 0.0, -0.5];
+        let a = matrix(values);
+        let least = LEAST * a.amax();
+        let projected = matrix(values.map(|value| value.max(least)));
+        let mirrored = matrix(values.map(|value: f64| value.abs().max(least)));
+        assert!((run(Convexification::Project, &a) - projected).amax() < TOLERANCE);
+        assert!((run(Convexification::Mirror, &a) - mirrored).amax() < TOLERANCE);
+        let shifted = run(Convexification::LevenbergMarquardt, &a) - a;
+        let shift = shifted[(0, 0)];
+        // As large as it takes, and not four times that.
+        assert!(shift > 2.0 && shift < 4.0 * 2.1);
+        assert!((shifted - SMatrix::identity() * shift).amax() < TOLERANCE);
+        assert!((run(Convexification::None, &a) - a).amax() < TOLERANCE);
+    }
+}

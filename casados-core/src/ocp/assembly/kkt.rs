@@ -1,0 +1,143 @@
+//! The conditions of optimality at a point: those of the problem where the QP was written at this
+//! point.
+
+use crate::qp::{
+    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, is_marked,
+    larger, marked, pad, part, part_mut, scale, subtract, subtract_column, symmetric,
+};
+use crate::scalar::{Packed, Real, Registers, compiled};
+
+/// The residuals, and penalties of soft bounds. Residuals as in
+/// [`qp::residuals`](crate::qp::residuals), which goes element by element and needs no scratch,
+/// here with room for three vectors over `(x, u)`.
+pub(in crate::ocp) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    qp: QpView<'_, T>,
+    at: &Solution<T, D, M>,
+    scratch: &mut [T],
+) -> (Residuals, f64) {
+    let mut result = Default::default();
+    T::compiled::<Conditions>(Kkt { qp, at: at.borrowed(), scratch, result: &mut result });
+    result
+}
+
+/// A point that others own.
+type Point<'a, T> = Solution<T, &'a [StageDims], &'a [T]>;
+
+/// See [`residuals`].
+struct Kkt<'a, T: Real> {
+    qp: QpView<'a, T>,
+    at: Point<'a, T>,
+    scratch: &'a mut [T],
+    result: &'a mut (Residuals, f64),
+}
+
+compiled! {
+    /// See [`residuals`].
+    Conditions: Kkt<'r, T>
+}
+
+impl<T: Real> Registers<T> for Kkt<'_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        *self.result = conditions::<T, E>(self.qp, &self.at, self.scratch);
+    }
+}
+
+#[inline(always)]
+fn conditions<T: Real, E: Packed<T>>(
+    qp: QpView<'_, T>,
+    at: &Point<'_, T>,
+    scratch: &mut [T],
+) -> (Residuals, f64) {
+    let mut residuals = Residuals::default();
+    let mut penalties = 0.0;
+    let mut arriving: &[T] = &[];
+    let (periodic, shared) = (qp.periodic(), qp.shared());
+    let (first, last) = (qp.dims().first().copied().unwrap_or_default(), qp.dims().len().saturating_sub(1));
+    let ld = pad::<T>(first.nx + first.nu);
+    let (scratch, joint) = scratch.split_at_mut_checked(2 * ld).unwrap_or_default();
+    let joint = part_mut(joint, 0, ld);
+    joint.fill(T::ZERO);
+    let (all, _) = at.vectors();
+    let mut begin = 0;
+    let mut stages = at.stages().peekable();
+    for (k, stage) in qp.stages().enumerate() {
+        let Some(point) = stages.next() else { break };
+        let next = stages.peek().map_or(&[][..], |next| next.x);
+        let view = stage.arrays();
+        // What is padding is zero.
+        let (n, ld) = (view.n, view.ld);
+        let v = part(all, begin, ld);
+        begin += ld;
+        let (sum, rest) = scratch.split_at_mut_checked(ld).unwrap_or_default();
+        let gap = part_mut(rest, 0, view.next);
+        let matrix = Columns { data: view.matrix, ld };
+        for ((gap, &offset), &x) in gap.iter_mut().zip(view.offset).zip(next) {
+            *gap = offset - x;
+        }
+        add_transposed::<T, E>(gap, matrix, v, n, view.next);
+        for &gap in &*gap {
+            grow(&mut residuals.dynamics, gap);
+        }
+        // The gradient with another sign.
+        assign(sum, view.gradient);
+        symmetric::<T, E>(sum, view.hessian, ld, v, n);
+        scale::<T, E>(sum, -T::ONE);
+        subtract::<T, E>(sum, matrix, point.dynamics, n, view.next);
+        let columns = view.matrix.chunks_exact(ld.max(1)).skip(view.next);
+        for ((&upper, &lower), column) in point.g_upper.iter().zip(point.g_lower).zip(columns) {
+            subtract_column::<T, E>(sum, upper - lower, column);
+        }
+        for (sum, &pi) in sum.iter_mut().zip(arriving) {
+            *sum = *sum + pi;
+        }
+        let upper = point.x_upper.iter().chain(point.u_upper);
+        let lower = point.x_lower.iter().chain(point.u_lower);
+        let nx = point.x.len();
+        for (i, ((&sum, &upper), &lower)) in sum.iter().zip(upper).zip(lower).enumerate() {
+            let residual = sum + lower - upper;
+            // Of variables that are one the sum counts.
+            let is_joint = match i.checked_sub(nx) {
+                None => (k == 0 || k == last) && is_marked(periodic, i),
+                Some(j) => is_marked(shared, j),
+            };
+            match joint.get_mut(i).filter(|_| is_joint) {
+                None => grow(&mut residuals.stationarity, residual),
+                Some(joint) => *joint = *joint + residual,
+            }
+        }
+        let value = |values: &[T], i: usize| values.get(i).map_or(0.0, |x| x.to_f64());
+        let g = |i: usize| dot::<T, E>(part(view.matrix, (view.next + i) * ld, ld), v).to_f64();
+        let (x, u) = (|i| value(point.x, i), |i| value(point.u, i));
+        penalties += bound_residuals(&stage.x_bounds(), x, point.x_lower, point.x_upper, &mut residuals);
+        penalties += bound_residuals(&stage.u_bounds(), u, point.u_lower, point.u_upper, &mut residuals);
+        penalties += bound_residuals(&stage.g_bounds(), g, point.g_lower, point.g_upper, &mut residuals);
+        arriving = point.dynamics;
+    }
+    if qp.is_coupled() {
+        joint_residuals(qp, at, joint, &mut residuals);
+    }
+    (residuals, penalties)
+}
+
+/// Residuals of variables that are one, from the sums of their gradients.
+fn joint_residuals<T: Real>(qp: QpView<'_, T>, at: &Point<'_, T>, joint: &[T], residuals: &mut Residuals) {
+    let mut stages = at.stages();
+    let (Some(first), last) = (stages.next(), stages.next_back()) else { return };
+    joint.iter().for_each(|&sum| grow(&mut residuals.stationarity, sum));
+    let get = |values: &[T], i: usize| values.get(i).copied().unwrap_or(T::ZERO);
+    for i in marked(qp.periodic()) {
+        grow(&mut residuals.dynamics, get(first.x, i) - last.map_or(T::ZERO, |last| get(last.x, i)));
+    }
+    for j in marked(qp.shared()) {
+        for &u in at.stages().filter_map(|stage| stage.u.get(j)) {
+            grow(&mut residuals.dynamics, u - get(first.u, j));
+        }
+    }
+}
+
+/// The larger size; NaN stays.
+#[inline(always)]
+pub(in crate::ocp) fn grow<T: Real>(largest: &mut f64, value: T) {
+    *largest = larger(*largest, value.abs().to_f64());
+}

@@ -1,0 +1,349 @@
+//! The QP at an iterate.
+
+use crate::linalg::dot;
+use crate::ocp::assembly::algebraic::{self, Extended};
+use crate::ocp::assembly::convexify::convexify;
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::assembly::transfer::Left;
+use crate::ocp::formulation::arrival;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::{At, Cost};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
+use crate::ocp::formulation::functions::point::{Terms, read};
+use crate::ocp::formulation::instance::data::{Node, inputs, split};
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
+    /// programming.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
+        self.linearise_watched(curvature, &mut |_, _| {})
+    }
+
+    /// [`Ocp::linearise`], and shows every interval to `watch`.
+    pub(in crate::ocp) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        watch: Sink<'_, T>,
+    ) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        let mut left = Left { plain: !C::EXACT, adding: false };
+        let sums = self.linearise_intervals(curvature, |k, step, stage, at| {
+            left.transfer::<P, C, T>(step, stage, at);
+            watch(k, step);
+        })?;
+        let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
+            if !(left.adding && k < intervals) {
+                hessian.fill(T::ZERO);
+                gradient.fill(T::ZERO);
+            }
+        })?;
+        self.complete_gradients(curvature, left.plain);
+        self.add_arrival(false);
+        self.keep_sums(sums, costs);
+        Ok(())
+    }
+
+    /// Dynamics and integral costs, all intervals in one call: each goes `to` its stage, with its
+    /// start and its multipliers. The sums of their costs, and of what lifted stages have left.
+    pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, [&[T]; 2]),
+    ) -> Result<Sums<T>, OcpError> {
+        self.check()?;
+        if C::EXACT {
+            self.weigh()?;
+        }
+        let (intervals, nx, ld) = (self.intervals(), P::Shape::NX, ld_of::<P::Shape, T>());
+        let Self { problem, qp, iterate, data, step_length, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let (v, multipliers) = iterate.vectors();
+        let weights = if C::EXACT { &*data.weights } else { &[] };
+        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
+        let nodes = Nodes { step_length: *step_length, ..nodes };
+        let mut stages = qp.stages_mut();
+        let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
+        let Problem { dynamics, .. } = problem.parts();
+        curvature.run(dynamics, &nodes, &mut |k, step: &IntervalResult<'_, T>| {
+            let Some(mut stage) = stages.next() else { return };
+            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            objective = objective + step.cost.value;
+            if P::Dynamics::LIFTED {
+                left = add_stages(left, step.stages);
+            }
+            to(k, step, stage.arrays(), [part(v, k * ld, ld), part(multipliers, k * pad::<T>(nx), nx)]);
+        })?;
+        Ok((objective, left))
+    }
+
+    /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
+    pub(in crate::ocp) fn add_arrival(&mut self, at_iterate: bool) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let x0 = self.iterate.stages().next().filter(|_| at_iterate).map_or(&[][..], |first| first.x);
+        arrival::add(data.arrival, x0, &mut self.qp);
+    }
+
+    /// The objective at the iterate, of intervals and `costs` at nodes.
+    pub(in crate::ocp) fn keep_sums(&mut self, (objective, stages): Sums<T>, costs: T) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        self.objective = objective + costs + arrival::cost(data.arrival, &self.iterate);
+        self.stages = stages;
+    }
+
+    /// Costs and constraints at nodes, stage by stage, added to Hessians and gradients with which
+    /// each `begin`s; the costs. Where stages have nothing else, they are `plain`.
+    pub(in crate::ocp) fn linearise_functions<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        plain: bool,
+        begin: impl Fn(usize, &mut [T], &mut [T]),
+    ) -> Result<T, OcpError> {
+        let intervals = self.intervals();
+        let Self { problem, qp, iterate, data, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
+        let (v, _) = iterate.vectors();
+        let mut objective = T::ZERO;
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
+            let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
+            begin(k, hessian, gradient);
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            let mut direct = Terms { gradient, hessian, ld };
+            let columns = matrix.get_mut(next * ld..).unwrap_or_default();
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let from = if plain && is_direct::<P, T>(k == intervals, z) { here } else { &[] };
+            // Where there are algebraic states, over them too.
+            let is_extended = !z.is_empty();
+            let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
+            let (terms, slopes, ld_slopes) = if is_extended {
+                let ld = room.terms.ld;
+                (&mut room.terms, &mut *room.columns, ld)
+            } else {
+                (&mut direct, &mut *columns, ld)
+            };
+            // Values lie where the lower bounds are written afterwards.
+            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
+            let values = lower.get_mut(ld..).unwrap_or_default();
+            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let values = part_mut(values, 0, count);
+            let place = At { stage: k, factor: node.factor, exact: C::EXACT, from };
+            // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
+            let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
+            for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+                *mu = upper - lower;
+            }
+            if k < intervals {
+                objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
+                path.linearise(&point, values, slopes, ld_slopes, k)?;
+                if !mu.is_empty() {
+                    path.curve(&point, mu, terms);
+                }
+            } else {
+                objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
+                terminal.linearise(&point, values, slopes, ld_slopes, k)?;
+                if !mu.is_empty() {
+                    terminal.curve(&point, mu, terms);
+                }
+            }
+            if is_extended {
+                room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
+            }
+            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, k * P::Path::ROWS, count));
+            shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
+        }
+        Ok(objective)
+    }
+
+    /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
+    /// complete.
+    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, plain: bool) {
+        let intervals = self.intervals();
+        let Self { qp, iterate, data, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let (v, _) = iterate.vectors();
+        let ld = ld_of::<P::Shape, T>();
+        for (k, mut stage) in qp.stages_mut().enumerate() {
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            if plain && is_direct::<P, T>(k == intervals, z) {
+                continue;
+            }
+            let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
+            let convex =
+                if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX } && !C::EXACT;
+            if !convex {
+                convexify(curvature.convexification(), hessian, stage_ld, n, data.scratch);
+            }
+            let product = part_mut(data.scratch, 0, stage_ld);
+            product.fill(T::ZERO);
+            add_symmetric(product, hessian, stage_ld, part(v, k * ld, stage_ld), n);
+            for (gradient, &product) in gradient.iter_mut().zip(&*product) {
+                *gradient = *gradient - product;
+            }
+        }
+    }
+
+    /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
+    pub(in crate::ocp) fn forget_gradients(&mut self) {
+        let (v, _) = self.iterate.vectors();
+        let mut begin = 0;
+        for mut stage in self.qp.stages_mut() {
+            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
+            gradient.fill(T::ZERO);
+            add_symmetric(gradient, hessian, ld, part(v, begin, ld), n);
+            gradient.iter_mut().for_each(|g| *g = T::ZERO - *g);
+            begin += ld;
+        }
+    }
+
+    /// Adds `½ δ ‖v − v̄‖²` to the objective of the QP at the iterate `v̄`.
+    pub(in crate::ocp) fn regularise(&mut self, delta: T) {
+        let (v, _) = self.iterate.vectors();
+        let mut begin = 0;
+        for mut stage in self.qp.stages_mut() {
+            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
+            let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
+            for ((h, gradient), &v) in diagonal.zip(gradient).zip(part(v, begin, n)) {
+                *h = *h + delta;
+                *gradient = *gradient - delta * v;
+            }
+            begin += ld;
+        }
+    }
+
+    /// How well the iterate satisfies the conditions of optimality of the problem, and the
+    /// objective with penalties of soft bounds; after [`Ocp::linearise`].
+    #[must_use]
+    pub fn residuals(&mut self) -> (Residuals, f64) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let (mut residuals, penalties) =
+            crate::ocp::assembly::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        if P::Dynamics::LIFTED {
+            let [_, stages] = self.stages;
+            residuals.dynamics = larger(residuals.dynamics, stages.to_f64());
+        }
+        (residuals, self.objective.to_f64() + penalties)
+    }
+
+    /// The objective at some point, without penalties; and what is left of its dynamics and
+    /// constraints in `ends`: `φ` of every interval, then `g` of every stage, in the layout of
+    /// [`Ocp::ends`].
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
+        let intervals = self.intervals();
+        let nx = P::Shape::NX;
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
+        let (v, multipliers) = at.vectors();
+        let mut objective = arrival::cost(data.arrival, at);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let (nodes, mut of_stages) = (Nodes { step_length: self.step_length, ..nodes }, [T::ZERO; 2]);
+        dynamics.simulate(&nodes, &mut |k, step: &IntervalResult<'_, T>| {
+            objective = objective + step.cost.value;
+            if P::Dynamics::LIFTED {
+                of_stages = add_stages(of_stages, step.stages);
+            }
+            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            assign(part_mut(ends, k * nx, nx), step.x);
+        })?;
+        let values = ends.get_mut(intervals * nx..).unwrap_or_default();
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, at) in at.stages().enumerate() {
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            if k < intervals {
+                objective = objective + node.factor * stage_cost.value(&point, node.reference, k)?;
+                path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
+            } else {
+                objective = objective + terminal_cost.value(&point, node.reference, k)?;
+                terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
+            }
+        }
+        self.stages = of_stages;
+        Ok(objective)
+    }
+
+    /// How many numbers `φ` of every interval and `g` of every stage are.
+    pub(crate) fn ends(&self) -> usize {
+        ends::<P, T>(self.qp.dims())
+    }
+
+    /// Rows of the path constraints.
+    pub(in crate::ocp) fn rows(&self) -> usize {
+        P::Path::ROWS
+    }
+
+    /// Constants of the linearised dynamics and constraints such that these are exact at some
+    /// point, whose `ends` are given: what a second-order correction solves.
+    pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
+        let intervals = self.intervals();
+        let (nx, path) = (P::Shape::NX, P::Path::ROWS);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let (v, _) = at.vectors();
+        let values = ends.get(intervals * nx..).unwrap_or_default();
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
+            for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
+                *offset = x - dot(column, here);
+            }
+            let columns = matrix.get(next * ld..).unwrap_or_default();
+            let first = k * path;
+            let count = if k < intervals { path } else { P::Terminal::ROWS };
+            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
+            let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
+            assign(lower, part(values, first, count));
+            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, first, count));
+            shift_limits(columns, [n, ld], here, [lower, upper], given);
+        }
+    }
+}
+
+/// The costs of all intervals, and what is left of the equations of lifted stages.
+type Sums<T> = (T, [T; 2]);
+
+/// Whether costs at a node write the gradient of the QP themselves, where nothing else is there.
+fn is_direct<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
+    let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
+    convex && z.is_empty()
+}
+
+/// Bounds of what is linear, `lg − g + [C D] v`, where the values `g` are.
+fn shift_limits<T: Real>(
+    columns: &[T],
+    [n, ld]: [usize; 2],
+    v: &[T],
+    [lower, upper]: [&mut [T]; 2],
+    [given_lower, given_upper]: [&[T]; 2],
+) {
+    let sides = lower.iter_mut().zip(upper).zip(given_lower.iter().zip(given_upper));
+    for (((lower, upper), (&low, &high)), column) in sides.zip(columns.chunks(ld.max(1))) {
+        let shift = dot(part(column, 0, n), v) - *lower;
+        (*lower, *upper) = (low + shift, high + shift);
+    }
+}
+
+/// How many numbers `φ` of every interval and `g` of every stage are.
+pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
+    dims.len().saturating_sub(1) * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
+}
+
+/// The distance of stages in vectors `v`.
+const fn ld_of<S: Shape, T>() -> usize {
+    pad::<T>(inputs::<S>())
+}

@@ -1,0 +1,13 @@
+//! The QP at an iterate: derivatives of intervals and functions, curvature, units, and the
+//! conditions of optimality.
+
+pub(in crate::ocp) mod algebraic;
+pub(in crate::ocp) mod convexify;
+pub(in crate::ocp) mod curvature;
+pub(in crate::ocp) mod kept_jacobians;
+pub(in crate::ocp) mod kkt;
+pub(in crate::ocp) mod linearise;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod program;
+pub(in crate::ocp) mod transfer;
+pub(in crate::ocp) mod units;

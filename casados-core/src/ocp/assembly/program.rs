@@ -1,0 +1,79 @@
+//! What is asked of a problem that is handed to others: to solvers of nonlinear programs, or as a
+//! solution.
+
+use crate::ocp::assembly::algebraic;
+#[cfg(feature = "casadi")]
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::Constraints;
+#[cfg(feature = "casadi")]
+use crate::ocp::formulation::functions::dynamics::Sink;
+#[cfg(feature = "casadi")]
+use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::{Node, split};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+#[cfg(feature = "casadi")]
+use crate::qp::Arrays;
+use crate::qp::{StageDims, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Derivatives at the iterate: those of intervals go to `watch`, those of costs and constraints
+    /// to the QP, with `∇f` as its gradient. `clear` makes zero what the Hessian of a stage has.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::linearise`].
+    #[cfg(feature = "casadi")]
+    pub(crate) fn linearise_apart<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        clear: &dyn Fn(usize, &mut [T]),
+        watch: Sink<'_, T>,
+    ) -> Result<(), OcpError> {
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let Arrays { hessian, gradient, .. } = stage.arrays();
+            clear(k, hessian);
+            gradient.fill(T::ZERO);
+        }
+        let sums =
+            self.linearise_intervals(curvature, |k, step, Arrays { ld, hessian, gradient, .. }, _| {
+                watch(k, step);
+                // The Hessian of what is integrated along is in that of the interval.
+                let (mut terms, slopes) =
+                    (Terms { gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
+                slopes.enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
+            })?;
+        let costs = self.linearise_functions::<C>(false, |_, _, _| {})?;
+        self.add_arrival(true);
+        self.keep_sums(sums, costs);
+        Ok(())
+    }
+
+    /// Where algebraic states are those of the iterate: `g` of every stage in `values`, and after
+    /// [`Ocp::linearise`] the objective without penalties.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    pub(crate) fn constraints(&mut self, values: &mut [T]) -> Result<T, OcpError> {
+        let intervals = self.intervals();
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { path, terminal, running, .. } = self.problem.parts();
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, at) in self.iterate.stages().enumerate() {
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            let values = values.get_mut(k * P::Path::ROWS..).unwrap_or_default();
+            if k < intervals {
+                path.value(&point, part_mut(values, 0, P::Path::ROWS), k)?;
+            } else {
+                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), k)?;
+            }
+        }
+        Ok(self.objective)
+    }
+}

@@ -1,0 +1,185 @@
+//! Units in which sizes are near one: of forces by the objective, of variables by guess and bounds,
+//! of constraints by their gradients.
+//!
+//! Iterates stay in the units of the problem. A constant of an algorithm is one in these units.
+//!
+//! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.8.
+
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::set;
+use crate::qp::interior::{at, is_first_fixed};
+use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, part, part_mut};
+use crate::scalar::Real;
+
+/// No unit is larger, or smaller than its inverse: squares of units are numbers.
+const FARTHEST: f64 = 1e12;
+/// Tolerances are those of the problem where units are up to this or its inverse.
+pub(in crate::ocp) const WIDE: f64 = 100.0;
+
+/// What is known of all units.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::ocp) struct Sizes {
+    /// The unit of forces.
+    pub force: f64,
+    /// The least unit of a row, at most one.
+    pub least: f64,
+}
+
+/// The units of a problem.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::ocp) struct Units<'a, T> {
+    pub sizes: Sizes,
+    /// Those of variables and constraints.
+    pub rows: &'a [T],
+}
+
+/// What a tolerance is multiplied by: the unit, but one from there to a hundredth of it.
+pub(in crate::ocp) fn of_tolerance(unit: f64) -> f64 {
+    unit.min(1.0).max(unit / WIDE)
+}
+
+/// The least and the largest of the sizes that something may have.
+#[derive(Clone, Copy)]
+struct Range {
+    least: f64,
+    most: f64,
+}
+
+impl Range {
+    const EMPTY: Self = Self { least: f64::INFINITY, most: 0.0 };
+
+    /// Zeros and infinite bounds say nothing.
+    fn add<T: Real>(&mut self, size: T) {
+        let size = size.abs().to_f64();
+        if size > 0.0 && size.is_finite() {
+            (self.least, self.most) = (self.least.min(size), self.most.max(size));
+        }
+    }
+
+    /// The number between least and most that is nearest to one; one where nothing is known.
+    fn unit<T: Real>(&self) -> T {
+        let Self { least, most } = *self;
+        let unit = if most == 0.0 { 1.0 } else { least.max(most.min(1.0)) };
+        T::from_f64(unit.clamp(1.0 / FARTHEST, FARTHEST))
+    }
+
+    /// The same; one where that is between a hundredth and a hundred.
+    fn unit_far_from_one<T: Real>(&self) -> T {
+        let unit = self.unit::<T>();
+        let wide = T::from_f64(WIDE);
+        if unit <= wide && unit * wide >= T::ONE { T::ONE } else { unit }
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// All units at the iterate, where the QP was written without second derivatives of
+    /// constraints.
+    ///
+    /// With a number for each row, and scratch over the variables of a stage.
+    pub(in crate::ocp) fn find_units(&self, rows: &mut [T], scratch: &mut [T]) -> Sizes {
+        rows.fill(T::ONE);
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let last = qp.dims.len().saturating_sub(1);
+        let variables = qp.dims.first().map_or(0, |dims| dims.nx + dims.nu);
+        for i in 0..variables {
+            units_of_variable(qp, v, i, rows);
+        }
+        let (path, terminal) = (0..last, last..last + 1);
+        for stages in [path, terminal] {
+            for i in 0..qp.dims.get(stages.start).map_or(0, |dims| dims.ng) {
+                units_of_row(qp, v, (stages.clone(), i), rows);
+            }
+        }
+        let force = unit_of_forces(qp, v, rows, scratch);
+        let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
+        Sizes { force, least: least.to_f64() }
+    }
+}
+
+/// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
+/// one.
+fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut [T]) {
+    let mut range = Range::EMPTY;
+    let mut guess = T::ZERO;
+    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(place, _)| i < place.n) {
+        guess = guess.max(at(v, (place.v + i) as u32).abs());
+        let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
+        let Bounds { lower, upper, .. } = bounds;
+        lower.get(i).into_iter().chain(upper.get(i)).for_each(|&bound| range.add(bound));
+        // Where zero is says nothing: of a temperature between 298 and 398 it is the room.
+        if let (Some(&lower), Some(&upper)) = (lower.get(i), upper.get(i)) {
+            range.add(upper - lower);
+        }
+    }
+    // Small guesses are as good as zero.
+    if range.most > 0.0 || guess > T::ONE {
+        range.add(guess);
+    }
+    let unit = range.unit_far_from_one();
+    for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
+        set(units, place.row + i, unit);
+    }
+}
+
+/// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
+fn units_of_row<T: Real>(
+    qp: QpView<'_, T>,
+    v: &[T],
+    (stages, i): (core::ops::Range<usize>, usize),
+    units: &mut [T],
+) {
+    let mut range = Range::EMPTY;
+    let (mut slope, mut distance) = (T::ZERO, T::ZERO);
+    for (place, stage) in
+        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
+    {
+        let view = stage.arrays();
+        let column = part(view.matrix, (place.next + i) * place.ld, place.ld);
+        let v = part(v, place.v, place.ld);
+        let mut value = T::ZERO;
+        for ((&g, &v), &unit) in column.iter().zip(v).zip(part(units, place.row, place.n)) {
+            value = value + g * v;
+            slope = slope.max((g * unit).abs());
+        }
+        let Bounds { lower, upper, .. } = stage.g_bounds();
+        let mut nearest = T::from_f64(f64::INFINITY);
+        for &bound in lower.get(i).into_iter().chain(upper.get(i)) {
+            nearest = nearest.min((value - bound).abs());
+        }
+        if nearest.is_finite() {
+            distance = distance.max(nearest);
+        }
+    }
+    range.add(slope);
+    range.add(distance);
+    let unit = range.unit_far_from_one();
+    for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
+        set(units, place.row + place.ld + i, unit);
+    }
+}
+
+/// The unit of forces: of the largest derivative of the objective by a variable, or what that
+/// changes by where the variable changes by a unit or by its size. At many guesses gradients
+/// vanish.
+fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
+    let (mut largest, fixed) = (T::ZERO, is_first_fixed(qp));
+    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+        let view = stage.arrays();
+        let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
+        assign(gradient, part(view.gradient, 0, place.ld));
+        add_symmetric(gradient, view.hessian, place.ld, v, place.n);
+        let curvatures = view.hessian.iter().step_by(place.ld + 1);
+        let given = if fixed && place.stage == 0 { place.nx } else { 0 };
+        let units = part(rows, place.row, place.n);
+        for (((&slope, &curvature), &v), &unit) in
+            gradient.iter().zip(curvatures).zip(v).zip(units).skip(given)
+        {
+            let change = curvature * v.abs().max(unit);
+            largest = largest.max(slope.abs() * unit).max(change.abs() * unit);
+        }
+    }
+    let mut range = Range::EMPTY;
+    range.add(largest);
+    range.unit::<T>().to_f64()
+}

@@ -1,0 +1,105 @@
+//! The equations of the stages of an interval, at stages that need not solve them.
+
+use crate::irk::{Coefficients, dot};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorX, VectorZ};
+use crate::ocp::formulation::functions::dynamics::Interval;
+use crate::qp::{assign, larger};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use bytemuck::Zeroable;
+
+/// Where stages lead to.
+pub(super) struct End<M: Dae, T: Real> {
+    /// The state at the end of the interval.
+    pub x: VectorX<M, T>,
+    /// The algebraic states at its start.
+    pub z0: VectorZ<M, T>,
+}
+
+/// An interval, from step to step.
+pub(super) struct Point<'a, M: Dae, T: Real, const S: usize> {
+    coefficients: &'a Coefficients<T, S>,
+    /// The state at the start of the step.
+    x: ArrayX<M, T>,
+    /// The variables at a stage.
+    v: ArrayV<M, T>,
+    /// The length of a step, and the time where the interval begins.
+    h: T,
+    t: T,
+}
+
+impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
+    /// The start of an interval of so many steps.
+    pub fn at(interval: &Interval<'_, T>, coefficients: &'a Coefficients<T, S>, steps: usize) -> Self {
+        let (mut x, mut v) = (ArrayX::<M, T>::zeroed(), ArrayV::<M, T>::zeroed());
+        assign(x.as_mut(), interval.x);
+        let inputs = v.as_mut().get_mut(2 * M::Shape::NX + M::Shape::NZ..).unwrap_or_default();
+        for (to, &from) in inputs.iter_mut().zip(interval.u.iter().chain(interval.p)) {
+            *to = from;
+        }
+        Self { coefficients, x, v, h: interval.h / T::from_whole(steps), t: interval.t }
+    }
+
+    /// Where stages `y + α Δy` lead to, and the sum of all `|h f|` at them and the largest one.
+    pub fn follow(
+        mut self,
+        stages: &[ArrayK<M, [T; S]>],
+        change: &[ArrayK<M, [T; S]>],
+        alpha: T,
+    ) -> (End<M, T>, [T; 2]) {
+        let mut end = End::<M, T> { x: VectorX::<M, T>::zeroed(), z0: VectorZ::<M, T>::zeroed() };
+        let (mut sum, mut largest) = (T::ZERO, T::ZERO);
+        for (n, y) in stages.iter().enumerate() {
+            let mut y = *y;
+            if let Some(change) = change.get(n).filter(|_| alpha != T::ZERO) {
+                for (y, &change) in
+                    y.as_mut().as_flattened_mut().iter_mut().zip(change.as_ref().as_flattened())
+                {
+                    *y = *y + alpha * change;
+                }
+            }
+            for i in 0..S {
+                let f = self.residual(&y, n, i);
+                for &f in f.as_ref() {
+                    let size = (self.h * f).abs();
+                    sum = sum + size;
+                    largest = larger(largest, size);
+                }
+            }
+            if n == 0 {
+                let algebraic = y.as_ref().get(M::Shape::NX..).unwrap_or_default();
+                for (z, y) in end.z0.as_mut_slice().iter_mut().zip(algebraic) {
+                    *z = dot(&self.coefficients.start, y);
+                }
+            }
+            for (x, k) in self.x.as_mut().iter_mut().zip(y.as_ref()) {
+                *x = *x + self.h * dot(&self.coefficients.b, k);
+            }
+        }
+        assign(end.x.as_mut_slice(), self.x.as_ref());
+        (end, [sum, largest])
+    }
+
+    /// `f(k_i, x + h Σ_j a_ij k_j, u, z_i, p, t + (n + c_i) h)`
+    fn residual(&mut self, y: &ArrayK<M, [T; S]>, n: usize, i: usize) -> ArrayK<M, T> {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let Self { coefficients: Coefficients { a, c, .. }, x, v, h, t } = self;
+        let (h, weights) = (*h, a.get(i).copied().unwrap_or([T::ZERO; S]));
+        let (slopes, algebraic) = y.as_ref().split_at(nx.min(y.as_ref().len()));
+        let v = v.as_mut();
+        let (xdot, rest) = v.split_at_mut(nx);
+        let (states, rest) = rest.split_at_mut(nx);
+        for (((xdot, state), k), &x) in xdot.iter_mut().zip(states).zip(slopes).zip(x.as_ref()) {
+            (*xdot, *state) = (k[i], x + h * dot(&weights, k));
+        }
+        for (z, y) in rest.iter_mut().take(nz).zip(algebraic) {
+            *z = y[i];
+        }
+        if let Some(time) = rest.last_mut() {
+            *time = *t + (T::from_whole(n) + c[i]) * h;
+        }
+        let mut f = ArrayK::<M, T>::zeroed();
+        M::residual::<T>(&self.v, &mut f);
+        f
+    }
+}

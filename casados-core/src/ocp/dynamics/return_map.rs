@@ -1,0 +1,272 @@
+//! The end of a period, seen from the start of the next one.
+
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::linalg::dot;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::cost::Show;
+use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink};
+use crate::ocp::formulation::functions::point::{finite_outputs, read};
+use crate::ocp::formulation::names::Names;
+use crate::qp::element::set;
+use crate::scalar::Real;
+use crate::shape::{Outputs, Plain, Shape};
+use alloc::{vec, vec::Vec};
+use bytemuck::Zeroable;
+use core::fmt;
+
+/// Dynamics whose last interval ends with a map of the state: `x_N = g(φ(x_{N−1}, u_{N−1}))`, where
+/// `φ` are the dynamics `D` and `g` is a [`Function`] of the states alone, with an output for each.
+///
+/// With [`Ocp::periodic`](crate::ocp::Ocp::periodic) an orbit is periodic up to that map: a turn of
+/// the frame, a phase that grows by `2π` in a period, half a period of what is symmetric, an
+/// impact. States, bounds and costs at the last node are those after the map; a state before it is
+/// that of the solution within the last interval.
+///
+/// First and second derivatives are exact: `g′ φ′`, and with the multipliers `π` of the last state
+/// `φ′ᵀ ∇²(πᵀg) φ′` beside the second derivatives of `φ` along `g′ᵀπ`, for which the dynamics are
+/// simulated once more.
+///
+/// # Example
+/// What turns by `u` in each of four intervals, and by a quarter altogether.
+/// ```
+/// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem, ReturnMap};
+/// use casados::prelude::*;
+/// use std::f64::consts::FRAC_PI_2;
+///
+/// #[function]
+/// fn turn(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn back(x: f64, _u: f64) -> f64 { x - core::f64::consts::FRAC_PI_2 }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [u, x - 1.0] }
+///
+/// let dynamics = ReturnMap::<Back, _>::new(Map::<Turn, f64>::new());
+/// let mut ocp = Problem::new(dynamics)
+///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0, 1e-3]))
+///     .on(Horizon::uniform(4, 1.0))?;
+/// ocp.free_initial_state().periodic("x")?.guess(&[0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let turned: f64 = (0..4).map(|k| ocp.stage(k).unwrap().u[0]).sum();
+/// assert!((turned - FRAC_PI_2).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct ReturnMap<G: Function, D, T: Plain = f64> {
+    dynamics: D,
+    end: End<G, T>,
+}
+
+impl<G: Function, D: fmt::Debug, T: Plain> fmt::Debug for ReturnMap<G, D, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let map = G::STRUCTURE.name;
+        f.debug_struct("ReturnMap").field("dynamics", &self.dynamics).field("map", &map).finish()
+    }
+}
+
+impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
+    /// These dynamics, with the map at their end. Memory is allocated here and by the first second
+    /// derivatives.
+    #[must_use]
+    pub fn new(dynamics: D) -> Self {
+        const {
+            let blocks = G::STRUCTURE.blocks;
+            assert!(G::Outputs::NY == G::Shape::NX, "a return map has one output for each state");
+            assert!(blocks[2] == blocks[5], "a return map depends on the states alone");
+        }
+        Self { dynamics, end: End::new() }
+    }
+
+    /// The dynamics, without the map.
+    pub fn dynamics(&mut self) -> &mut D {
+        &mut self.dynamics
+    }
+
+    /// What a call of the dynamics returns, with the map at its end and so many of its derivatives.
+    fn visit(
+        &mut self,
+        nodes: &Nodes<'_, T>,
+        call: impl FnOnce(&mut D, &Nodes<'_, T>, Sink<'_, T>) -> Result<(), OcpError>,
+        derivatives: usize,
+        sink: Sink<'_, T>,
+    ) -> Result<(), OcpError> {
+        let Self { dynamics, end } = self;
+        let last = nodes.len().wrapping_sub(1);
+        let pi = crate::qp::part(nodes.multipliers, last.wrapping_mul(nodes.ld[1]), G::Shape::NX);
+        let t = nodes.times.last().copied().unwrap_or(T::ZERO);
+        let mut outcome = Ok(());
+        // Second derivatives of the dynamics take other multipliers of the end: see there.
+        let others = core::mem::take(&mut end.multipliers);
+        let inner =
+            Nodes { multipliers: if derivatives == 2 { &others } else { nodes.multipliers }, ..*nodes };
+        let called = call(dynamics, &inner, &mut |k, step| {
+            if k != last {
+                return sink(k, step);
+            }
+            end.evaluate(step, t, derivatives, pi);
+            match finite_outputs::<G, T>(&end.x, k) {
+                Ok(()) => sink(k, &end.mapped(step, derivatives)),
+                error => outcome = error,
+            }
+        });
+        end.multipliers = others;
+        called.and(outcome)
+    }
+}
+
+impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for ReturnMap<G, D, T> {
+    type Shape = D::Shape;
+    const NAMES: Names = D::NAMES;
+    const ALGEBRAIC: bool = {
+        assert!(!D::LIFTED, "a return map needs shooting: ends of collocated intervals are variables");
+        D::ALGEBRAIC
+    };
+
+    fn check(&self) -> Result<(), OcpError> {
+        self.dynamics.check()
+    }
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        self.dynamics.terms(show)
+    }
+    fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.visit(nodes, D::simulate, 0, sink)
+    }
+    fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.visit(nodes, D::linearise, 1, sink)
+    }
+    fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
+        self.dynamics.inside(nodes, parts, sink)
+    }
+}
+
+impl<G: Function<Shape = D::Shape>, D: SecondOrder<T>, T: Real> SecondOrder<T> for ReturnMap<G, D, T> {
+    fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        // Where the last interval ends says what its multipliers are.
+        self.visit(nodes, D::simulate, 1, &mut |_, _| {})?;
+        self.end.pull_back(nodes);
+        self.visit(nodes, D::second_order, 2, sink)
+    }
+}
+
+/// The map at an end, and what it makes of a step.
+struct End<G: Function, T: Plain> {
+    v: ArrayV<G, T>,
+    pi: ArrayY<G, T>,
+    jacobian: G::Jacobian<T>,
+    hessian: G::Hessian<T>,
+    /// `x_N`
+    x: ArrayY<G, T>,
+    /// `g′` and `∇²(πᵀg)`, column after column.
+    first: Vec<T>,
+    second: Vec<T>,
+    /// Those of all intervals, of the last one before the map: `g′ᵀπ`.
+    multipliers: Vec<T>,
+    /// Derivatives of `x_N` by `x`, `u`, `p`, and second ones, as a [`IntervalResult`] has them.
+    slopes: [Vec<T>; 3],
+    curvature: [Vec<T>; 6],
+}
+
+impl<G: Function, T: Real> End<G, T> {
+    fn new() -> Self {
+        let (nx, nu, np) = (G::Shape::NX, G::Shape::NU, G::Shape::NP);
+        let zeros = |length: usize| vec![T::ZERO; length];
+        let mut jacobian = G::Jacobian::<T>::zeroed();
+        G::jacobian_constants::<T>(&mut jacobian);
+        Self {
+            v: Zeroable::zeroed(),
+            pi: Zeroable::zeroed(),
+            jacobian,
+            hessian: Zeroable::zeroed(),
+            x: Zeroable::zeroed(),
+            first: zeros(nx * nx),
+            second: zeros(nx * nx),
+            multipliers: Vec::new(),
+            slopes: [nx, nu, np].map(|columns| zeros(nx * columns)),
+            curvature: [nx * nx, nx * nu, nu * nu, nx * np, nu * np, np * np].map(zeros),
+        }
+    }
+
+    /// The map at the end of a step, with so many derivatives.
+    fn evaluate(&mut self, step: &IntervalResult<'_, T>, t: T, derivatives: usize, pi: &[T]) {
+        read::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
+        if derivatives == 0 {
+            return G::value::<T>(&self.v, &mut self.x);
+        }
+        let nx = G::Shape::NX;
+        G::value_jacobian::<T>(&self.v, &mut self.x, &mut self.jacobian);
+        for ((row, variable), &value) in G::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
+            set(&mut self.first, (variable - nx) * nx + row, value);
+        }
+        self.slopes(step);
+        if derivatives == 1 {
+            return;
+        }
+        crate::qp::assign(self.pi.as_mut(), pi);
+        G::hessian::<T>(&self.v, &self.pi, &mut self.hessian);
+        for ((row, column), &value) in G::STRUCTURE.hessian.iter().zip(self.hessian.as_ref()) {
+            let (row, column) = (row - nx, column - nx);
+            set(&mut self.second, column * nx + row, value);
+            set(&mut self.second, row * nx + column, value);
+        }
+        self.curvature(step);
+    }
+
+    /// `g′ φ′`
+    fn slopes(&mut self, step: &IntervalResult<'_, T>) {
+        let nx = G::Shape::NX.max(1);
+        for (slopes, of_step) in self.slopes.iter_mut().zip([step.dx, step.du, step.dp]) {
+            for (to, column) in slopes.chunks_exact_mut(nx).zip(of_step.chunks_exact(nx)) {
+                to.fill(T::ZERO);
+                for (of_state, &by) in self.first.chunks_exact(nx).zip(column) {
+                    to.iter_mut().zip(of_state).for_each(|(to, &slope)| *to = *to + slope * by);
+                }
+            }
+        }
+    }
+
+    /// Second derivatives of `φ` along `g′ᵀπ`, and `φ′ᵀ ∇²(πᵀg) φ′`.
+    fn curvature(&mut self, step: &IntervalResult<'_, T>) {
+        let nx = G::Shape::NX.max(1);
+        let [dx, du, dp] = [step.dx, step.du, step.dp];
+        let pairs = [(dx, dx), (dx, du), (du, du), (dx, dp), (du, dp), (dp, dp)];
+        let of_step = step.hessian.iter().chain(&step.hessian_p);
+        for ((block, (rows, columns)), of_step) in self.curvature.iter_mut().zip(pairs).zip(of_step) {
+            let height = rows.len() / nx;
+            for (j, column) in columns.chunks_exact(nx).enumerate() {
+                for (i, row) in rows.chunks_exact(nx).enumerate() {
+                    let mut sum = of_step.get(j * height + i).copied().unwrap_or(T::ZERO);
+                    for (&factor, of_state) in row.iter().zip(self.second.chunks_exact(nx)) {
+                        sum = sum + factor * dot(of_state, column);
+                    }
+                    set(block, j * height + i, sum);
+                }
+            }
+        }
+    }
+
+    /// The multipliers of all intervals, with `g′ᵀπ` in the place of the last.
+    fn pull_back(&mut self, nodes: &Nodes<'_, T>) {
+        let nx = G::Shape::NX.max(1);
+        self.multipliers.clear();
+        self.multipliers.extend_from_slice(nodes.multipliers);
+        let begin = nodes.len().saturating_sub(1) * nodes.ld[1];
+        let pi = crate::qp::part(nodes.multipliers, begin, nx);
+        for (j, column) in self.first.chunks_exact(nx).enumerate() {
+            set(&mut self.multipliers, begin + j, dot(column, pi));
+        }
+    }
+
+    /// The step with the map at its end, and with as many derivatives.
+    fn mapped<'a>(&'a self, step: &IntervalResult<'a, T>, derivatives: usize) -> IntervalResult<'a, T> {
+        let all = |there: bool, numbers: &'a Vec<T>| if there { numbers.as_slice() } else { &[] };
+        let [dx, du, dp] = self.slopes.each_ref().map(|slopes| all(derivatives > 0, slopes));
+        let [xx, xu, uu, xp, up, pp] = self.curvature.each_ref().map(|block| all(derivatives > 1, block));
+        IntervalResult {
+            x: self.x.as_ref(),
+            dx,
+            du,
+            dp,
+            hessian: [xx, xu, uu],
+            hessian_p: [xp, up, pp],
+            ..*step
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! Bounds by name, parameters and references.
+
+use crate::ocp::formulation::check::{Labels, first, range};
+use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::names::Names;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{BoundsMut, QpError, QpField, Side, StageDims, check};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use crate::structure::means;
+use core::ops::{Range, RangeBounds};
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Bounds of a general constraint of a stage, as they were given.
+    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+        let intervals = self.intervals();
+        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
+    }
+
+    /// The names of states and controls.
+    #[must_use]
+    pub fn names(&self) -> Names {
+        <P::Dynamics as Dynamics<T>>::NAMES
+    }
+
+    /// Where a name means states, and where it means controls: a part is left out of which it means
+    /// nothing.
+    ///
+    /// # Errors
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
+    pub(in crate::ocp) fn find(
+        &self,
+        name: &str,
+        stages: &impl RangeBounds<usize>,
+    ) -> Result<[Range<usize>; 2], OcpError> {
+        let known = self.names();
+        let find = |part, names: &[&str], count| match names.iter().any(|variable| means(name, variable)) {
+            true => range(part, stages, count),
+            false => Ok(0..0),
+        };
+        let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
+        let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
+        if of_states.is_empty() && of_controls.is_empty() {
+            let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
+            return Err(OcpError::UnknownName { name: Text::new(name), known });
+        }
+        Ok([of_states, of_controls])
+    }
+
+    /// Does something to the bounds of every variable that a name means.
+    pub(in crate::ocp) fn each(
+        &mut self,
+        name: &str,
+        [of_states, of_controls]: [Range<usize>; 2],
+        mut visit: impl FnMut(&mut BoundsMut<'_, T>, usize),
+    ) {
+        let known = self.names();
+        // Of a state that is given there is nothing to be bounded.
+        let first = usize::from(self.initial == Initial::Fixed);
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let mut visit_all = |bounds: &mut BoundsMut<'_, T>, names: &[&str]| {
+                let variables = names.iter().enumerate().filter(|(_, variable)| means(name, variable));
+                variables.for_each(|(index, _)| visit(bounds, index));
+            };
+            if k >= first && of_states.contains(&k) {
+                visit_all(&mut stage.x_bounds_mut(), known.x);
+            }
+            if of_controls.contains(&k) {
+                visit_all(&mut stage.u_bounds_mut(), known.u);
+            }
+        }
+    }
+
+    /// What the first variable that a name means is called, from some stage on.
+    pub(in crate::ocp) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
+        let known = self.names();
+        let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
+        match position(known.x) {
+            Some(index) => (Labels::states::<P, T>(Part::StateBounds, stage), index),
+            None => (Labels::controls::<P, T>(Part::ControlBounds, stage), position(known.u).unwrap_or(0)),
+        }
+    }
+
+    /// Bounds of a state or control, or of all of them that a name means (`u` means `u[0]`, `u[1]`,
+    /// …), at some stages: `..` are all of them, the last one has no controls. An infinite bound is
+    /// none. While the initial state is fixed, bounds of states do not touch stage 0.
+    ///
+    /// # Errors
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]: then no bound is changed.
+    pub fn bound(
+        &mut self,
+        name: &str,
+        stages: impl RangeBounds<usize>,
+        lower: T,
+        upper: T,
+    ) -> Result<&mut Self, OcpError> {
+        let found = self.find(name, &stages)?;
+        let (labels, index) = self.labels(name, first(&stages));
+        labels.check_bounds(index, lower, upper)?;
+        self.each(name, found, |bounds, index| bounds.set(index, lower, upper));
+        Ok(self)
+    }
+
+    /// Bounds of the path constraints at some stages.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
+    pub fn set_path_bounds(
+        &mut self,
+        stages: impl RangeBounds<usize>,
+        lower: &[T],
+        upper: &[T],
+    ) -> Result<&mut Self, OcpError> {
+        let range = range(Part::PathBounds, &stages, self.intervals())?;
+        self.write_bounds(Part::PathBounds, range, P::Path::ROWS, lower, upper)
+    }
+
+    /// Bounds of the terminal constraints.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
+    pub fn set_terminal_bounds(&mut self, lower: &[T], upper: &[T]) -> Result<&mut Self, OcpError> {
+        let last = self.intervals();
+        self.write_bounds(Part::TerminalBounds, last..last + 1, P::Terminal::ROWS, lower, upper)
+    }
+
+    fn write_bounds(
+        &mut self,
+        part: Part,
+        stages: Range<usize>,
+        rows: usize,
+        lower: &[T],
+        upper: &[T],
+    ) -> Result<&mut Self, OcpError> {
+        let labels = Labels::constraints::<P, T>(part, stages.start);
+        labels.check_length(lower, rows)?;
+        labels.check_length(upper, rows)?;
+        for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+            labels.check_bounds(index, lower, upper)?;
+        }
+        let intervals = self.intervals();
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for k in stages {
+            for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
+                // The rows of the last stage lie behind those of all others.
+                crate::qp::assign(crate::qp::part_mut(bounds, k * P::Path::ROWS, rows), given);
+            }
+        }
+        Ok(self)
+    }
+
+    /// The state at the start.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn fix_initial_state(&mut self, x0: &[T]) -> Result<&mut Self, OcpError> {
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
+        self.qp.fix_initial_state(x0)?;
+        self.initial = Initial::Fixed;
+        Ok(self)
+    }
+
+    /// The state at the start is free; it may be bounded like any other. If it was fixed, it has no
+    /// bounds until it is given new ones.
+    pub fn free_initial_state(&mut self) -> &mut Self {
+        let was_fixed = self.initial == Initial::Fixed;
+        self.initial = Initial::Free;
+        let infinity = T::from_f64(f64::INFINITY);
+        if was_fixed && let Some(mut stage) = self.qp.stage_mut(0) {
+            let bounds = stage.x_bounds_mut();
+            bounds.lower.fill(-infinity);
+            bounds.upper.fill(infinity);
+        }
+        self
+    }
+
+    /// The times of the nodes.
+    #[must_use]
+    pub fn times(&self) -> &[T] {
+        crate::qp::part(self.data.as_ref(), 0, self.intervals() + 1)
+    }
+
+    /// Parameters of some nodes; the last node has parameters for terminal cost and constraints.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]
+    pub fn set_parameters(
+        &mut self,
+        stages: impl RangeBounds<usize>,
+        p: &[T],
+    ) -> Result<&mut Self, OcpError> {
+        let intervals = self.intervals();
+        let range = range(Part::Parameters, &stages, intervals + 1)?;
+        Labels::parameters::<P, T>(range.start).check_vector(p, P::Shape::NP)?;
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for k in range {
+            crate::qp::assign(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
+        }
+        Ok(self)
+    }
+
+    /// The reference of the stage cost at some stages; zero if never set.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]
+    pub fn set_reference(
+        &mut self,
+        stages: impl RangeBounds<usize>,
+        reference: &[T],
+    ) -> Result<&mut Self, OcpError> {
+        let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
+        let range = range(Part::Reference, &stages, intervals)?;
+        Labels::references::<P, T>(Part::Reference, range.start).check_vector(reference, length)?;
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for k in range {
+            crate::qp::assign(crate::qp::part_mut(data.references, k * length, length), reference);
+        }
+        Ok(self)
+    }
+
+    /// The reference of the stage cost at every stage, as a function of the stage and of the time
+    /// of its node, which writes it over zeros.
+    ///
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0, 1e-4]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[0.0])?.guess(&[0.0], &[0.0])?;
+    /// // `x` follows a sine, and `u` stays small.
+    /// ocp.set_references(|_stage, t, reference| reference[0] = t.sin())?;
+    /// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    /// let x = ocp.solution()?.state("x")?[10];
+    /// assert!((x - 1.0_f64.sin()).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidValue`]; then the references of the stages before are set.
+    pub fn set_references(
+        &mut self,
+        mut write: impl FnMut(usize, T, &mut [T]),
+    ) -> Result<&mut Self, OcpError> {
+        let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for (k, &mut time) in data.times.iter_mut().enumerate().take(intervals) {
+            let reference = crate::qp::part_mut(data.references, k * length, length);
+            reference.fill(T::ZERO);
+            write(k, time, reference);
+            Labels::references::<P, T>(Part::Reference, k).check_vector(reference, length)?;
+        }
+        Ok(self)
+    }
+
+    /// The reference of the terminal cost; zero if never set.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn set_terminal_reference(&mut self, reference: &[T]) -> Result<&mut Self, OcpError> {
+        let (intervals, length) = (self.intervals(), P::TerminalCost::REFERENCES);
+        Labels::references::<P, T>(Part::TerminalReference, intervals).check_vector(reference, length)?;
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let begin = intervals * P::StageCost::REFERENCES;
+        crate::qp::assign(crate::qp::part_mut(data.references, begin, length), reference);
+        Ok(self)
+    }
+
+    /// A constraint of the QP by its name in the problem.
+    #[must_use]
+    pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
+        let names = self.names();
+        let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
+        let (part, (name, output)) = match field {
+            QpField::StateBounds => (Part::StateBounds, (of(names.x), 0)),
+            QpField::ControlBounds => (Part::ControlBounds, (of(names.u), 0)),
+            _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
+            _ => (Part::PathBounds, P::Path::name(index)),
+        };
+        ConstraintName { part, stage, name, output, side }
+    }
+
+    /// The constraint that makes a QP infeasible.
+    #[must_use]
+    pub fn infeasible(&self, error: &QpError) -> Option<ConstraintName> {
+        match *error {
+            QpError::Infeasible { field, stage, index, side, .. } => {
+                Some(self.name(field, stage, index, side))
+            }
+            _ => None,
+        }
+    }
+
+    /// The derivative that makes a QP one without values.
+    pub(in crate::ocp) fn derivative(&self, error: &QpError) -> Option<OcpError> {
+        // Whatever a solver says of a QP without values. Derivatives come first in it, before the
+        // bounds and constants that are made with them.
+        if matches!(error, QpError::Infeasible { .. }) {
+            return None;
+        }
+        let Err(QpError::InvalidValue { field, stage, index, value }) = check(self.qp()) else { return None };
+        let known = self.names();
+        let (nx, nu) = (known.x.len(), known.u.len());
+        let rows = match field {
+            QpField::A | QpField::B | QpField::Q => nx,
+            QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
+            QpField::C | QpField::D => P::Path::ROWS,
+            QpField::R | QpField::S => nu,
+            QpField::GradientX | QpField::GradientU => 1,
+            _ => return None,
+        };
+        let (row, column) = (index.checked_rem(rows)?, index.checked_div(rows)?);
+        let (list, by) = match field {
+            QpField::A | QpField::Q => (known.x, known.x),
+            QpField::B => (known.x, known.u),
+            QpField::R => (known.u, known.u),
+            QpField::S => (known.u, known.x),
+            QpField::C | QpField::GradientX => (&[][..], known.x),
+            _ => (&[][..], known.u),
+        };
+        let (of, output) = match field {
+            QpField::C | QpField::D if stage == self.intervals() => P::Terminal::name(row),
+            QpField::C | QpField::D => P::Path::name(row),
+            _ => (list.get(row).copied().unwrap_or(""), 0),
+        };
+        let by = by.get(column).copied().unwrap_or("");
+        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value })
+    }
+}

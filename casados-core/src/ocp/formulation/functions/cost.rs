@@ -1,0 +1,329 @@
+//! Costs at the nodes.
+
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::pattern::{self, Entries};
+use crate::ocp::formulation::functions::point::{
+    Cross, Terms, There, finite, is_algebraic, parameter, position,
+};
+use crate::scalar::Real;
+use crate::shape::{Array, Plain, Shape, plain};
+use bytemuck::Zeroable;
+use core::fmt;
+
+/// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their
+/// sum.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
+/// /// A cart with any cost, or a pair of them.
+/// fn effortless<C>(cost: C) -> Result<f64, Box<dyn std::error::Error>>
+/// where
+///     C: CostOf<Irk<Cart, Gauss<2>>, f64>,
+/// {
+///     let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+///     let mut ocp = Problem::new(irk).stage_cost(cost).on(Horizon::uniform(2, 0.5))?;
+///     ocp.fix_initial_state(&[1.0, 0.0])?.guess(&[1.0, 0.0], &[3.0])?;
+///     HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
+///     Ok(ocp.stage(0)?.u[0])
+/// }
+/// let least = || LeastSquaresCost::<Effort>::diagonal(&[1.0]);
+/// assert!(effortless(least())?.abs() < 1e-7 && effortless((least(), least()))?.abs() < 1e-7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Cost<S: Shape, T: Real> {
+    /// How many numbers a reference has.
+    const REFERENCES: usize;
+    /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is
+    /// not asked for.
+    const CONVEX: bool;
+    /// Whether it depends on algebraic states.
+    const ALGEBRAIC: bool;
+
+    /// Whether it depends on what is there only, and has weights that make sense.
+    ///
+    /// # Errors
+    /// [`OcpError::NotThere`], [`OcpError::InvalidWeight`]
+    #[doc(hidden)]
+    fn check(&self, there: There) -> Result<(), OcpError>;
+
+    /// Whether its weights, which may be changed after it was checked, make sense.
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidWeight`]
+    #[doc(hidden)]
+    fn check_weights(&self) -> Result<(), OcpError> {
+        Ok(())
+    }
+
+    /// The function of an element of the reference, and which of its outputs it is.
+    #[doc(hidden)]
+    fn name(reference: usize) -> (&'static str, usize) {
+        ("", reference)
+    }
+
+    /// Shows its terms as mathematics.
+    ///
+    /// # Errors
+    /// Those of what shows them.
+    #[doc(hidden)]
+    fn terms(&self, show: Show<'_>) -> fmt::Result;
+
+    /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
+    #[doc(hidden)]
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        let _ = visit;
+        false
+    }
+
+    /// The value at a point.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn value(&mut self, v: &S::ArrayV<T>, reference: &[T], stage: usize) -> Result<T, OcpError>;
+
+    /// The value at a point times a factor; adds gradient and Hessian times this factor.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn add(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<'_, T>,
+        terms: &mut Terms<'_, T>,
+    ) -> Result<T, OcpError>;
+
+    /// Adds what parameters change of the gradient, and gradient and Hessian with respect to the
+    /// parameters themselves, times the factor.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn cross(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<'_, T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError>;
+}
+
+/// What takes terms of an objective.
+pub type Show<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
+
+/// Where, how much, and whether the Hessian is to be exact.
+#[derive(Clone, Copy, Debug)]
+pub struct At<'a, T> {
+    pub(in crate::ocp) stage: usize,
+    pub(in crate::ocp) factor: T,
+    pub(in crate::ocp) exact: bool,
+    /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with
+    /// the Hessian `H` that is added, which is [convex](Cost::CONVEX). Else it is empty.
+    pub(in crate::ocp) from: &'a [T],
+}
+
+impl<S: Shape, T: Real> Cost<S, T> for () {
+    const REFERENCES: usize = 0;
+    const CONVEX: bool = true;
+    const ALGEBRAIC: bool = false;
+    fn check(&self, _: There) -> Result<(), OcpError> {
+        Ok(())
+    }
+    fn terms(&self, _: Show<'_>) -> fmt::Result {
+        Ok(())
+    }
+    fn pattern(&self, _: Entries<'_>) -> bool {
+        true
+    }
+    fn value(&mut self, _: &S::ArrayV<T>, _: &[T], _: usize) -> Result<T, OcpError> {
+        Ok(T::ZERO)
+    }
+    fn add(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<'_, T>, _: &mut Terms<'_, T>) -> Result<T, OcpError> {
+        Ok(T::ZERO)
+    }
+    fn cross(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: &[T],
+        _: At<'_, T>,
+        _: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        Ok(())
+    }
+}
+
+/// References lie one after the other.
+impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
+    const REFERENCES: usize = A::REFERENCES + B::REFERENCES;
+    const CONVEX: bool = A::CONVEX && B::CONVEX;
+    const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        self.0.check(there)?;
+        self.1.check(there)
+    }
+    fn check_weights(&self) -> Result<(), OcpError> {
+        self.0.check_weights()?;
+        self.1.check_weights()
+    }
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        self.0.terms(show)?;
+        self.1.terms(show)
+    }
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        self.0.pattern(visit) && self.1.pattern(visit)
+    }
+    fn name(reference: usize) -> (&'static str, usize) {
+        match reference.checked_sub(A::REFERENCES) {
+            None => A::name(reference),
+            Some(reference) => B::name(reference),
+        }
+    }
+    fn value(&mut self, v: &S::ArrayV<T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
+        Ok(self.0.value(v, first, stage)? + self.1.value(v, second, stage)?)
+    }
+    fn add(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<'_, T>,
+        terms: &mut Terms<'_, T>,
+    ) -> Result<T, OcpError> {
+        let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
+        Ok(self.0.add(v, first, at, terms)? + self.1.add(v, second, at, terms)?)
+    }
+    fn cross(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<'_, T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
+        self.0.cross(v, first, at, cross)?;
+        self.1.cross(v, second, at, cross)
+    }
+}
+
+/// The sum of all outputs `y(x, z, u, p, t)` of a function, with its exact Hessian.
+///
+/// If that is not positive semidefinite, the stages are made convex.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(4, 0.5))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0, 0.0], &[2.0])?;
+/// println!("{ocp}"); // the cost by its name
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct GeneralCost<F: Function, T: Plain = f64> {
+    y: ArrayY<F, T>,
+    mu: ArrayY<F, T>,
+    gradient: ArrayV<F, T>,
+    hessian: F::Hessian<T>,
+}
+
+plain!([F: Function, T: Plain] GeneralCost<F, T> { y, mu, gradient, hessian });
+
+impl<F: Function, T: Plain> GeneralCost<F, T> {
+    /// The cost of a function.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl<F: Function, T: Plain> Default for GeneralCost<F, T> {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T> {
+    const REFERENCES: usize = 0;
+    const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
+    const ALGEBRAIC: bool = is_algebraic::<F>();
+
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        there.check::<F>()
+    }
+
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("{}", F::STRUCTURE.name))
+    }
+
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        pattern::curvature::<F>(visit);
+        true
+    }
+
+    fn value(&mut self, v: &ArrayV<F, T>, _: &[T], stage: usize) -> Result<T, OcpError> {
+        F::value::<T>(v, &mut self.y);
+        let sum = self.y.as_ref().iter().fold(T::ZERO, |sum, &y| sum + y);
+        finite::<F, T>(&self.y, sum, stage)
+    }
+
+    fn add(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<'_, T>,
+        terms: &mut Terms<'_, T>,
+    ) -> Result<T, OcpError> {
+        let value = self.value(v, reference, at.stage)?;
+        self.mu = Array::from_fn(|_| T::ONE);
+        F::adjoint::<T>(v, &self.mu, &mut self.gradient);
+        for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
+            if let Some(i) = position::<F::Shape>(variable) {
+                terms.slope(i, at.factor * slope);
+            }
+        }
+        terms.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
+        Ok(at.factor * value)
+    }
+
+    fn cross(
+        &mut self,
+        v: &ArrayV<F, T>,
+        _: &[T],
+        at: At<'_, T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        self.mu = Array::from_fn(|_| T::ONE);
+        F::adjoint::<T>(v, &self.mu, &mut self.gradient);
+        for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
+            if let Some(p) = parameter::<F::Shape>(variable) {
+                cross.slope(p, at.factor * slope);
+            }
+        }
+        cross.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
+        Ok(())
+    }
+}

@@ -1,0 +1,158 @@
+//! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
+
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::get;
+use crate::qp::{StageDims, pad, part};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// The parts of the memory.
+pub(in crate::ocp) struct Data<'a, T> {
+    /// Times of the nodes.
+    pub times: &'a mut [T],
+    /// Parameters of every node.
+    pub p: &'a mut [T],
+    /// References of every stage, and of the last one.
+    pub references: &'a mut [T],
+    /// Lower bounds of the constraints of every stage, and of the last one.
+    pub lower: &'a mut [T],
+    /// Upper ones.
+    pub upper: &'a mut [T],
+    /// Algebraic states of every stage but the last, and `∂z/∂(x, u)`, row after row.
+    pub algebraic: &'a mut [T],
+    /// Weights of the second derivatives of algebraic states, of every stage but the last, if
+    /// anything depends on these.
+    pub weights: &'a mut [T],
+    /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints;
+    /// nothing if there is no `z`.
+    pub extended: &'a mut [T],
+    /// Room for two matrices and a vector over `(x, u)`.
+    pub scratch: &'a mut [T],
+    /// Mean and weights of the arrival cost.
+    pub arrival: &'a mut [T],
+}
+
+/// `NX + NU`
+pub(in crate::ocp) const fn inputs<S: Shape>() -> usize {
+    S::NX + S::NU
+}
+
+/// Whether a cost or a constraint depends on algebraic states.
+pub(in crate::ocp) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
+    P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
+}
+
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 10] {
+    let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+    let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+    let n = inputs::<P::Shape>();
+    let constraints = if P::Path::ROWS > P::Terminal::ROWS { P::Path::ROWS } else { P::Terminal::ROWS };
+    [
+        intervals + 1,
+        (intervals + 1) * P::Shape::NP,
+        references,
+        rows,
+        rows,
+        intervals * kept::<P::Shape>(),
+        if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
+        extended::<P::Shape>(constraints),
+        (2 * n + 1) * pad::<T>(n),
+        P::Shape::NX * (P::Shape::NX + 1),
+    ]
+}
+
+/// How many numbers it takes.
+pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
+    let mut rest: &[usize] = &lengths::<P, T>(intervals);
+    let mut sum = 0_usize;
+    while let Some((&first, others)) = rest.split_first() {
+        sum = sum.saturating_add(first);
+        rest = others;
+    }
+    sum
+}
+
+/// The parts.
+pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
+    let mut rest = memory;
+    let [times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival] =
+        lengths::<P, T>(intervals).map(|length| {
+            let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+            rest = behind;
+            part
+        });
+    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival }
+}
+
+/// The lower and the upper bounds of all constraints.
+pub(in crate::ocp) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> [&[T]; 2] {
+    let [times, p, references, lower, upper, ..] = lengths::<P, T>(intervals);
+    let begin = times + p + references;
+    [part(memory, begin, lower), part(memory, begin + lower, upper)]
+}
+
+/// The weights of the arrival cost.
+pub(in crate::ocp) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> &[T] {
+    let nx = P::Shape::NX;
+    part(memory, length::<P, T>(intervals) - nx * nx, nx * nx)
+}
+
+/// What is given at a node.
+pub(in crate::ocp) struct Node<'a, T> {
+    pub time: T,
+    pub p: &'a [T],
+    /// Of its cost.
+    pub reference: &'a [T],
+    /// What its cost is multiplied by: the length of the interval that begins there, if costs are
+    /// rates.
+    pub factor: T,
+}
+
+impl<'a, T: Real> Node<'a, T> {
+    /// Of the `times`, `p` and `references` of [`Data`].
+    #[inline(always)]
+    pub fn new<P: Formulation<T>>(
+        k: usize,
+        intervals: usize,
+        running: bool,
+        [times, p, references]: [&'a [T]; 3],
+    ) -> Self {
+        let (np, time, of_stage) = (P::Shape::NP, get(times, k), P::StageCost::REFERENCES);
+        let is_stage = k < intervals;
+        let length = if is_stage { of_stage } else { P::TerminalCost::REFERENCES };
+        Self {
+            time,
+            p: part(p, k * np, np),
+            reference: part(references, k * of_stage, length),
+            factor: if running && is_stage { get(times, k + 1) - time } else { T::ONE },
+        }
+    }
+}
+
+/// The dimensions of a stage.
+pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(last: bool) -> StageDims {
+    if last {
+        StageDims::new(P::Shape::NX, 0, P::Terminal::ROWS)
+    } else {
+        StageDims::new(P::Shape::NX, P::Shape::NU, P::Path::ROWS)
+    }
+}
+
+/// `NX + NU` and `NZ`.
+pub(in crate::ocp) const fn sizes<S: Shape>() -> [usize; 2] {
+    [S::NX + S::NU, S::NZ]
+}
+
+/// How many numbers a stage keeps: `z`, and `∂z/∂(x, u)` row after row.
+pub(in crate::ocp) const fn kept<S: Shape>() -> usize {
+    let [n, nz] = sizes::<S>();
+    nz * (1 + n)
+}
+
+/// How many numbers `algebraic::Extended` takes, for stages with so many constraints.
+pub(in crate::ocp) const fn extended<S: Shape>(rows: usize) -> usize {
+    let [n, nz] = sizes::<S>();
+    if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
+}

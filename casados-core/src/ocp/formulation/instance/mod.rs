@@ -1,0 +1,370 @@
+//! A problem on a horizon, with its data, its iterate and its QP.
+
+pub(in crate::ocp) mod data;
+mod memory;
+
+use crate::ocp::formulation::check::Labels;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::functions::dynamics::Nodes;
+use crate::ocp::formulation::functions::point::There;
+use crate::ocp::formulation::horizon::Horizon;
+use crate::ocp::formulation::instance::data::{Data, split};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// What is known of the state at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::ocp) enum Initial {
+    /// Nothing was said.
+    Unknown,
+    Fixed,
+    Free,
+}
+
+/// A problem of optimal control on a horizon, discretised by multiple shooting.
+///
+/// ```text
+/// min  Σ_k l(x_k, u_k) + e(x_N)     x_{k+1} = φ(x_k, u_k)     lb ≤ (x_k, u_k) ≤ ub     lg ≤ g(x_k, u_k) ≤ ug
+/// ```
+///
+/// It holds the data of every stage, an iterate with multipliers, and the QP that
+/// [`Ocp::linearise`] writes at the iterate. The variables of this QP are states and controls
+/// themselves, not their changes: bounds are written into it once, its solution is the next
+/// iterate, and its conditions of optimality at the iterate are those of the problem.
+///
+/// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`]
+/// takes it.
+///
+/// It prints itself as mathematics, with names, bounds and sizes (`println!("{ocp}")`). A clone on
+/// the heap has its bounds, data and iterate, and integrators of its own.
+///
+/// # Example
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// const N: usize = 20;
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(N, 0.05))?;
+/// // Bounds by the names of the model, stages by ranges: from rest to rest in a second.
+/// ocp.fix_initial_state(&[0.0, 0.0])?;
+/// ocp.bound("x[0]", N.., 1.0, 1.0)?.bound("x[1]", N.., 0.0, 0.0)?.bound("u", .., -8.0, 8.0)?;
+/// ocp.guess(&[0.0, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// // The best push falls linearly from 6 to −6, and so do its samples, about as much.
+/// let solution = ocp.solution()?;
+/// assert!((solution.control("u")?[0] - 6.0).abs() < 0.5);
+/// assert!((solution.state("x[0]")?[N / 2] - 0.5).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct Ocp<P, T, D, M> {
+    pub(in crate::ocp) problem: P,
+    pub(in crate::ocp) initial: Initial,
+    pub(in crate::ocp) qp: Qp<T, D, M>,
+    pub(in crate::ocp) iterate: Solution<T, D, M>,
+    pub(in crate::ocp) data: M,
+    /// Of the last linearisation, without penalties.
+    pub(in crate::ocp) objective: T,
+    /// What was left of the equations of stages where intervals were evaluated last: the sum, and
+    /// the largest.
+    pub(in crate::ocp) stages: [T; 2],
+    /// See [`Nodes`].
+    pub(in crate::ocp) step_length: Option<T>,
+    /// Whether algebraic states of the last evaluation are those of the iterate.
+    pub(in crate::ocp) has_algebraic: bool,
+}
+
+/// A problem with its memory on the heap.
+///
+/// `problem.on(horizon)` makes it; [`Ocp`] has its methods, and an example.
+///
+/// A function of one's own returns it by what it can do:
+///
+/// ```
+/// use casados::ocp::{ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, OcpError, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// /// To a place in a second. `ExactFormulation` is what solvers with exact Hessians take.
+/// fn travel(place: f64) -> Result<HeapOcp<impl ExactFormulation<f64>>, OcpError> {
+///     let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?)
+///         .running_cost(GeneralCost::<Effort>::new())
+///         .on(Horizon::uniform(10, 0.1))?;
+///     ocp.fix_initial_state(&[0.0; 2])?.bound("x[0]", 10.., place, place)?.guess(&[0.0; 2], &[0.0])?;
+///     Ok(ocp)
+/// }
+///
+/// let (mut one, mut other) = (travel(1.0)?, travel(1.0)?);
+/// let by_sqp = HeapSqp::new(&one)?.solve(&mut one)?;
+/// let by_ipm = HeapIpm::new(&other)?.solve(&mut other)?;
+/// assert!((by_sqp.objective - by_ipm.objective).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[cfg(feature = "alloc")]
+pub type HeapOcp<P, T = f64> = Ocp<P, T, Vec<StageDims>, Vec<T>>;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    pub(in crate::ocp) fn build(
+        mut problem: P,
+        horizon: Horizon<'_, T>,
+        mut qp: Qp<T, D, M>,
+        iterate: Solution<T, D, M>,
+        mut data: M,
+    ) -> Result<Self, OcpError> {
+        let intervals = horizon.intervals();
+        if intervals == 0 {
+            return Err(OcpError::Missing { part: Part::Times, stage: 0 });
+        }
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
+        let z = P::Dynamics::ALGEBRAIC;
+        let (inside, at_end) =
+            (There { z, u: true, stage: 0 }, There { z: false, u: false, stage: intervals });
+        dynamics.check()?;
+        stage_cost.check(inside)?;
+        terminal_cost.check(at_end)?;
+        path.check(inside)?;
+        terminal.check(at_end)?;
+        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
+        horizon.write(times)?;
+        // Parameters that nobody sets are found in this way.
+        p.fill(T::from_f64(f64::NAN));
+        references.fill(T::ZERO);
+        for (k, mut stage) in qp.stages_mut().enumerate() {
+            let begin = k * P::Path::ROWS;
+            let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let bounds = stage.g_bounds_mut();
+            let limits = [
+                part_mut(lower, begin, rows),
+                part_mut(upper, begin, rows),
+                &mut *bounds.lower_linear,
+                &mut *bounds.lower_quadratic,
+            ];
+            if k < intervals {
+                path.bounds(limits)
+            } else {
+                terminal.bounds(limits)
+            }
+            assign(bounds.upper_linear, bounds.lower_linear);
+            assign(bounds.upper_quadratic, bounds.lower_quadratic);
+        }
+        Ok(Self {
+            problem,
+            initial: Initial::Unknown,
+            qp,
+            iterate,
+            data,
+            objective: T::ZERO,
+            stages: [T::ZERO; 2],
+            step_length: None,
+            has_algebraic: false,
+        })
+    }
+
+    /// Finds out whether memory of a run has the dimensions of the problem.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]
+    pub(in crate::ocp) fn fits(&self, dims: &[StageDims]) -> Result<(), OcpError> {
+        let part = Part::Dimensions;
+        let (expected, found) = (self.qp.dims().len(), dims.len());
+        if expected != found {
+            return Err(OcpError::Length { part, stage: 0, expected, found });
+        }
+        for (stage, (a, b)) in self.qp.dims().iter().zip(dims).enumerate() {
+            for (expected, found) in [(a.nx, b.nx), (a.nu, b.nu), (a.ng, b.ng)] {
+                if expected != found {
+                    return Err(OcpError::Length { part, stage, expected, found });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How many intervals the horizon has.
+    #[must_use]
+    pub fn intervals(&self) -> usize {
+        self.qp.dims().len().saturating_sub(1)
+    }
+
+    /// The functions of the problem: weights of costs and options of integrators may be changed
+    /// there.
+    pub fn problem(&mut self) -> &mut P {
+        &mut self.problem
+    }
+
+    /// The QP at the iterate of the last [`Ocp::linearise`].
+    #[must_use]
+    pub fn qp(&self) -> QpView<'_, T> {
+        self.qp.view()
+    }
+
+    /// The QP, and the iterate as the place of its solution.
+    pub fn qp_and_iterate(&mut self) -> (QpView<'_, T>, &mut Solution<T, D, M>) {
+        (self.qp.view(), &mut self.iterate)
+    }
+
+    /// States, controls and multipliers.
+    #[must_use]
+    pub fn iterate(&self) -> &Solution<T, D, M> {
+        &self.iterate
+    }
+
+    /// States, controls and multipliers, to be changed.
+    pub fn iterate_mut(&mut self) -> &mut Solution<T, D, M> {
+        &mut self.iterate
+    }
+
+    /// A stage of the iterate.
+    ///
+    /// # Errors
+    /// [`OcpError::NoSuchStage`]
+    pub fn stage(&self, stage: usize) -> Result<SolutionStage<'_, T>, OcpError> {
+        let stages = self.intervals() + 1;
+        self.iterate.stage(stage).ok_or(OcpError::NoSuchStage { part: Part::States, stage, stages })
+    }
+
+    /// A state and a control as the iterate at every stage, and no multipliers: a start that is
+    /// always there.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
+        Labels::states::<P, T>(Part::States, 0).check_vector(x, P::Shape::NX)?;
+        Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, P::Shape::NU)?;
+        for k in 0..=self.intervals() {
+            self.guess_stage(k, x, if k < self.intervals() { u } else { &[] })?;
+        }
+        Ok(self)
+    }
+
+    /// A state and a control as the iterate at one stage, and no multipliers there. The last stage
+    /// has no control.
+    ///
+    /// # Errors
+    /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn guess_stage(&mut self, stage: usize, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
+        let last = self.intervals();
+        let Some(place) = self.iterate.stage_mut(stage) else {
+            return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
+        };
+        Labels::states::<P, T>(Part::States, stage).check_vector(x, place.x.len())?;
+        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, place.u.len())?;
+        assign(place.x, x);
+        assign(place.u, u);
+        for multipliers in [
+            place.dynamics,
+            place.x_lower,
+            place.x_upper,
+            place.u_lower,
+            place.u_upper,
+            place.g_lower,
+            place.g_upper,
+        ] {
+            multipliers.fill(T::ZERO);
+        }
+        Ok(self)
+    }
+
+    /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
+    /// finite.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::InvalidWeight`], [`OcpError::InvalidValue`]
+    pub fn check(&mut self) -> Result<(), OcpError> {
+        let Problem { dynamics, stage_cost, terminal_cost, .. } = self.problem.parts();
+        dynamics.check()?;
+        stage_cost.check_weights()?;
+        terminal_cost.check_weights()?;
+        if self.initial == Initial::Unknown {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        let np = P::Shape::NP;
+        let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
+        if let Some((index, _)) = crate::finite::not_finite(p) {
+            let stage = index.checked_div(np).unwrap_or(0);
+            return Err(OcpError::Missing { part: Part::Parameters, stage });
+        }
+        self.check_iterate()
+    }
+
+    /// # Errors
+    /// [`OcpError::InvalidValue`]
+    pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
+        // All numbers at once; names are looked for where one of these is not finite.
+        if crate::finite::not_finite(self.iterate.numbers()).is_some() {
+            self.name_not_finite()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Finds functions of algebraic states, where these have no derivatives.
+    ///
+    /// # Errors
+    /// [`OcpError::NotThere`]
+    pub(in crate::ocp) fn check_without_algebraic(&mut self) -> Result<(), OcpError> {
+        let Problem { stage_cost, path, .. } = self.problem.parts();
+        let there = There { z: false, u: true, stage: 0 };
+        stage_cost.check(there)?;
+        path.check(there)
+    }
+
+    /// The first number of the iterate that is not finite.
+    fn name_not_finite(&self) -> Result<(), OcpError> {
+        let (last, part) = (self.intervals(), Part::Multipliers);
+        for (stage, point) in self.iterate.stages().enumerate() {
+            Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
+            Labels::controls::<P, T>(Part::Controls, stage).check_finite(point.u)?;
+            for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
+                Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
+            }
+            for multipliers in [point.u_lower, point.u_upper] {
+                Labels::controls::<P, T>(part, stage).check_finite(multipliers)?;
+            }
+            let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
+            let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
+            for multipliers in [point.g_lower, point.g_upper] {
+                of_constraints.check_finite(multipliers)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Everything of the iterate one interval earlier, as the start of the problem of the next
+    /// sampling instant.
+    pub fn shift(&mut self) {
+        self.iterate.shift();
+    }
+}
+
+/// The intervals at a point; weights of algebraic states may be empty.
+pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
+    v: &'a [T],
+    multipliers: &'a [T],
+    weights: &'a [T],
+    p: &'a [T],
+    times: &'a [T],
+) -> Nodes<'a, T> {
+    let dims = [S::NX, S::NU, S::NP, S::NZ];
+    let ld = [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)];
+    Nodes { v, multipliers, weights, p, times, dims, ld, step_length: None }
+}

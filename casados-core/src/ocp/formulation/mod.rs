@@ -1,0 +1,24 @@
+//! What a problem is: functions, bounds, a horizon, and the memory of all of it.
+//!
+//! | | |
+//! | --- | --- |
+//! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
+//! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
+//! | `instance/` | a problem on a horizon, with memory |
+//! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
+//! | `names`, `labels`, `check`, `error` | refusals by name |
+//! | `print` | a problem as mathematics |
+
+pub(in crate::ocp) mod arrival;
+pub(in crate::ocp) mod bounds;
+pub(in crate::ocp) mod check;
+pub(in crate::ocp) mod coupling;
+pub(in crate::ocp) mod error;
+pub(in crate::ocp) mod functions;
+pub(in crate::ocp) mod horizon;
+pub(in crate::ocp) mod instance;
+pub(in crate::ocp) mod labels;
+pub(in crate::ocp) mod names;
+pub(in crate::ocp) mod print;
+pub(in crate::ocp) mod problem;
+pub(in crate::ocp) mod soften;

@@ -1,0 +1,179 @@
+//! Soft bounds of variables and constraints, by name, stage and side.
+
+use crate::ocp::formulation::check::{Labels, first, range};
+use crate::ocp::formulation::error::{OcpError, Part, Text};
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::get;
+use crate::qp::{Side, StageDims};
+use crate::scalar::Real;
+use crate::structure::means;
+use core::ops::RangeBounds;
+
+const BOTH: &[Side] = &[Side::Lower, Side::Upper];
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Makes bounds soft, of states, controls or constraints: leaving one by `e` costs
+    /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
+    ///
+    /// Names are those of variables as in [`Ocp::bound`], or those of constraints: their function,
+    /// and the output if one of several is meant, `Corner[2]`. Path constraints are at all stages
+    /// but the last, terminal ones at that. [`Ocp::soften_lower`] and [`Ocp::soften_upper`] are for
+    /// one side.
+    ///
+    /// # Errors
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]; [`OcpError::NoBound`] if nothing that the name means has a bound
+    /// at these stages. Then no penalty is changed.
+    pub fn soften(
+        &mut self,
+        name: &str,
+        stages: impl RangeBounds<usize>,
+        linear: T,
+        quadratic: T,
+    ) -> Result<&mut Self, OcpError> {
+        self.soften_sides(name, stages, BOTH, [linear, quadratic])
+    }
+
+    /// As [`Ocp::soften`], of lower bounds alone.
+    ///
+    /// # Errors
+    /// As [`Ocp::soften`].
+    pub fn soften_lower(
+        &mut self,
+        name: &str,
+        stages: impl RangeBounds<usize>,
+        linear: T,
+        quadratic: T,
+    ) -> Result<&mut Self, OcpError> {
+        self.soften_sides(name, stages, &[Side::Lower], [linear, quadratic])
+    }
+
+    /// As [`Ocp::soften`], of upper bounds alone.
+    ///
+    /// # Errors
+    /// As [`Ocp::soften`].
+    ///
+    /// # Example
+    /// A pull towards 3 with the force `3 − x`: the upper bound 1 gives way where that is more than
+    /// its penalty.
+    /// ```
+    /// use casados::ocp::{Constraint, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn go(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn place(x: f64, _u: f64) -> f64 { x }
+    ///
+    /// let mut ocp = Problem::new(Map::<Go, f64>::new())
+    ///     .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0]))
+    ///     .terminal_constraints(Constraint::<Place>::new([-1.0], [1.0]))
+    ///     .on(Horizon::uniform(1, 1.0))?;
+    /// ocp.fix_initial_state(&[0.0])?.set_terminal_reference(&[3.0])?;
+    /// ocp.soften_upper("Place", .., 0.5, 0.0)?.guess(&[0.0], &[0.0])?;
+    /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// assert!((ocp.stage(1)?.x[0] - 2.5).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn soften_upper(
+        &mut self,
+        name: &str,
+        stages: impl RangeBounds<usize>,
+        linear: T,
+        quadratic: T,
+    ) -> Result<&mut Self, OcpError> {
+        self.soften_sides(name, stages, &[Side::Upper], [linear, quadratic])
+    }
+
+    fn soften_sides(
+        &mut self,
+        name: &str,
+        stages: impl RangeBounds<usize>,
+        sides: &[Side],
+        penalty: [T; 2],
+    ) -> Result<&mut Self, OcpError> {
+        let known = self.names();
+        let is_variable = known.x.iter().chain(known.u).any(|variable| means(name, variable));
+        let is_path = (0..P::Path::ROWS).any(|row| output::<P::Path, _, T>(row).is_meant(name));
+        let is_terminal = (0..P::Terminal::ROWS).any(|row| output::<P::Terminal, _, T>(row).is_meant(name));
+        let end = if !is_variable && (is_path || is_terminal) {
+            self.soften_constraints(name, &stages, [is_path, is_terminal], sides, penalty)?
+        } else {
+            self.soften_variables(name, &stages, sides, penalty)?
+        };
+        match end {
+            None => Ok(self),
+            Some(end) => Err(OcpError::NoBound { name: Text::new(name), start: first(&stages), end }),
+        }
+    }
+
+    /// Where the stages end, if there was no bound.
+    fn soften_variables(
+        &mut self,
+        name: &str,
+        stages: &impl RangeBounds<usize>,
+        sides: &[Side],
+        [linear, quadratic]: [T; 2],
+    ) -> Result<Option<usize>, OcpError> {
+        let found = self.find(name, stages)?;
+        let (labels, index) = self.labels(name, first(stages));
+        labels.check_penalty(index, linear, quadratic)?;
+        let mut is_bounded = false;
+        self.each(name, found.clone(), |bounds, index| {
+            let of = |&side: &Side| if side == Side::Lower { &*bounds.lower } else { &*bounds.upper };
+            is_bounded |= sides.iter().map(of).any(|list| get(list, index).is_finite());
+        });
+        if !is_bounded {
+            return Ok(found.iter().map(|range| range.end).max());
+        }
+        self.each(name, found, |bounds, index| {
+            sides.iter().for_each(|&side| bounds.soften_side(index, side, linear, quadratic));
+        });
+        Ok(None)
+    }
+
+    /// Where the stages end, if there was no bound.
+    fn soften_constraints(
+        &mut self,
+        name: &str,
+        stages: &impl RangeBounds<usize>,
+        [is_path, is_terminal]: [bool; 2],
+        sides: &[Side],
+        [linear, quadratic]: [T; 2],
+    ) -> Result<Option<usize>, OcpError> {
+        let last = self.intervals();
+        let part = if is_path { Part::PathBounds } else { Part::TerminalBounds };
+        let range = range(part, stages, if is_terminal { last + 1 } else { last })?;
+        let row = match is_path {
+            true => (0..P::Path::ROWS).find(|&row| output::<P::Path, _, T>(row).is_meant(name)),
+            false => (0..P::Terminal::ROWS).find(|&row| output::<P::Terminal, _, T>(row).is_meant(name)),
+        };
+        let labels = Labels::constraints::<P, T>(part, range.start);
+        labels.check_penalty(row.unwrap_or(0), linear, quadratic)?;
+        let data = split::<P, T>(self.data.as_mut(), last);
+        let rows = |k: usize| {
+            let count = if k == last { P::Terminal::ROWS } else { P::Path::ROWS };
+            (0..count).filter(move |&row| match k == last {
+                true => output::<P::Terminal, _, T>(row).is_meant(name),
+                false => output::<P::Path, _, T>(row).is_meant(name),
+            })
+        };
+        let has_bound = |place: usize| {
+            let of = |&side: &Side| if side == Side::Lower { &*data.lower } else { &*data.upper };
+            sides.iter().map(of).any(|list| get(list, place).is_finite())
+        };
+        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * P::Path::ROWS + row))) {
+            return Ok(Some(range.end));
+        }
+        for (k, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| range.contains(k)) {
+            for (row, &side) in rows(k).flat_map(|row| sides.iter().map(move |side| (row, side))) {
+                stage.g_bounds_mut().soften_side(row, side, linear, quadratic);
+            }
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,53 @@
+//! Where a run begins.
+
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{Bounds, Solution, StageDims};
+use crate::scalar::Real;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Linearises at the guess; where something has no value there, at the point nearest to it that
+    /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
+    ///
+    /// # Errors
+    /// That at the guess, if there is none at that point either.
+    pub(in crate::ocp) fn linearise_guess<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        copy: &mut Solution<T, D, M>,
+    ) -> Result<(), OcpError> {
+        let Err(error) = self.linearise(curvature) else { return Ok(()) };
+        if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {
+            return Err(error);
+        }
+        copy.copy_from(&self.iterate);
+        self.clip();
+        let result = self.linearise(curvature);
+        if result.is_err() {
+            self.iterate.copy_from(copy);
+        }
+        result.map_err(|_| error)
+    }
+
+    /// Moves states and controls of the iterate into their bounds.
+    pub(in crate::ocp) fn clip(&mut self) {
+        let Self { qp, iterate, .. } = self;
+        for (k, stage) in qp.view().stages().enumerate() {
+            let Some(point) = iterate.stage_mut(k) else { return };
+            for (values, bounds) in [(point.x, stage.x_bounds()), (point.u, stage.u_bounds())] {
+                let Bounds { lower, upper, .. } = bounds;
+                for ((value, &lower), &upper) in values.iter_mut().zip(lower).zip(upper) {
+                    *value = if *value < lower {
+                        lower
+                    } else if *value > upper {
+                        upper
+                    } else {
+                        *value
+                    };
+                }
+            }
+        }
+    }
+}

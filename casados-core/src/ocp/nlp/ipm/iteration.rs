@@ -1,0 +1,334 @@
+//! One iteration: residuals and barrier parameter, search direction, line search, step.
+
+use super::barrier;
+use super::kkt::lengths::Lengths;
+use super::kkt::measure;
+use super::kkt::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
+use super::kkt::scaling::{Relative, relative};
+use super::line_search::{Accepted, Expected, Found, Room, longest};
+use super::predictor::{self, needs_equal_steps};
+use super::state::{GAMMA_PHI, Next, State};
+
+use super::Ipm;
+use super::kkt::work::Work;
+use super::restoration::elastic;
+use crate::ocp::assembly::convexify::Convexification;
+use crate::ocp::assembly::curvature::{Exact, Slopes};
+use crate::ocp::assembly::units::of_tolerance;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageAction};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::filter::{Filter, Measure};
+use crate::ocp::nlp::watch::Watch;
+use crate::ocp::solution::log::Iteration;
+use crate::ocp::solution::outcome::Status;
+use crate::qp::{QpError, StageDims, Store, larger};
+use crate::scalar::Real;
+
+/// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
+/// it was at the start, or of one: an objective that becomes less leads no farther away.
+const GROWTH: f64 = 10.0;
+/// The Hessian of the Lagrangian as it is.
+const EXACT: Exact = Exact { convexification: Convexification::None };
+
+/// A search direction, and how far it may be gone.
+struct Direction {
+    expected: Expected,
+    tau: f64,
+    primal: f64,
+    dual: f64,
+    /// It moves nothing but rounding errors.
+    tiny: bool,
+    /// Whether it has the changes of products.
+    is_corrected: bool,
+}
+
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
+    /// One iteration; a status if it is the last one.
+    pub(super) fn iterate<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<Option<Status>, OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        let mut watch = Watch::start();
+        self.linearise(ocp, capacity, state)?;
+        self.assess(ocp, capacity, state, row)?;
+        row.times.linearise = watch.lap();
+        if (state.over)() {
+            return Ok(Some(Status::OutOfTime));
+        }
+        match self.next(ocp, capacity, state, row) {
+            Next::Direction => {}
+            Next::NewPenalties => return Ok(None),
+            Next::End(status) => {
+                if matches!(status, Status::Infeasible { .. }) {
+                    // That is said of the last iterate.
+                    state.best_iteration = *row;
+                }
+                return Ok(Some(status));
+            }
+        }
+        if state.is_held() {
+            self.release(ocp, state)?;
+        }
+        let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
+            let here = self.here(ocp, capacity, state)?;
+            self.along(ocp, capacity, state, here, is_corrected)
+        });
+        let mut direction = match direction {
+            Ok(direction) => direction,
+            Err(error @ QpError::NotConvex { .. }) => {
+                // A derivative that is not finite is another error.
+                ocp.status_of_error(error)?;
+                return Ok(self.recover(ocp, capacity, state));
+            }
+            Err(error) => return ocp.status_of_error(error).map(Some),
+        };
+        self.expand(ocp, state)?;
+        row.times.qp = watch.lap();
+        if (state.over)() {
+            return Ok(Some(Status::OutOfTime));
+        }
+        let accepted = match self.search(ocp, capacity, state, &mut direction)? {
+            Found::OutOfTime => return Ok(Some(Status::OutOfTime)),
+            found => found.accepted(),
+        };
+        row.times.search = watch.lap();
+        let Some(accepted) = accepted else {
+            return Ok(self.recover(ocp, capacity, state));
+        };
+        (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
+        state.count_straying(row.step);
+        state.regularisation.gone(accepted.alpha / direction.primal);
+        self.accept(ocp, capacity, state, &direction, accepted)?;
+        let least =
+            (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);
+        let ends = direction.tiny && state.mu <= least;
+        Ok(ends.then_some(Status::NoProgress))
+    }
+
+    /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
+    pub(super) fn linearise<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+    ) -> Result<(), OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        if !state.has_slacks {
+            if !core::mem::take(&mut state.is_linearised) {
+                ocp.linearise(Slopes)?;
+            }
+            if state.lengths.alone {
+                ocp.forget_gradients();
+            }
+            self.begin(ocp, capacity, state)?;
+        }
+        self.curve(ocp, capacity, state)?;
+        ocp.linearise(EXACT)?;
+        if state.lengths.alone {
+            ocp.forget_gradients();
+        }
+        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
+        attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
+        Ok(())
+    }
+
+    /// Residuals and barrier parameter at the iterate, and the best iterate.
+    fn assess<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<(), OcpError> {
+        let (plain, [_, of_stages]) = (ocp.objective.to_f64(), ocp.stages.map(|left| left.to_f64()));
+        let ends = ocp.ends();
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
+        let mut view = solution.view_mut();
+        iterate.store(&mut view);
+        let objective = if state.lengths.alone { plain } else { plain + penalties };
+        if P::Dynamics::LIFTED {
+            residuals.dynamics = larger(residuals.dynamics, of_stages);
+        }
+        if self.options.final_mu > 0.0 {
+            (residuals.inequalities, residuals.complementarity) =
+                barrier::residuals(&iterate.sides, self.options.final_mu);
+        }
+        let work = Work::new(ends, capacity, self.work.as_mut());
+        let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
+        let units = state.lengths.units(work.units);
+        let Relative { barrier, error, others } =
+            relative(&residuals, &iterate, view.dynamics, units, of_stages);
+        state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
+        state.judge(error, others, &self.options);
+        state.gaps = barrier.0.dynamics;
+        state.violation = larger(state.gaps, barrier.0.inequalities);
+        let is_alone = state.lengths.alone;
+        if is_alone {
+            state.phase.take(&iterate, view.dynamics, state.gaps, units);
+        }
+        (row.residuals, row.objective) = (residuals, objective);
+        (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let worst = elastic::worst(ocp, state, (work.penalties, work.units));
+        let violation = worst.map_or(0.0, |worst| worst.violation);
+        let size = larger(state.error, violation);
+        let is_best = size < state.best_residual || state.best_residual.is_nan();
+        if !is_alone && is_best || row.iteration == 0 {
+            (state.best_residual, state.best_iteration) = (size, *row);
+            state.best_violation = state.violation;
+            self.best.copy_from(&ocp.iterate);
+            ocp.problem.parts().dynamics.move_stages(StageAction::Remember);
+        }
+        let acceptable = !is_alone && size <= self.options.acceptable_tolerance;
+        state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
+        Ok(())
+    }
+
+    /// Barrier function and violation at the iterate.
+    ///
+    /// # Errors
+    /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
+    fn here<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+    ) -> Result<Measure, QpError> {
+        let lengths = state.lengths;
+        let Self { trial, numbers, indices, work, .. } = self;
+        let plain = if lengths.alone { 0.0 } else { ocp.objective.to_f64() };
+        let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
+        let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
+        let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
+        if P::Dynamics::LIFTED {
+            // The QP has the ends of intervals where the next step would lead to.
+            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
+            here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
+        }
+        if !state.has_filter {
+            state.first_violation = here.violation;
+            state.small_violation = 1e-4 * here.violation.max(1.0);
+            state.filter = Filter::new(GAMMA_PHI, 1e4 * here.violation.max(1.0));
+            state.has_filter = true;
+        }
+        Ok(here)
+    }
+
+    /// What is to be expected along the search direction, and how far it may be gone.
+    ///
+    /// # Errors
+    /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
+    fn along<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &State<'_>,
+        here: Measure,
+        is_corrected: bool,
+    ) -> Result<Direction, QpError> {
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let first = state.first_violation.max(1.0);
+        let expected = Expected {
+            here,
+            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
+            small_violation: state.small_violation,
+            most: (GROWTH * here.violation.min(first)).max(first),
+            mu: state.mu,
+            delta: state.delta,
+        };
+        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
+        let (primal, dual) = predictor::lengths(&iterate.sides, tau);
+        let noise = T::from_f64(10.0 * T::EPSILON);
+        let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
+        let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
+        let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
+        Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
+    }
+
+    /// How far the search direction is gone. A corrected one is gone as far as it may be, or
+    /// not at all: then the direction is that without the correction.
+    fn search<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        direction: &mut Direction,
+    ) -> Result<Found, OcpError> {
+        if direction.tiny {
+            return Ok(Found::Step(Accepted { alpha: direction.primal, corrected: false }));
+        }
+        let lengths = state.lengths;
+        macro_rules! room {
+            ($work:ident) => {{
+                let Self { trial, numbers, indices, work, .. } = &mut *self;
+                $work = Work::new(ocp.ends(), capacity, work.as_mut());
+                Room { lengths: &lengths, numbers, indices, trial, work: &mut $work }
+            }};
+        }
+        let mut work;
+        if direction.is_corrected {
+            let Direction { expected, primal, .. } = direction;
+            if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
+                return Ok(Found::Step(Accepted { alpha: *primal, corrected: false }));
+            }
+            let here = direction.expected.here;
+            let mut iterate = attach(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
+            again(&mut iterate, T::from_f64(state.mu), false)?;
+            *direction = self.along(ocp, capacity, state, here, false)?;
+            self.expand(ocp, state)?;
+        }
+        let Direction { expected, primal, tau, .. } = direction;
+        room!(work).search(ocp, state, expected, *primal, *tau)
+    }
+
+    /// Goes the step that was accepted.
+    fn accept<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &State<'_>,
+        direction: &Direction,
+        accepted: Accepted,
+    ) -> Result<(), OcpError> {
+        let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        iterate.units = &*core::mem::take(&mut work.units);
+        let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
+        if corrected {
+            dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+        }
+        if needs_equal_steps(&iterate.sides) {
+            dual = dual.min(alpha);
+        }
+        dynamics_after(&mut iterate, &mut work, T::from_f64(state.delta));
+        let part = T::from_f64(alpha);
+        for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
+            *pi = *pi + part * (after - *pi);
+        }
+        let full = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        for (of_hessian, (&multiplier, &step)) in work.hessian_multipliers.iter_mut().zip(full) {
+            *of_hessian = *of_hessian + part * (multiplier + step - *of_hessian);
+        }
+        iterate.go(part, T::from_f64(dual));
+        barrier::keep_near_centre(&mut iterate.sides, state.mu);
+        iterate.store(&mut view);
+        ocp.problem.parts().dynamics.move_stages(StageAction::Go(part));
+        // The line search ends where it accepts a point; a tiny step has none.
+        ocp.has_algebraic = !direction.tiny;
+        Ok(())
+    }
+}

@@ -1,0 +1,143 @@
+//! Barrier function and violation at a point, and how the barrier function changes along a step.
+
+use super::scaling::{of_gaps, of_sides, sum};
+use crate::ocp::assembly::units::Units;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::filter::Measure;
+use crate::qp::interior::{Iterate, Sides};
+use crate::qp::{Places, Solution, StageDims, add_symmetric, assign, part, part_mut};
+use crate::scalar::{Real, Scalar};
+use crate::shape::Shape;
+
+/// `Σ λ_e e + ½ q e²` of violations of soft sides, and `−Σ log` of slacks and violations.
+pub(in crate::ocp::nlp::ipm) fn penalties_and_barrier<T: Real>(
+    sides: &Sides<'_, T>,
+    slacks: &[T],
+) -> (f64, f64) {
+    let violations = slacks.get(sides.counts.sides()..).unwrap_or_default();
+    let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
+    let penalties = costs.fold(0.0, |sum, ((&l, &q), &e)| {
+        let (l, q, e) = (l.to_f64(), q.to_f64(), e.to_f64());
+        sum + e * (l + 0.5 * q * e)
+    });
+    let barrier = slacks.iter().fold(0.0, |sum, &s| sum - Scalar::ln(s.to_f64()));
+    (penalties, barrier)
+}
+
+/// Barrier function, in units of forces, and violation at the iterate itself, from residuals that
+/// are there.
+pub(in crate::ocp::nlp::ipm) fn here<T: Real>(
+    iterate: &Iterate<'_, T>,
+    objective: f64,
+    mu: f64,
+    units: Units<'_, T>,
+) -> Measure {
+    let (force, units) = (units.sizes.force, units.rows);
+    let sides = &iterate.sides;
+    let gaps = of_gaps(iterate.qp.dims, iterate.dynamics, units);
+    let equations = of_sides(sides.equations, sides.equation_residual, units);
+    let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.violation());
+    let violation = sum(gaps) + sum(of_sides(sides.rows, sides.residual, units)) + sum(equations) + coupling;
+    let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
+    Measure { objective: (objective + penalties + mu * barrier) / force, violation }
+}
+
+/// `∇φᵀ d`
+pub(in crate::ocp::nlp::ipm) fn slope<T: Real>(iterate: &Iterate<'_, T>, mu: f64, scratch: &mut [T]) -> f64 {
+    let mut slope = T::ZERO;
+    for (place, stage) in Places::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
+        let view = stage.arrays();
+        let gradient = part_mut(scratch, 0, place.ld);
+        assign(gradient, part(view.gradient, 0, place.ld));
+        add_symmetric(gradient, view.hessian, place.ld, part(iterate.v, place.row, place.ld), place.n);
+        let step = part(iterate.step, place.row, place.n);
+        slope = gradient.iter().zip(step).fold(slope, |sum, (&g, &d)| sum + g * d);
+    }
+    let sides = &iterate.sides;
+    let mut slope = slope.to_f64();
+    for (&s, &d) in sides.slack.iter().zip(&*sides.slack_step) {
+        slope -= mu * d.to_f64() / s.to_f64();
+    }
+    let violations = sides.slack.get(sides.counts.sides()..).unwrap_or_default();
+    let steps = sides.slack_step.get(sides.counts.sides()..).unwrap_or_default();
+    for (((&l, &q), &e), &d) in sides.linear.iter().zip(&*sides.quadratic).zip(violations).zip(steps) {
+        slope += (l.to_f64() + q.to_f64() * e.to_f64()) * d.to_f64();
+    }
+    slope
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Objective, and the values of all rows at a point, in the units of the QP's bounds; ends of
+    /// intervals and constraints in `ends`.
+    ///
+    /// # Errors
+    /// Those of functions and integrators.
+    pub(in crate::ocp::nlp::ipm) fn rows_at(
+        &mut self,
+        at: &Solution<T, D, M>,
+        ends: &mut [T],
+        rows: &mut [T],
+    ) -> Result<f64, OcpError> {
+        let objective = self.evaluate(at, ends)?.to_f64();
+        let (intervals, nx, count) = (self.intervals(), P::Shape::NX, self.rows());
+        let values = ends.get(intervals * nx..).unwrap_or_default();
+        let (v, _) = at.vectors();
+        let qp = self.qp.view();
+        for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+            let rows = part_mut(rows, place.row, place.rows);
+            assign(rows, part(v, place.v, place.n));
+            let bounds = stage.g_bounds();
+            for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
+                // Bounds of the QP are those that were given, and what its linear part leaves.
+                let [given_lower, given_upper] = self.limits(place.stage, index);
+                let shift = if lower.is_finite() { lower - given_lower } else { upper - given_upper };
+                let value = values.get(place.stage * count + index).copied().unwrap_or(T::ZERO);
+                if let Some(row) = rows.get_mut(place.ld + index) {
+                    *row = if shift.is_finite() { value + shift } else { value };
+                }
+            }
+        }
+        Ok(objective)
+    }
+
+    /// The sum of the gaps between the ends of intervals and the states that follow, in units.
+    pub(in crate::ocp::nlp::ipm) fn gaps_at(&self, at: &Solution<T, D, M>, ends: &[T], units: &[T]) -> f64 {
+        let nx = P::Shape::NX;
+        let mut sum = 0.0;
+        for (k, (next, place)) in at.stages().zip(Places::<T>::new(at.dims())).skip(1).enumerate() {
+            let units = part(units, place.row, nx);
+            for ((&phi, &x), &unit) in part(ends, k * nx, nx).iter().zip(next.x).zip(units) {
+                sum += ((phi - x) / unit).abs().to_f64();
+            }
+        }
+        sum
+    }
+}
+
+/// Violations of sides and equations whose rows have such values, with such slacks.
+pub(in crate::ocp::nlp::ipm) fn violations<T: Real>(
+    sides: &mut Sides<'_, T>,
+    rows: &[T],
+    slacks: &[T],
+    units: &[T],
+) -> f64 {
+    let at = |row: u32| rows.get(row as usize).copied().unwrap_or(T::ZERO);
+    let lower = sides.counts.lower;
+    let listed = sides.rows.iter().zip(&*sides.bound).zip(slacks);
+    for (i, (residual, ((&row, &bound), &slack))) in sides.scratch.iter_mut().zip(listed).enumerate() {
+        let distance = at(row) - bound;
+        *residual = if i < lower { distance - slack } else { -distance - slack };
+    }
+    let violations = slacks.get(sides.counts.sides()..).unwrap_or_default();
+    for (&side, &violation) in sides.soft.iter().zip(violations) {
+        if let Some(residual) = sides.scratch.get_mut(side as usize) {
+            *residual = *residual + violation;
+        }
+    }
+    let of_sides = sum(of_sides(sides.rows, sides.scratch, units));
+    let unit = |row: u32| units.get(row as usize).copied().unwrap_or(T::ONE);
+    let equations = sides.equations.iter().zip(&*sides.equation_bound);
+    equations.fold(of_sides, |sum, (&row, &bound)| sum + ((at(row) - bound) / unit(row)).abs().to_f64())
+}

@@ -1,0 +1,299 @@
+//! Newton's equations of the barrier problem, over the memory of a run.
+//!
+//! With the QP written at the iterate, one step of the interior point of QPs from there is a step
+//! of that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
+
+use super::lengths::{Lengths, reading};
+use super::work::Work;
+use crate::ocp::assembly::units::Sizes;
+use crate::qp::interior::{First, Iterate, Sides, at};
+use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
+use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
+
+/// The iterate of Newton's method in its memory, whose contents stay as they were.
+///
+/// # Errors
+/// [`QpError::OutOfMemory`], [`QpError::Dimension`]
+pub(in crate::ocp::nlp::ipm) fn attach<'a, T: Real>(
+    qp: QpView<'a, T>,
+    lengths: &Lengths,
+    numbers: &'a mut impl Store<T>,
+    indices: &'a mut impl Store<u32>,
+) -> Result<Iterate<'a, T>, QpError> {
+    let mut numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
+    let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
+    let first = if lengths.fixed { First::Fixed } else { First::Free };
+    let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
+    let Sizes { force, least } = lengths.sizes;
+    sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
+    Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
+}
+
+/// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties. What
+/// equations give way is measured in `units` of their rows.
+///
+/// # Errors
+/// As [`attach`].
+pub(in crate::ocp::nlp::ipm) fn attach_to_new<'a, T: Real>(
+    qp: QpView<'a, T>,
+    lengths: &Lengths,
+    numbers: &'a mut impl Store<T>,
+    indices: &'a mut impl Store<u32>,
+    units: &[T],
+) -> Result<Iterate<'a, T>, QpError> {
+    let mut iterate = attach(qp, lengths, numbers, indices)?;
+    iterate.sides.list(qp, &reading(qp));
+    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.sizes.least));
+    for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
+        let ratio = least / at(units, row);
+        *stiffness = ratio * ratio;
+    }
+    Ok(iterate)
+}
+
+/// Evaluates all residuals at a point with its multipliers `π`: the largest of those of the
+/// problem, and what violations of soft bounds cost.
+pub(in crate::ocp::nlp::ipm) fn evaluate<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    at: &mut SolutionView<'_, T>,
+) -> (Residuals, f64) {
+    iterate.take_point(at);
+    iterate.give_initial_state();
+    let mut found = Default::default();
+    T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics, found: &mut found });
+    found
+}
+
+struct Evaluate<'r, 'a, 's, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    pi: &'s mut [T],
+    found: &'s mut (Residuals, f64),
+}
+
+compiled!(/// See [`Evaluate`].
+EvaluateCompiled: Evaluate<'r, 'a, 's, T>);
+
+impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, pi, found } = self;
+        iterate.evaluate_at::<E>(pi);
+        let penalties = iterate.sides.costs_of_violations().to_f64();
+        *found = (iterate.at_point::<E>().into(), penalties);
+    }
+}
+
+/// Residuals of what is linear in the QP at the iterate, after its constants have changed.
+pub(in crate::ocp::nlp::ipm) fn evaluate_values<T: Real>(iterate: &mut Iterate<'_, T>) {
+    T::compiled::<EvaluateValuesCompiled>(EvaluateValues { iterate });
+}
+
+struct EvaluateValues<'r, 'a, T> {
+    iterate: &'r mut Iterate<'a, T>,
+}
+
+compiled!(/// See [`EvaluateValues`].
+EvaluateValuesCompiled: EvaluateValues<'r, 'a, T>);
+
+impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        self.iterate.evaluate_values::<E>();
+    }
+}
+
+/// A step towards products of slacks and multipliers that are all `μ`.
+///
+/// # Errors
+/// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
+/// definite.
+pub(in crate::ocp::nlp::ipm) fn step<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    mu: T,
+    delta: T,
+) -> Result<(), QpError> {
+    iterate.proximal = delta;
+    towards(iterate, mu, false, true)
+}
+
+/// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
+/// that are there.
+///
+/// # Errors
+/// Those of the recursion.
+pub(in crate::ocp::nlp::ipm) fn again<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    mu: T,
+    corrected: bool,
+) -> Result<(), QpError> {
+    towards(iterate, mu, corrected, false)
+}
+
+fn towards<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    mu: T,
+    corrected: bool,
+    factor: bool,
+) -> Result<(), QpError> {
+    let mut result = Ok(());
+    T::compiled::<StepCompiled>(Step { iterate, mu, corrected, factor, result: &mut result });
+    result
+}
+
+struct Step<'r, 'a, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    mu: T,
+    corrected: bool,
+    factor: bool,
+    result: &'r mut Result<(), QpError>,
+}
+
+compiled!(/// See [`Step`].
+StepCompiled: Step<'r, 'a, T>);
+
+impl<T: Real> Registers<T> for Step<'_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, mu, corrected, factor, result } = self;
+        if corrected {
+            iterate.sides.correct(mu);
+        } else {
+            iterate.sides.aim(mu);
+        }
+        *result = iterate.newton::<E>(factor);
+    }
+}
+
+/// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
+/// back bit by bit.
+pub(in crate::ocp::nlp::ipm) fn dynamics_after<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    work: &mut Work<'_, T>,
+    delta: T,
+) {
+    assign(work.rows, iterate.v);
+    assign(work.slacks, iterate.sides.multiplier);
+    assign(work.ends, iterate.sides.free);
+    iterate.proximal = delta;
+    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
+    assign(iterate.v, work.rows);
+    assign(iterate.sides.multiplier, work.slacks);
+    assign(iterate.sides.free, work.ends);
+}
+
+struct After<'r, 'a, 's, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    pi: &'s mut [T],
+}
+
+compiled!(/// See [`After`].
+AfterCompiled: After<'r, 'a, 's, T>);
+
+impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        self.iterate.go_without_slacks();
+        self.iterate.controlled_costates::<E>(self.pi);
+    }
+}
+
+/// The weight of the identity in place of the Hessian in [`least_squares`], in units of forces.
+const IDENTITY: f64 = 1e8;
+
+/// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
+/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are
+/// given. These are Newton's equations with a large multiple of the identity for a Hessian, and no
+/// residuals of the constraints (Wächter and Biegler, section 3.6).
+///
+/// # Errors
+/// Those of the recursion.
+pub(in crate::ocp::nlp::ipm) fn least_squares<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    work: &mut Work<'_, T>,
+    force: f64,
+) -> Result<(), QpError> {
+    let identity = T::from_f64(IDENTITY * force);
+    assign(work.slacks, iterate.sides.multiplier);
+    general_multipliers(iterate, |_| T::ZERO);
+    let mut result = Ok(());
+    T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, identity, result: &mut result });
+    result?;
+    let sides = &mut iterate.sides;
+    assign(work.hessian_multipliers, sides.multiplier_step);
+    sides.multiplier_step.fill(T::ZERO);
+    general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
+    assign(work.rows, iterate.v);
+    iterate.proximal = identity;
+    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
+    assign(iterate.v, work.rows);
+    assign(iterate.sides.multiplier, work.slacks);
+    Ok(())
+}
+
+/// Sets multipliers of sides of general constraints.
+fn general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
+    let sides = &mut iterate.sides;
+    let count = sides.counts.sides();
+    let general = is_general::<T>(iterate.qp, sides.rows);
+    for (i, (multiplier, general)) in sides.multiplier.iter_mut().zip(general).enumerate().take(count) {
+        if general {
+            *multiplier = value(i);
+        }
+    }
+}
+
+/// Whether rows, first those of lower and then those of upper sides, belong to general constraints.
+pub(in crate::ocp::nlp::ipm) fn is_general<'a, T: Real>(
+    qp: QpView<'a, T>,
+    rows: &'a [u32],
+) -> impl Iterator<Item = bool> + 'a {
+    let mut places = Places::<T>::new(qp.dims).peekable();
+    let mut last = 0;
+    rows.iter().map(move |&row| {
+        let row = row as usize;
+        if row < last {
+            places = Places::<T>::new(qp.dims).peekable();
+        }
+        last = row;
+        while places.next_if(|place| row >= place.row + place.rows).is_some() {}
+        places.peek().is_some_and(|place| row >= place.row + place.ld)
+    })
+}
+
+struct LeastSquares<'r, 'a, 's, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    pi: &'s mut [T],
+    identity: T,
+    result: &'r mut Result<(), QpError>,
+}
+
+compiled!(/// See [`LeastSquares`].
+LeastSquaresCompiled: LeastSquares<'r, 'a, 's, T>);
+
+impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, pi, identity, result } = self;
+        pi.fill(T::ZERO);
+        iterate.evaluate_at::<E>(pi);
+        iterate.dynamics.fill(T::ZERO);
+        iterate.proximal = identity;
+        let sides = &mut iterate.sides;
+        sides.residual.fill(T::ZERO);
+        sides.equation_residual.fill(T::ZERO);
+        sides.target.fill(T::ZERO);
+        sides.inverse.fill(T::ZERO);
+        let general = is_general::<T>(iterate.qp, sides.rows);
+        for ((inverse, multiplier), general) in
+            sides.inverse.iter_mut().zip(&mut *sides.multiplier).zip(general)
+        {
+            if general {
+                (*inverse, *multiplier) = (T::ONE, identity);
+            }
+        }
+        if let Some(coupling) = &mut iterate.coupling {
+            coupling.residual.fill(T::ZERO);
+        }
+        *result = iterate.newton::<E>(true);
+    }
+}

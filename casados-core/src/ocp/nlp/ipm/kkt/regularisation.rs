@@ -1,0 +1,108 @@
+//! Newton's step, with as much on the diagonal (`δ_w`) as makes the reduced Hessian positive
+//! definite.
+
+use super::newton::step;
+use crate::qp::QpError;
+use crate::qp::interior::Iterate;
+use crate::scalar::Real;
+
+/// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
+const FIRST: f64 = 1e-4;
+/// With this on the diagonal, directions without curvature may be left alone.
+const FLAT: f64 = 1e-6;
+/// `δ_w` is never less.
+const LEAST: f64 = 1e-20;
+/// Where this is not enough nothing is.
+const MOST: f64 = 1e20;
+/// A step that goes no farther than this part of what bounds leave of it is short,
+const SHORT: f64 = 0.1;
+/// and after so many in sequence the next ones are damped,
+const PATIENCE: usize = 8;
+/// at first by this, as `δ_w` is,
+const FIRST_DAMPING: f64 = 1e-3;
+/// and not at all any more where this does not help.
+const MOST_DAMPING: f64 = 1e2;
+
+/// What is remembered of `δ_w`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::ocp::nlp::ipm) struct Regularisation {
+    /// The last one that curvature asked for.
+    last: f64,
+    /// No less is taken while steps are short.
+    damping: f64,
+    /// So many steps in sequence were short.
+    short: usize,
+}
+
+impl Regularisation {
+    /// A step was accepted that goes so far of what bounds leave of it. Where constraints are
+    /// curved and the reduced Hessian is nearly singular, full steps leave the constraints at once,
+    /// and what the line search leaves of them is nothing: as in a trust region shorter steps in
+    /// another direction go farther.
+    pub fn gone(&mut self, part: f64) {
+        if part >= SHORT {
+            self.short = 0;
+            if part >= 1.0 {
+                let less = self.damping / 3.0;
+                self.damping = if less > 1e-2 * FIRST_DAMPING { less } else { 0.0 };
+            }
+            return;
+        }
+        self.short += 1;
+        if self.short >= PATIENCE || self.damping > 0.0 {
+            self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last);
+            if self.damping > MOST_DAMPING {
+                (self.damping, self.short) = (0.0, 0);
+            }
+        }
+    }
+
+    /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
+    ///
+    /// # Errors
+    /// Those of the recursion.
+    pub fn direction<T: Real>(
+        &mut self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        force: f64,
+    ) -> Result<f64, QpError> {
+        let mut failed = match self.attempt(iterate, mu, self.damping, force) {
+            Ok(()) => return Ok(self.damping * force),
+            Err(failed) => failed,
+        };
+        let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
+        delta = delta.max(8.0 * self.damping);
+        while delta < MOST {
+            match self.attempt(iterate, mu, delta, force) {
+                Ok(()) => {
+                    self.last = delta;
+                    return Ok(delta * force);
+                }
+                Err(error) => failed = error,
+            }
+            delta *= if self.last > 0.0 { 8.0 } else { 100.0 };
+        }
+        Err(failed)
+    }
+
+    /// One factorisation; a step that is not finite is no step.
+    fn attempt<T: Real>(
+        &self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        delta: f64,
+        force: f64,
+    ) -> Result<(), QpError> {
+        match step(iterate, mu, T::from_f64(delta * force)) {
+            Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
+            }
+            // Directions in which pivots vanished would not move at all.
+            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
+            }
+            result => result,
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! How far a step goes: the filter line search with second-order corrections.
+
+use super::kkt::lengths::Lengths;
+use super::kkt::measure;
+use super::kkt::newton::{attach, attach_to_new, evaluate_values};
+use super::kkt::work::Work;
+use super::state::{GAMMA_PHI, State};
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::filter::{
+    Filter, GAMMA_THETA, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides,
+};
+use crate::qp::interior::Iterate;
+use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
+use crate::scalar::{Real, Scalar};
+
+/// `η_φ`
+const ARMIJO: f64 = 1e-8;
+/// `γ_α`
+const SAFETY: f64 = 0.05;
+/// Corrections of one step.
+const CORRECTIONS: usize = 4;
+/// `κ_soc`: a correction that leaves more of the violation is the last one.
+const CORRECTED: f64 = 0.99;
+
+/// What is known before a line search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expected {
+    pub here: Measure,
+    /// `∇φᵀ d`, in units of forces.
+    pub slope: f64,
+    /// `θ_min`: below this violation the barrier function may decide.
+    pub small_violation: f64,
+    /// No step leaves more violation.
+    pub most: f64,
+    pub mu: f64,
+    /// `δ_w`
+    pub delta: f64,
+}
+
+impl Expected {
+    /// Whether the barrier function decides after a step of this length.
+    fn decides(&self, alpha: f64) -> bool {
+        self.here.violation <= self.small_violation
+            && objective_decides(alpha, self.slope, self.here.violation)
+    }
+
+    /// The shortest step that can be accepted (equation (23)).
+    fn shortest(&self) -> f64 {
+        let Measure { violation, .. } = self.here;
+        let mut least: f64 = GAMMA_THETA;
+        if self.slope < 0.0 {
+            least = least.min(GAMMA_PHI * violation / -self.slope);
+            if violation <= self.small_violation {
+                let powers =
+                    (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
+                least = least.min(powers.0 / powers.1);
+            }
+        }
+        (SAFETY * least).max(1e-14)
+    }
+
+    /// Whether a point after a step of this length is good enough; the filter grows where the
+    /// barrier function does not decide.
+    pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
+        // What rounding leaves of a difference of barrier functions.
+        let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
+        if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {
+            return false;
+        }
+        if self.decides(alpha) {
+            return there.objective <= self.here.objective + ARMIJO * alpha * self.slope + noise;
+        }
+        filter.improves(there, &self.here, noise)
+    }
+}
+
+/// A step that was accepted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Accepted {
+    pub alpha: f64,
+    pub corrected: bool,
+}
+
+/// What a line search finds.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Found {
+    /// A step.
+    Step(Accepted),
+    /// No step is short enough.
+    Nothing,
+    /// The time was over before.
+    OutOfTime,
+}
+
+impl Found {
+    /// The step.
+    pub fn accepted(self) -> Option<Accepted> {
+        match self {
+            Self::Step(accepted) => Some(accepted),
+            _ => None,
+        }
+    }
+}
+
+/// The memory that a line search works on.
+pub(super) struct Room<'r, 'w, T, D, M, N, I> {
+    pub lengths: &'r Lengths,
+    pub numbers: &'r mut N,
+    pub indices: &'r mut I,
+    pub trial: &'r mut Solution<T, D, M>,
+    pub work: &'r mut Work<'w, T>,
+}
+
+impl<T, D, M, N, I> Room<'_, '_, T, D, M, N, I>
+where
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+    N: Store<T>,
+    I: Store<u32>,
+{
+    /// Whether the filter accepts a step of this length; a point without a value is not accepted.
+    pub fn accepts<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        filter: &mut Filter,
+        expected: &Expected,
+        alpha: f64,
+    ) -> bool {
+        self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
+    }
+
+    /// Halves the step until the filter accepts it.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]; points without a value are not good enough.
+    pub fn search<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_>,
+        expected: &Expected,
+        longest: f64,
+        tau: f64,
+    ) -> Result<Found, OcpError> {
+        let State { filter, over, .. } = state;
+        let mut alpha = longest;
+        let shortest = expected.shortest();
+        while alpha >= shortest {
+            let there = self.measure(ocp, expected.mu, alpha);
+            if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
+                return Ok(Found::Step(Accepted { alpha, corrected: false }));
+            }
+            // Corrections know nothing of stages.
+            let bends =
+                !P::Dynamics::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
+            if alpha == longest
+                && bends
+                && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
+            {
+                return Ok(Found::Step(Accepted { alpha, corrected: true }));
+            }
+            if over() {
+                return Ok(Found::OutOfTime);
+            }
+            alpha *= 0.5;
+        }
+        Ok(Found::Nothing)
+    }
+
+    /// Barrier function and violation after a part of the step; nothing where a function has no
+    /// value.
+    pub fn measure<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        mu: f64,
+        alpha: f64,
+    ) -> Option<Measure> {
+        let part_of_step = T::from_f64(alpha);
+        ocp.step_length = Some(part_of_step);
+        {
+            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+            self.trial.copy_from(&ocp.iterate);
+            let to = self.trial.view_mut();
+            for place in Places::<T>::new(iterate.qp.dims) {
+                let v = part_mut(to.v, place.v, place.n);
+                let from =
+                    part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
+                for (v, (&from, &step)) in v.iter_mut().zip(from) {
+                    *v = from + part_of_step * step;
+                }
+            }
+            let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
+            for (slack, (&from, &mut step)) in self.work.slacks.iter_mut().zip(steps) {
+                *slack = from + part_of_step * step;
+            }
+        }
+        let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
+        let objective = if self.lengths.alone { 0.0 } else { objective };
+        ocp.step_length = Some(T::ZERO);
+        let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
+        if P::Dynamics::LIFTED {
+            gaps += ocp.stages[0].to_f64();
+        }
+        let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+        let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
+        let mut violation =
+            gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
+        if let Some(coupling) = &mut iterate.coupling {
+            coupling.evaluate(iterate.qp, self.work.rows);
+            violation += coupling.violation();
+        }
+        let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
+        Some(Measure {
+            objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force,
+            violation,
+        })
+    }
+
+    /// Second-order corrections: constraints take their values at the point that was tried.
+    /// Afterwards the step is what was accepted, or what it was before.
+    fn correct<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        filter: &mut Filter,
+        expected: &Expected,
+        tau: f64,
+    ) -> Result<Option<f64>, OcpError> {
+        {
+            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            assign(self.work.step, iterate.step);
+            assign(self.work.slack_step, iterate.sides.slack_step);
+            assign(self.work.multiplier_step, iterate.sides.multiplier_step);
+        }
+        let mut violation = expected.here.violation;
+        let mut accepted = None;
+        for _ in 0..CORRECTIONS {
+            ocp.correct(self.trial, self.work.ends);
+            let (solved, alpha) = {
+                let qp = ocp.qp.view();
+                let mut iterate =
+                    attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                iterate.units = self.work.units;
+                // Sides keep their slacks; the gradient stays what it was.
+                evaluate_values(&mut iterate);
+                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
+                let solved = super::kkt::newton::step(&mut iterate, mu, delta);
+                (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
+            };
+            if solved.is_err() {
+                break;
+            }
+            let Some(there) = self.measure(ocp, expected.mu, alpha) else { break };
+            if expected.accepts(filter, alpha, &there) {
+                accepted = Some(alpha);
+                break;
+            }
+            if there.violation > CORRECTED * violation {
+                break;
+            }
+            violation = there.violation;
+        }
+        if accepted.is_none() {
+            let iterate: Iterate<'_, T> = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            assign(iterate.step, self.work.step);
+            assign(iterate.sides.slack_step, self.work.slack_step);
+            assign(iterate.sides.multiplier_step, self.work.multiplier_step);
+        }
+        Ok(accepted)
+    }
+}
+
+/// The longest step after which `1 − τ` of every number is left, at most 1.
+pub(super) fn longest<T: Real>(values: &[T], steps: &[T], tau: f64) -> f64 {
+    let mut ratio = 1.0f64;
+    for (&value, &step) in values.iter().zip(steps) {
+        let (value, step) = (value.to_f64(), step.to_f64());
+        if step < 0.0 && -step * ratio > tau * value {
+            ratio = tau * value / -step;
+        }
+    }
+    ratio
+}

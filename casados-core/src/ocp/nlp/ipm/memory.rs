@@ -1,0 +1,87 @@
+//! In memory that is given.
+
+use super::Ipm;
+use super::IpmOptions;
+use super::kkt::lengths::all_soft;
+use super::kkt::work::Work;
+use crate::ocp::assembly::linearise::ends;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::interior::{Counts, Iterate};
+use crate::qp::{Solution, StageDims};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
+    /// How many numbers and indices it takes for a problem with so many finite bounds of variables
+    /// and constraints (each side for itself), and equations (pairs of equal bounds) beside the
+    /// state at the start: as much as if all were soft, which they are where no step makes
+    /// progress.
+    ///
+    /// Periodic states and shared controls, for which the feature `alloc` is needed, take
+    /// [`InteriorPoint::memory_of_coupling`](crate::qp::InteriorPoint::memory_of_coupling) numbers
+    /// more.
+    #[must_use]
+    pub const fn memory<P: Formulation<T>>(
+        dims: &[StageDims],
+        bounds: usize,
+        equations: usize,
+    ) -> (usize, usize) {
+        let solution = Solution::<T, (), ()>::memory(dims);
+        if solution == usize::MAX {
+            return (usize::MAX, usize::MAX);
+        }
+        let [numbers, work, indices] = lengths::<P, T>(dims, bounds, equations);
+        (solution.saturating_mul(3).saturating_add(numbers).saturating_add(work), indices)
+    }
+
+    /// For problems of these dimensions with at most so many bounds and equations, in given memory
+    /// of the lengths that [`Ipm::memory`] tells.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]
+    pub fn in_memory<P: Formulation<T>>(
+        dims: &'a [StageDims],
+        bounds: usize,
+        equations: usize,
+        numbers: &'a mut [T],
+        indices: &'a mut [u32],
+    ) -> Result<Self, OcpError> {
+        let (expected, of_indices) = Self::memory::<P>(dims, bounds, equations);
+        for (expected, found) in [(expected, numbers.len()), (of_indices, indices.len())] {
+            if found < expected {
+                return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
+            }
+        }
+        let length = Solution::<T, (), ()>::memory(dims);
+        let [_, work, _] = lengths::<P, T>(dims, bounds, equations);
+        let (trial, rest) = numbers.split_at_mut_checked(length).unwrap_or_default();
+        let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (guess, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        // What is more than that is for couplings.
+        let (work, numbers) = rest.split_at_mut_checked(work).unwrap_or_default();
+        Ok(Self {
+            options: IpmOptions::new::<T>(),
+            trial: Solution::in_memory(dims, trial)?,
+            best: Solution::in_memory(dims, best)?,
+            guess: Solution::in_memory(dims, guess)?,
+            numbers,
+            indices,
+            work,
+            #[cfg(feature = "alloc")]
+            log: Vec::new(),
+        })
+    }
+}
+
+/// Numbers of Newton's equations, numbers beside them, and indices.
+const fn lengths<P: Formulation<T>, T: Real>(
+    dims: &[StageDims],
+    bounds: usize,
+    equations: usize,
+) -> [usize; 3] {
+    let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
+    let work = Work::<T>::length(dims, ends::<P, T>(dims), &counts);
+    [Iterate::<T>::memory(dims, &counts), work, counts.indices()]
+}

@@ -1,0 +1,61 @@
+//! A second attempt, from a simulation with the controls of the guess.
+
+use super::feasibility::leave;
+use crate::ocp::assembly::curvature::Slopes;
+use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::ipm::Ipm;
+use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
+use crate::ocp::nlp::ipm::kkt::work::Work;
+use crate::ocp::nlp::ipm::state::State;
+use crate::ocp::nlp::ipm::violations::Phase;
+use crate::ocp::nlp::simulation::{BETTER, STRAYING};
+use crate::ocp::solution::outcome::Status;
+use crate::qp::{StageDims, Store};
+use crate::scalar::Real;
+
+impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
+    /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
+    /// violations, for long: once, where a simulation with the controls of the guess violates
+    /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
+    /// astray, and violations that stay there say nothing of the problem.
+    pub(in crate::ocp::nlp::ipm) fn begin_again<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        capacity: &Lengths,
+        state: &mut State<'_>,
+        end: Option<Status>,
+    ) -> bool
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        let strays = end.is_none() && state.straying == STRAYING;
+        let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
+        if !(failed || strays) || state.again || P::Dynamics::LIFTED {
+            return false;
+        }
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let here = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
+        let left = match end {
+            Some(Status::NoProgress) => state.best_violation,
+            Some(_) => here,
+            None => state.violation.max(here),
+        };
+        self.trial.copy_from(&self.guess);
+        if !ocp.simulate_guess(&mut self.trial, work.ends) {
+            return false;
+        }
+        let is_linearised = ocp.linearise(Slopes).is_ok();
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
+        if !(is_linearised && found < BETTER * left) {
+            core::mem::swap(&mut ocp.iterate, &mut self.trial);
+            state.is_linearised = false;
+            return false;
+        }
+        leave(ocp, state, work.penalties, &self.options);
+        (state.phase, state.is_linearised, state.again) = (Phase::default(), true, true);
+        true
+    }
+}

@@ -1,0 +1,182 @@
+//! What a run remembers.
+
+use super::IpmOptions;
+use super::barrier::{self, Barrier, Progress};
+use super::kkt::lengths::Lengths;
+use super::kkt::regularisation::Regularisation;
+use super::violations::Phase;
+use crate::ocp::nlp::filter::Filter;
+use crate::ocp::solution::log::Iteration;
+use crate::ocp::solution::outcome::Status;
+use crate::qp::Residuals;
+use crate::qp::interior::{Iterate, Sides};
+use crate::scalar::Real;
+
+/// `γ_φ`
+pub(super) const GAMMA_PHI: f64 = 1e-8;
+
+/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
+/// are no convergence of Newton's method.
+const HELD: usize = 3;
+const CRAWLS: f64 = 0.9;
+
+/// Steps that are no longer lead nowhere if there are many of them.
+const SHORT: f64 = 1.0 / 32.0;
+
+/// What a run remembers from one iteration to the next.
+pub(super) struct State<'c> {
+    /// Whether the time is over.
+    pub over: &'c mut dyn FnMut() -> bool,
+    pub lengths: Lengths,
+    /// The barrier parameter.
+    pub mu: f64,
+    /// What an adaptive one follows.
+    pub progress: Progress,
+    pub filter: Filter,
+    /// `θ_min`: below this violation the barrier function may decide.
+    pub small_violation: f64,
+    /// The violation that the filter began with.
+    pub first_violation: f64,
+    pub regularisation: Regularisation,
+    /// `δ_w` of the step.
+    pub delta: f64,
+    /// The penalty, if bounds are soft.
+    pub elastic: Option<f64>,
+    /// Whether this is a second attempt.
+    pub again: bool,
+    /// Phases in which violations alone are made small.
+    pub phase: Phase,
+    /// The largest gap or violation, in units.
+    pub violation: f64,
+    /// The largest gap.
+    pub gaps: f64,
+    /// The largest gap or violation of the best iterate.
+    pub best_violation: f64,
+    /// The objective at the first iterate.
+    pub first_objective: f64,
+    /// The violation that the last penalty left.
+    pub stationary_violation: f64,
+    /// Iterations one after the other whose residuals are acceptable.
+    pub acceptable: usize,
+    /// Iterations one after the other in which complementarity is all that is left, and stays.
+    pub held: usize,
+    /// Steps one after the other that are short, or of phases for violations.
+    pub straying: usize,
+    /// Whether slacks that multipliers held were released.
+    pub released: bool,
+    /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
+    pub has_slacks: bool,
+    /// Whether the QP is that at the iterate, with whatever multipliers.
+    pub is_linearised: bool,
+    /// Whether the filter has the bound of violations that belongs to these slacks.
+    pub has_filter: bool,
+    /// The largest residual, relative to units and multipliers.
+    pub error: f64,
+    /// That of the best iterate.
+    pub best_residual: f64,
+    /// That iterate.
+    pub best_iteration: Iteration,
+}
+
+impl<'c> State<'c> {
+    /// That of a run that begins.
+    pub fn new(
+        over: &'c mut dyn FnMut() -> bool,
+        lengths: Lengths,
+        is_linearised: bool,
+        options: &IpmOptions,
+    ) -> Self {
+        // Products that do not vanish leave nothing to correct.
+        let barrier = if options.final_mu > 0.0 { Barrier::Monotone } else { options.barrier };
+        Self {
+            over,
+            lengths,
+            mu: options.first_mu(lengths.sizes.force),
+            progress: Progress::new(barrier),
+            filter: Filter::new(GAMMA_PHI, f64::INFINITY),
+            small_violation: f64::INFINITY,
+            first_violation: f64::INFINITY,
+            regularisation: Regularisation::default(),
+            delta: 0.0,
+            elastic: None,
+            again: false,
+            phase: Phase::default(),
+            violation: f64::INFINITY,
+            gaps: f64::INFINITY,
+            best_violation: f64::INFINITY,
+            first_objective: 0.0,
+            stationary_violation: f64::INFINITY,
+            acceptable: 0,
+            held: 0,
+            straying: 0,
+            released: false,
+            has_slacks: false,
+            is_linearised,
+            has_filter: false,
+            error: f64::INFINITY,
+            best_residual: f64::INFINITY,
+            best_iteration: Iteration::default(),
+        }
+    }
+
+    /// Counts a step of this length.
+    pub fn count_straying(&mut self, step: f64) {
+        let strays = self.phase.force.is_some() || step <= SHORT;
+        self.straying = if strays { self.straying + 1 } else { 0 };
+    }
+
+    /// The next barrier parameter, from residuals and with a unit of products in which errors are
+    /// relative; another one has another filter.
+    pub fn update_barrier<T: Real>(
+        &mut self,
+        iterate: &Iterate<'_, T>,
+        (residuals, products): (&Residuals, f64),
+        options: &IpmOptions,
+    ) {
+        let force = self.lengths.sizes.force;
+        let Sides { slack, multiplier, .. } = &iterate.sides;
+        let error =
+            |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
+        let mean = barrier::mean(&iterate.sides) / force;
+        let mu = force * self.progress.next(self.mu / force, error, mean, options.least_error(force));
+        if mu != self.mu {
+            self.mu = mu;
+            self.filter.clear();
+        }
+    }
+
+    /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
+    /// that is all that is left, and stays, no smaller `μ` can make it less.
+    pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
+        let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
+        let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
+        let stays = error > tolerance.max(CRAWLS * self.error);
+        self.held = if is_last && others <= tolerance && stays { self.held + 1 } else { 0 };
+        self.error = error;
+    }
+
+    /// Whether multipliers hold slacks, which is said once.
+    pub fn is_held(&mut self) -> bool {
+        let is_held = self.held >= HELD && !self.released;
+        self.released |= is_held;
+        is_held
+    }
+
+    /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
+    pub fn begin_monotone(&mut self, options: &IpmOptions) {
+        self.progress = Progress::new(Barrier::Monotone);
+        self.mu = options.first_mu(self.lengths.sizes.force);
+        self.regularisation = Regularisation::default();
+        (self.has_slacks, self.has_filter) = (false, false);
+    }
+}
+
+/// What follows the residuals of an iteration.
+pub(super) enum Next {
+    /// A search direction.
+    Direction,
+    /// Another iteration: bounds have other penalties.
+    NewPenalties,
+    /// The end of the run.
+    End(Status),
+}

@@ -1,0 +1,13 @@
+//! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), and
+//! what both of them use.
+
+pub(in crate::ocp) mod elastic;
+pub(in crate::ocp) mod filter;
+pub(in crate::ocp) mod guess;
+pub(in crate::ocp) mod inertia;
+pub(in crate::ocp) mod ipm;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod multi_start;
+pub(in crate::ocp) mod simulation;
+pub(in crate::ocp) mod sqp;
+pub(in crate::ocp) mod watch;

@@ -1,0 +1,313 @@
+//! The direction of a step: the QP at the iterate, regularised where it is not convex, with
+//! penalties where it is infeasible.
+
+use super::Sqp;
+use super::scaled::{Way, penalties_end, penalties_mut};
+use super::state::State;
+use crate::ocp::assembly::convexify::Convexification;
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::elastic::Worst;
+use crate::ocp::solution::log::Iteration;
+use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
+use crate::scalar::Real;
+
+/// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
+const MOST_AT_FIRST: f64 = 1e-2;
+/// Penalties grow by this to see whether less violation is possible at all, up to that multiple.
+const GROWTH: f64 = 100.0;
+const MOST_ELASTIC: f64 = 1e4;
+/// What rounding may leave of forces as large as one: no QP is solved to more digits.
+const DIGITS: f64 = 1e-13;
+/// No direction makes violations smaller if the best one leaves this part of them.
+const STAYS: f64 = 1.0 - 1e-3;
+/// Gaps are closed that are no more than this part of the violations of bounds.
+const CLOSED: f64 = 1e-2;
+/// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
+/// are not closed any further: a step that closes them opens as large ones.
+const CLOSING: usize = 4;
+/// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
+/// penalty; then those of an easier QP.
+const FLAT: [(f64, f64); 2] = [(2e-5, DIGITS), (2e-3, 1e-9)];
+
+/// What came of a QP.
+pub(super) enum Direction {
+    /// A step.
+    Step,
+    /// A proof that the sum of violations is stationary.
+    Infeasible(Worst),
+}
+
+impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+    pub(super) fn penalties<'s, P: Formulation<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
+        self.work.as_ref().get(ocp.ends()..penalties_end(ocp)).unwrap_or_default()
+    }
+
+    /// Penalties in place of hard bounds.
+    fn set_elastic<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        penalty: f64,
+    ) {
+        let memory = penalties_mut(self.work.as_mut(), ocp);
+        if !state.elastic {
+            ocp.remember_penalties(memory);
+        }
+        ocp.set_penalties(memory, Some(T::from_f64(penalty)), &[]);
+        state.elastic = true;
+        // Objectives with other penalties are not to be compared.
+        state.search.filter.clear();
+    }
+
+    /// Bounds as they were given.
+    pub(super) fn leave_elastic<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+    ) {
+        if state.elastic {
+            // What is remembered is in units.
+            self.scale(ocp, state, Way::Into);
+            ocp.set_penalties(self.penalties(ocp), None, &[]);
+            self.scale(ocp, state, Way::Back);
+            state.elastic = false;
+            state.search.filter.clear();
+        }
+    }
+
+    /// The QP at the iterate; in elastic mode if it has no solution otherwise.
+    pub(super) fn direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<Result<Direction, QpError>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        (state.nearest, state.rewritten) = (false, false);
+        state.residual = row.residuals.largest();
+        self.scale(ocp, state, Way::Into);
+        if state.sizes.is_some() {
+            state.residual = ocp.residuals().0.largest();
+        }
+        let mut direction = self.direction_in_units(ocp, state, row);
+        self.scale(ocp, state, Way::Back);
+        if state.nearest || state.rewritten {
+            self.linearise(ocp)?;
+        }
+        if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
+            *worst = self.in_problem(ocp, *worst);
+        }
+        Ok(direction)
+    }
+
+    /// The same where the QP, the iterate and all constants are in units.
+    fn direction_in_units<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<Direction, QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let reduced = self.curvature.convexification() == Convexification::Reduced;
+        let warm = self.options.warm_start && (row.iteration > 0 || reduced);
+        let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
+        let part = self.options.qp_accuracy * state.residual;
+        // Without multipliers stationarity is the gradient, and says nothing of what is far away.
+        let wrong = part * state.force();
+        let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
+        let permitted = if begins || state.exact { 0.0 } else { part };
+        self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
+        let start = if warm { QpStart::Warm } else { QpStart::Cold };
+        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
+        let may_help = matches!(
+            error,
+            QpError::Infeasible { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. }
+        );
+        if !(may_help && self.options.elastic) {
+            return Err(error);
+        }
+        self.elastic_direction(ocp, state, row, error)
+    }
+
+    /// The step where bounds have penalties, since the QP had no solution; or that violations stay.
+    ///
+    /// # Errors
+    /// The error of the QP with hard bounds, where that with penalties has no solution either.
+    fn elastic_direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+        error: QpError,
+    ) -> Result<Direction, QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        // What is violated and what is possible are compared: by exact solutions.
+        let mut penalty = self.options.elastic_penalty.max(state.penalty);
+        self.set_elastic(ocp, state, penalty);
+        self.qp_solver.permit(DIGITS * penalty);
+        row.elastic = true;
+        let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
+        let gaps = ocp.gaps();
+        let before = bounds + gaps;
+        if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
+            // Without objective and curvature it is nearly a linear program.
+            if self.nearest(ocp, state, row, before).is_err() {
+                return Err(error);
+            }
+            return Ok(Self::go_near(state, row));
+        }
+        let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
+            return Ok(Direction::Step);
+        };
+        if self.violation_of_solution(ocp) < STAYS * before {
+            return Ok(Direction::Step);
+        }
+        // The objective may be what holds it back: with larger penalties it counts less.
+        self.trial.copy_from(&self.solution);
+        let most = MOST_ELASTIC * self.options.elastic_penalty;
+        let mut solved = true;
+        while solved && penalty < most {
+            penalty *= GROWTH;
+            self.set_elastic(ocp, state, penalty);
+            // Forces are as large as penalties, and have as many digits.
+            self.qp_solver.permit(DIGITS * penalty);
+            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
+            if solved && self.violation_of_solution(ocp) < STAYS * before {
+                // It is, and from now on it does.
+                state.penalty = penalty;
+                return Ok(Direction::Step);
+            }
+        }
+        // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
+        // gaps are closed.
+        if gaps <= CLOSED * bounds {
+            let is_near = self.nearest(ocp, state, row, before).is_ok();
+            if is_near && self.violation_of_solution(ocp) >= STAYS * before {
+                return Ok(Direction::Infeasible(worst));
+            }
+            if solved {
+                return if is_near { Ok(Self::go_near(state, row)) } else { Err(error) };
+            }
+            // The QP has another objective now, and is to be written again.
+            state.rewritten = true;
+        }
+        // Gaps are to be closed first, whatever that leaves of bounds.
+        if solved && gaps <= bounds && state.elastic_steps >= CLOSING {
+            return Ok(Direction::Infeasible(worst));
+        }
+        state.penalty = 0.0;
+        self.set_elastic(ocp, state, self.options.elastic_penalty);
+        core::mem::swap(&mut self.solution, &mut self.trial);
+        Ok(Direction::Step)
+    }
+
+    /// The step to the nearest point; the QP has another objective than that of the iterate.
+    fn go_near(state: &mut State<'_, T>, row: &mut Iteration) -> Direction {
+        (state.nearest, row.regularisation) = (true, 0.0);
+        Direction::Step
+    }
+
+    /// The point that violates the linearisation least, near the iterate:
+    ///
+    /// ```text
+    /// min  θ(v) + ½ ε ‖v − v̄‖² / θ₀        θ: violations of bounds, θ₀: those at v̄, and gaps
+    /// ```
+    ///
+    /// Afterwards penalties are those beside which the objective counts nothing.
+    fn nearest<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+        violation: f64,
+    ) -> Result<(), QpError> {
+        let (one, alone) = (self.options.elastic_penalty, MOST_ELASTIC * self.options.elastic_penalty);
+        // Of soft bounds that were given there are costs.
+        let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
+        let penalty = if soft { alone } else { one };
+        self.set_elastic(ocp, state, penalty);
+        let mut result = Ok(());
+        for (flat, digits) in FLAT {
+            self.qp_solver.permit(digits * penalty);
+            ocp.forget_objective(T::from_f64(flat * penalty / violation));
+            result = self.solve_qp(ocp, state, QpStart::Cold, row);
+            if result.is_ok() {
+                break;
+            }
+        }
+        self.set_elastic(ocp, state, alone);
+        result
+    }
+
+    /// The sum of violations that the solution of the QP leaves, by its linearisation.
+    fn violation_of_solution<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        let (_, sum) = ocp.worst(self.penalties(ocp), &[]);
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        sum
+    }
+
+    /// The QP with as much regularisation as it takes.
+    fn regularised<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        start: QpStart,
+        row: &mut Iteration,
+    ) -> Result<(), QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if state.damping > row.regularisation {
+            ocp.regularise(T::from_f64(state.damping - row.regularisation));
+            row.regularisation = state.damping;
+        }
+        if self.curvature.convexification() != Convexification::Reduced {
+            return self.solve_qp(ocp, state, start, row);
+        }
+        let (mut correction, mut delta) = (state.inertia, row.regularisation);
+        let solve = |ocp: &Ocp<P, T, D, M>| self.solve_qp(ocp, state, start, row);
+        let result = ocp.correct_inertia(&mut correction, &mut delta, solve);
+        (state.inertia, row.regularisation) = (correction, delta);
+        result
+    }
+
+    /// The QP from the iterate; from a cold start if a warm one was to blame.
+    fn solve_qp<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        start: QpStart,
+        row: &mut Iteration,
+    ) -> Result<(), QpError> {
+        let mut start = start;
+        loop {
+            self.solution.copy_from(&ocp.iterate);
+            let over = &mut || state.is_over();
+            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+            row.qp_iterations += match &result {
+                Ok(QpStatistics { iterations, .. })
+                | Err(QpError::MaxIterations { iterations, .. } | QpError::Stalled { iterations, .. }) => {
+                    *iterations
+                }
+                Err(_) => 0,
+            };
+            let Err(error) = result else { return Ok(()) };
+            if start == QpStart::Cold
+                || matches!(error, QpError::NotConvex { .. } | QpError::OutOfTime { .. })
+            {
+                return Err(error);
+            }
+            start = QpStart::Cold;
+        }
+    }
+}

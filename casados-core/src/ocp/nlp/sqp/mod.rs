@@ -1,0 +1,293 @@
+//! Sequential quadratic programming.
+//!
+//! ```text
+//! linearise at (x̄, ū)  →  QP with the exact Hessian, or that of Gauss and Newton  →  step
+//! ```
+//!
+//! | | |
+//! | --- | --- |
+//! | `multipliers` | the first multipliers, where costs have no curvature |
+//! | `secant` | Hessians from differences of gradients |
+//! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
+//! | `search` | how far a step goes, by what `measure` finds at trial points |
+//! | `scaled` | the QP in units |
+//! | `run` | the iterations, and how they end |
+//! | `again` | the second attempt, from a simulation |
+
+mod acceptance;
+mod again;
+mod direction;
+mod measure;
+mod multipliers;
+mod options;
+mod run;
+mod scaled;
+mod search;
+mod secant;
+mod state;
+
+pub use options::{Globalisation, SqpOptions};
+
+use crate::ocp::assembly::curvature::{Exact, GaussNewton};
+use crate::ocp::assembly::kept_jacobians::KeptJacobians;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::elastic;
+#[cfg(feature = "alloc")]
+use crate::ocp::solution::log::{Iteration, Log};
+#[cfg(feature = "alloc")]
+use crate::qp::HeapInteriorPoint;
+use crate::qp::{Solution, StageDims};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`Exact`], or
+/// [`GaussNewton`] after [`Sqp::gauss_newton`].
+///
+/// Exact Hessians converge whatever the costs are. That of Gauss and Newton is cheaper, needs no
+/// second derivatives of dynamics, and converges about as fast where costs are least squares whose
+/// residuals are small at the solution, as in tracking; elsewhere it may not converge at all.
+///
+/// Memory is made for one problem, of whose dimensions all others are to be.
+///
+/// # Errors
+/// [`OcpError`] where there is nothing to go on with: data that make no sense, or dynamics that
+/// cannot be integrated at the first iterate. How a run ended otherwise is the `status` of its
+/// [`Outcome`](crate::ocp::Outcome).
+///
+/// # Example
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// sqp.options.tolerance = 1e-9;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// // A linear-quadratic problem: one step, and one that finds nothing to do.
+/// assert!(outcome.is_converged() && outcome.iterations <= 2);
+/// println!("{}{outcome}", sqp.log());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Sqp<S, C, T, D, M> {
+    /// Options, which may be changed between calls.
+    pub options: SqpOptions,
+    /// The Hessian.
+    pub curvature: C,
+    /// The solver of QPs.
+    pub qp_solver: S,
+    /// The solution of a QP.
+    solution: Solution<T, D, M>,
+    /// A point that is tried.
+    trial: Solution<T, D, M>,
+    /// The best iterate.
+    best: Solution<T, D, M>,
+    /// The weights of constraints in the merit function, in the places of their multipliers; in
+    /// those of variables the guess.
+    weights: Solution<T, D, M>,
+    /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
+    /// exchanges, then units of rows.
+    work: M,
+    /// What [`Secant`](crate::ocp::Secant) remembers.
+    history: M,
+    #[cfg(feature = "alloc")]
+    log: Vec<Iteration>,
+}
+
+/// Sequential quadratic programming with its memory on the heap.
+///
+/// `HeapSqp::new(&ocp)?` makes it; [`Sqp`] has its methods, and an example.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # #[function]
+/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
+/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?; // exact Hessians; `.gauss_newton()` after it takes others
+/// assert!(sqp.solve(&mut ocp)?.is_converged());
+/// // The velocity at the end is free: the push falls along a line, from 20/7 in the first
+/// // interval.
+/// assert!((ocp.stage(0)?.u[0] - 20.0 / 7.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[cfg(feature = "alloc")]
+pub type HeapSqp<S = HeapInteriorPoint, C = Exact, T = f64> = Sqp<S, C, T, Vec<StageDims>, Vec<T>>;
+
+#[cfg(feature = "alloc")]
+impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
+    /// For a problem, with the library's own solver of QPs and exact Hessians.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(
+        ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
+    ) -> Result<Self, OcpError> {
+        Self::with_solver(ocp, HeapInteriorPoint::new())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<S, T: Real> HeapSqp<S, Exact, T> {
+    /// For a problem, with exact Hessians and a solver of QPs, such as
+    /// [`Condensing`](crate::qp::Condensing).
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn with_solver<P: Formulation<T>>(
+        ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
+        qp_solver: S,
+    ) -> Result<Self, OcpError> {
+        let dims = ocp.qp().dims();
+        let length = ocp.ends() + elastic::memory(dims) + scaled::memory::<T>(dims);
+        Ok(Self {
+            options: SqpOptions::new::<T>(),
+            curvature: Exact::default(),
+            qp_solver,
+            solution: Solution::new(dims)?,
+            trial: Solution::new(dims)?,
+            best: Solution::new(dims)?,
+            weights: Solution::new(dims)?,
+            work: crate::qp::zeros(length)?,
+            history: Vec::new(),
+            log: Vec::new(),
+        })
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<S, C, T: Real> HeapSqp<S, C, T> {
+    /// The iterations of the last run, to be printed.
+    #[must_use]
+    pub fn log(&self) -> Log<'_> {
+        Log(&self.log)
+    }
+}
+
+impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
+    /// The same with the Hessian of the Lagrangian, and another way to make it convex.
+    #[must_use]
+    pub fn exact(self, curvature: Exact) -> Sqp<S, Exact, T, D, M> {
+        self.with(curvature)
+    }
+
+    /// The same with the Hessian of Gauss and Newton.
+    #[must_use]
+    pub fn gauss_newton(self) -> Sqp<S, GaussNewton, T, D, M> {
+        self.with(GaussNewton::default())
+    }
+
+    /// The same with the Hessian of Gauss and Newton, and with Jacobians of dynamics that stay
+    /// while steps contract: adjoints of integrators ([`Adjoints`](crate::ocp::Adjoints)) correct
+    /// them.
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[ode]
+    /// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] { [x[1], -x[0].sin() + u[0]] }
+    /// #[function]
+    /// fn all(x: [f64; 2], u: [f64; 1]) -> [f64; 3] { [x[0], x[1], u[0]] }
+    ///
+    /// let mut ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
+    ///     .stage_cost(LeastSquaresCost::<All>::diagonal(&[1.0, 1.0, 0.1]))
+    ///     .on(Horizon::uniform(10, 0.1))?;
+    /// ocp.fix_initial_state(&[0.5, 0.0])?.guess(&[0.5, 0.0], &[0.0])?;
+    /// let mut sqp = HeapSqp::new(&ocp)?.keep_jacobians();
+    /// assert!(sqp.solve(&mut ocp)?.is_converged());
+    /// assert!(sqp.curvature.adjoints() > 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn keep_jacobians(self) -> Sqp<S, KeptJacobians, T, D, M> {
+        self.with(KeptJacobians::new())
+    }
+
+    fn with<N>(self, curvature: N) -> Sqp<S, N, T, D, M> {
+        Sqp {
+            options: self.options,
+            curvature,
+            qp_solver: self.qp_solver,
+            solution: self.solution,
+            trial: self.trial,
+            best: self.best,
+            weights: self.weights,
+            work: self.work,
+            history: self.history,
+            #[cfg(feature = "alloc")]
+            log: self.log,
+        }
+    }
+}
+
+impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
+    /// How many numbers [`Sqp::secant`] takes behind those of [`Sqp::memory`].
+    #[must_use]
+    pub const fn memory_of_secant(dims: &[StageDims]) -> usize {
+        secant::length::<T>(dims)
+    }
+
+    /// How many numbers it takes for a problem; `usize::MAX` if they are more than that.
+    #[must_use]
+    pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
+        Solution::<T, (), ()>::memory(dims)
+            .saturating_mul(4)
+            .saturating_add(crate::ocp::assembly::linearise::ends::<P, T>(dims))
+            .saturating_add(elastic::memory(dims))
+            .saturating_add(scaled::memory::<T>(dims))
+    }
+
+    /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]
+    pub fn in_memory<P: Formulation<T>>(
+        qp_solver: S,
+        dims: &'a [StageDims],
+        memory: &'a mut [T],
+    ) -> Result<Self, OcpError> {
+        let (expected, found) = (Self::memory::<P>(dims), memory.len());
+        if found < expected {
+            return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
+        }
+        let length = Solution::<T, (), ()>::memory(dims);
+        let (solution, rest) = memory.split_at_mut_checked(length).unwrap_or_default();
+        let (trial, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (weights, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (work, history) = rest.split_at_mut_checked(expected - 4 * length).unwrap_or_default();
+        Ok(Self {
+            options: SqpOptions::new::<T>(),
+            curvature: Exact::default(),
+            qp_solver,
+            solution: Solution::in_memory(dims, solution)?,
+            trial: Solution::in_memory(dims, trial)?,
+            best: Solution::in_memory(dims, best)?,
+            weights: Solution::in_memory(dims, weights)?,
+            work,
+            history,
+            #[cfg(feature = "alloc")]
+            log: Vec::new(),
+        })
+    }
+}

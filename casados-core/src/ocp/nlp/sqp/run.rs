@@ -1,0 +1,399 @@
+//! The iterations.
+
+use super::Sqp;
+use super::again::violation_of;
+use super::direction::Direction;
+use super::options::Globalisation;
+use super::scaled::Way;
+use super::secant::Take;
+use super::state::{State, Taken};
+use crate::ocp::assembly::convexify::Convexification;
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::watch::Watch;
+use crate::ocp::solution::log::Iteration;
+use crate::ocp::solution::outcome::{Outcome, Status};
+#[cfg(feature = "alloc")]
+use crate::qp::room;
+use crate::qp::{QpError, QpSolver, StageDims};
+use crate::scalar::Real;
+use core::ops::ControlFlow;
+
+/// The log has room for so many iterations before it grows.
+#[cfg(feature = "alloc")]
+const ROOM: usize = 64;
+
+/// After so many steps with penalties in a row it is the sum of violations that is made small, and
+/// its curvature counts.
+const PASSING: usize = 4;
+
+/// What a step tries, where no step along the direction before is short enough.
+#[derive(Clone, Copy, PartialEq)]
+enum Attempt {
+    /// The QP to as many digits as the iterate deserves.
+    First,
+    /// To all of them: it may have been wrong by more than a step gains.
+    Exact,
+    /// With at least so much regularisation.
+    Damped(f64),
+}
+
+const ATTEMPTS: [Attempt; 5] = [
+    Attempt::First,
+    Attempt::Exact,
+    Attempt::Damped(1e-2),
+    Attempt::Damped(1e0),
+    Attempt::Damped(MOST_DAMPING),
+];
+const MOST_DAMPING: f64 = 1e2;
+
+impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+    /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
+    /// With exact Hessians, without multipliers and without costs that curve in all controls, it
+    /// begins with the multipliers of least squares.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
+    /// full steps went to a point at which something has no value: then the iterate is the best
+    /// one, too.
+    pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        self.solve_observed(ocp, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Sqp::solve`], with an observer of the iterations that may stop the run.
+    ///
+    /// # Errors
+    /// As [`Sqp::solve`].
+    pub fn solve_observed<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+    ) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        self.run(ocp, observer, &mut || false)
+    }
+
+    /// As [`Sqp::solve`], until the time is over: `over`, a clock or a counter of cycles, is asked
+    /// after each linearisation, and in every iteration of a QP, as far as its solver makes use of
+    /// that. Then the status is [`Status::OutOfTime`], and the iterate the best one.
+    ///
+    /// # Errors
+    /// As [`Sqp::solve`].
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// use std::time::{Duration, Instant};
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    /// #     .on(Horizon::uniform(10, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let deadline = Instant::now() + Duration::from_secs(60);
+    /// let mut sqp = HeapSqp::new(&ocp)?;
+    /// assert_eq!(sqp.solve_until(&mut ocp, &mut || true)?.status, Status::OutOfTime);
+    /// assert!(sqp.solve_until(&mut ocp, &mut || Instant::now() > deadline)?.is_converged());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn solve_until<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
+    }
+
+    fn run<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        ocp.fits(self.solution.dims())?;
+        self.options.check()?;
+        self.qp_solver.require(self.options.tolerance);
+        let mut state = State { over: Some(over), ..State::new() };
+        if C::KEEPS {
+            ocp.check_without_algebraic()?;
+            self.curvature.follow(f64::INFINITY);
+        }
+        // Steps are to solutions of QPs: what is one stays so.
+        ocp.join_controls();
+        ocp.join_states();
+        self.weights.copy_from(&ocp.iterate);
+        #[cfg(feature = "alloc")]
+        {
+            self.log.clear();
+            room(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
+        }
+        let mut outcome = Outcome::new();
+        let mut result = Ok(());
+        loop {
+            let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
+            let end = match self.iterate(ocp, &mut state, &mut row) {
+                Ok(end) => end,
+                Err(error) => {
+                    result = Err(error);
+                    break;
+                }
+            };
+            outcome.count(&row);
+            #[cfg(feature = "alloc")]
+            {
+                if let Err(error) = room(&mut self.log, 1) {
+                    result = Err(error.into());
+                    break;
+                }
+                self.log.push(row);
+            }
+            let begins_again = self.begin_again(ocp, &mut state, end, &row);
+            if let (Some(status), false) = (end, begins_again) {
+                outcome.status = status;
+                if matches!(status, Status::Infeasible { .. }) {
+                    state.best_iteration = row;
+                }
+                break;
+            }
+            if observer(&row).is_break() {
+                outcome.status = Status::Stopped;
+                break;
+            }
+            outcome.iterations += 1;
+        }
+        self.leave_elastic(ocp, &mut state);
+        // What is infeasible is said of the last iterate.
+        let is_last =
+            matches!(outcome.status, Status::Converged | Status::Infeasible { .. }) && result.is_ok();
+        if !is_last && state.best_residual.is_finite() {
+            ocp.iterate.copy_from(&self.best);
+        }
+        outcome.objective = state.best_iteration.objective;
+        outcome.residuals = state.best_iteration.residuals;
+        result.map(|()| outcome)
+    }
+
+    /// One iteration; a status if it is the last one.
+    fn iterate<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<Option<Status>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let mut watch = Watch::start();
+        row.times.linearise = match state.search.linearised.take() {
+            Some(seconds) => seconds,
+            None if row.iteration == 0 => {
+                ocp.linearise_guess(self.curvature, &mut self.trial)?;
+                watch.lap()
+            }
+            None => {
+                ocp.linearise(self.curvature)?;
+                watch.lap()
+            }
+        };
+        self.leave_elastic(ocp, state);
+        if row.iteration == 0 {
+            if self.options.scaling {
+                self.find_units(ocp, state);
+            }
+            self.forget_weights(ocp, state);
+            state.violation_of_guess = violation_of(&ocp.residuals().0);
+        }
+        if let Some(update) = self.curvature.update() {
+            let take = match (row.iteration, state.elastic_steps) {
+                (0, _) => Take::First,
+                (_, 0) => Take::Updated(update),
+                // Forces of penalties are no multipliers.
+                _ => Take::Moved,
+            };
+            self.take_hessians(ocp, take);
+        }
+        if state.begins && C::EXACT {
+            self.first_multipliers(ocp, state)?;
+        }
+        let (residuals, objective) = ocp.residuals();
+        (row.residuals, row.objective) = (residuals, objective);
+        let size = self.judge(ocp, state, &residuals);
+        if size < state.best_residual || state.begins && !state.best_residual.is_finite() {
+            (state.best_residual, state.best_iteration) = (size, *row);
+            self.best.copy_from(&ocp.iterate);
+        }
+        state.begins = false;
+        if size <= self.options.tolerance {
+            state.best_iteration = *row;
+            return Ok(Some(Status::Converged));
+        }
+        if row.iteration >= self.options.max_iterations {
+            return Ok(Some(Status::MaxIterations));
+        }
+        if state.is_over() {
+            return Ok(Some(Status::OutOfTime));
+        }
+        let taken = match self.step(ocp, state, row, &mut watch)? {
+            ControlFlow::Continue(taken) => taken,
+            ControlFlow::Break(status) => return Ok(Some(status)),
+        };
+        (row.step, row.corrected) = (taken.length, taken.corrected);
+        let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
+        state.damp(row, curvature);
+        self.leave_merit(ocp, state, row);
+        state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
+        if row.elastic && C::EXACT && (state.nearest || state.elastic_steps <= PASSING) {
+            // On the way to a feasible point forces of penalties are no multipliers: curvatures
+            // would be far too large.
+            ocp.iterate.multipliers_mut().fill(T::ZERO);
+            state.search.linearised = None;
+            self.forget_weights(ocp, state);
+        }
+        Ok(None)
+    }
+
+    /// Lets the filter decide from now on where the merit function creeps.
+    fn leave_merit<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &Iteration,
+    ) where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if C::EXACT && state.creeps(row, &self.options) {
+            state.search.filter.clear();
+            self.forget_weights(ocp, state);
+        }
+    }
+
+    /// The curvature of the QP along its step, of which the iterate has gone a part.
+    fn curvature_of_step<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_, T>,
+    ) -> f64 {
+        self.scale(ocp, state, Way::Into);
+        let curvature = ocp.curvature(&self.solution);
+        self.scale(ocp, state, Way::Back);
+        curvature
+    }
+
+    /// Compares the length of the full step with that of the one before.
+    fn follow<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>)
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if C::KEEPS {
+            let steps = ocp.iterate.vectors().0.iter().zip(self.solution.vectors().0);
+            let reach = steps.fold(0.0_f64, |reach, (&a, &b)| reach.max((b - a).abs().to_f64()));
+            // What follows new Jacobians is kept.
+            state.reach = if self.curvature.follow(reach / state.reach) { reach } else { f64::INFINITY };
+        }
+    }
+
+    /// The full step, or one that a line search finds.
+    fn go<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<Option<Taken>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if self.options.globalisation != Globalisation::FullStep {
+            return self.search(ocp, state, row);
+        }
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        Ok(Some(Taken { length: 1.0, corrected: false }))
+    }
+
+    /// A step in the direction of the QP, or of one with more regularisation where none is short
+    /// enough or the QP has no solution.
+    fn step<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+        watch: &mut Watch,
+    ) -> Result<ControlFlow<Status, Taken>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let mut failure = None;
+        // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
+        let damps = state.again || !C::EXACT && self.curvature.update().is_none();
+        for attempt in ATTEMPTS {
+            let (damping, skips) = match attempt {
+                Attempt::First => (0.0, false),
+                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.passing),
+                Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
+            };
+            if skips {
+                continue;
+            }
+            state.exact = state.again || attempt != Attempt::First;
+            state.passing = damps && damping.max(state.damping) < MOST_DAMPING;
+            if attempt != Attempt::First {
+                if failure.is_some() {
+                    // The curvature that multipliers have is no help.
+                    ocp.iterate.multipliers_mut().fill(T::ZERO);
+                }
+                state.reach = f64::INFINITY;
+                self.curvature.follow(f64::INFINITY);
+                self.linearise(ocp)?;
+                self.leave_elastic(ocp, state);
+                row.regularisation = 0.0;
+                if damping > 0.0 {
+                    state.damping = damping;
+                }
+            }
+            let direction = self.direction(ocp, state, row)?;
+            row.times.qp += watch.lap();
+            failure = direction.as_ref().err().copied();
+            if state.late {
+                return Ok(ControlFlow::Break(Status::OutOfTime));
+            }
+            match direction {
+                Ok(Direction::Step) => {
+                    self.follow(ocp, state);
+                    let taken = self.go(ocp, state, row)?;
+                    row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
+                    if let Some(taken) = taken {
+                        return Ok(ControlFlow::Continue(taken));
+                    }
+                }
+                Ok(Direction::Infeasible(worst)) => {
+                    return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
+                }
+                Err(QpError::Infeasible { .. }) if self.options.elastic => {}
+                Err(QpError::NotConvex { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. })
+                    if self.curvature.convexification() == Convexification::Reduced => {}
+                Err(error) => return ocp.status_of_error(error).map(ControlFlow::Break),
+            }
+        }
+        let status = match failure {
+            // That the QP at one iterate has no solution says nothing of the problem.
+            None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
+            Some(error) => ocp.status_of_error(error)?,
+        };
+        Ok(ControlFlow::Break(status))
+    }
+}

@@ -1,0 +1,242 @@
+//! What errors say: what, where by name, the values, and the way out.
+
+use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
+use crate::qp::{QpField, Side};
+use core::fmt;
+
+/// What may help where a function has no value, or no derivative.
+const ELSEWHERE: &str = "another guess, or bounds that keep away from there, may help";
+
+impl Part {
+    fn is_bound(self) -> bool {
+        matches!(self, Self::StateBounds | Self::ControlBounds | Self::PathBounds | Self::TerminalBounds)
+    }
+    fn verb(self) -> &'static str {
+        match self {
+            Self::InitialState | Self::Reference | Self::TerminalReference | Self::Memory => "has",
+            _ => "have",
+        }
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Times => "the nodes",
+            Self::States => "the states",
+            Self::Controls => "the controls",
+            Self::Multipliers => "the multipliers",
+            Self::Parameters => "the parameters",
+            Self::InitialState => "the initial state",
+            Self::Arrival => "the weights of the arrival cost",
+            Self::Reference => "the reference of the stage cost",
+            Self::TerminalReference => "the reference of the terminal cost",
+            Self::StateBounds => "the bounds of the states",
+            Self::ControlBounds => "the bounds of the controls",
+            Self::PathBounds => "the bounds of the path constraints",
+            Self::TerminalBounds => "the bounds of the terminal constraints",
+            Self::Penalty => "the penalties",
+            Self::Dimensions => "the dimensions of the stages",
+            Self::Memory => "the memory",
+        })
+    }
+}
+
+impl fmt::Display for ConstraintName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = match self.side {
+            Side::Lower => "lower",
+            Side::Upper => "upper",
+        };
+        write!(f, "the {side} bound of `{}`", self.name)?;
+        if matches!(self.part, Part::PathBounds | Part::TerminalBounds) {
+            write!(f, " (output {})", self.output)?;
+        }
+        write!(f, " at stage {}", self.stage)
+    }
+}
+
+impl fmt::Display for OcpError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownName { name, known } => {
+                write!(f, "`{}` has no state or control `{}`: its states are", known.model, name.as_str())?;
+                list(f, known.x)?;
+                f.write_str(", its controls")?;
+                list(f, known.u)
+            }
+            Self::NoSuchStage { part, stage, stages } => {
+                write!(f, "there is no stage {stage}: {part} are at stages 0 to {}", stages.saturating_sub(1))
+            }
+            Self::EmptyRange { part, start, end, stages } => write!(
+                f,
+                "there is no stage in {start}..{end}: {part} are at stages 0 to {}, and a range begins before it \
+                 ends, as `2..4` and `2..=3` do",
+                stages.saturating_sub(1)
+            ),
+            Self::NoBound { name, start, end } => write!(
+                f,
+                "`{}` has no bound at stages {start} to {} that could be soft: call `bound` before `soften`",
+                name.as_str(),
+                end.saturating_sub(1)
+            ),
+            Self::Length { part: Part::Dimensions, stage, expected, found } => write!(
+                f,
+                "these are the dimensions of another problem, {found} instead of {expected} at stage {stage}: memory \
+                 and solvers are made for one problem, as by `HeapSqp::new(&ocp)`"
+            ),
+            Self::Length { part, stage, expected, found } => {
+                let elements = if *found == 1 { "element" } else { "elements" };
+                stage_of(f, *part, *stage)?;
+                write!(f, "{part} {} {found} {elements} instead of {expected}", part.verb())?;
+                f.write_str(if *expected == 0 { ": the problem has none" } else { "" })
+            }
+            Self::InvalidValue { part, stage, name, index, value } => {
+                stage_of(f, *part, *stage)?;
+                let (what, allowed) = match part {
+                    Part::Penalty => ("a penalty of ", "from 0 on, and finite if it is quadratic"),
+                    _ if part.is_bound() => {
+                        ("a bound of ", "a number, or -inf below and inf above where there is none")
+                    }
+                    Part::InitialState => ("the initial value of ", "finite"),
+                    Part::Multipliers => ("a multiplier of ", "finite"),
+                    Part::Reference | Part::TerminalReference => ("the reference of ", "finite"),
+                    _ => ("", "finite"),
+                };
+                f.write_str(what)?;
+                named(f, *part, name, *index)?;
+                write!(f, " is {value}: it has to be {allowed}")
+            }
+            Self::InvalidArrivalWeight { states: [i, j], value, allowed } => {
+                match i == j {
+                    true => write!(f, "the weight of `{i}` in the arrival cost")?,
+                    false => write!(f, "the weight of `{i}` and `{j}` in the arrival cost")?,
+                }
+                write!(f, " is {value}: it has to be {allowed}")
+            }
+            Self::InvalidWeight { function, outputs: [i, j], value, allowed } => {
+                match i == j {
+                    true => write!(f, "the weight of output {i} of `{function}`")?,
+                    false => write!(f, "the weight of outputs {i} and {j} of `{function}`")?,
+                }
+                write!(f, " is {value}: it has to be {allowed}")
+            }
+            Self::Times { interval, start, end } => {
+                write!(
+                    f,
+                    "interval {interval} goes from {start} to {end}: times of nodes are finite and increase"
+                )
+            }
+            Self::CrossedBounds { part, stage, name, index, lower, upper } => {
+                write!(f, "stage {stage}: the lower bound {lower} of ")?;
+                named(f, *part, name, *index)?;
+                write!(f, " is above the upper bound {upper}")
+            }
+            Self::Missing { part: Part::Times, .. } => f.write_str(
+                "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times",
+            ),
+            Self::Missing { part: Part::InitialState, .. } => f.write_str(
+                "nothing is said about the initial state: call `fix_initial_state` or `free_initial_state`",
+            ),
+            Self::Missing { part: Part::Parameters, stage } => {
+                write!(f, "stage {stage}: the parameters were never set: call `set_parameters`")
+            }
+            Self::Missing { part, stage } => write!(f, "stage {stage}: {part} were never set"),
+            Self::NotThere { function, variable, terminal } => {
+                write!(f, "`{function}` depends on `{variable}`, which does not exist ")?;
+                f.write_str(if *terminal { "at the end of the horizon" } else { "at the nodes" })
+            }
+            Self::NonFiniteFunction { function, stage, output, value } => {
+                write!(f, "stage {stage}: output {output} of `{function}` is {value}: {ELSEWHERE}")
+            }
+            Self::NonFiniteDerivative { field, stage, of, output, by, value } => {
+                write!(f, "stage {stage}: ")?;
+                match field {
+                    QpField::A | QpField::B => write!(f, "the derivative of the next `{of}` by `{by}`")?,
+                    QpField::C | QpField::D => write!(f, "the derivative of output {output} of `{of}` by `{by}`")?,
+                    QpField::GradientX | QpField::GradientU => write!(f, "the derivative of the cost by `{by}`")?,
+                    _ => write!(f, "the second derivative of the Lagrangian by `{of}` and `{by}`")?,
+                }
+                write!(f, " is {value}: {ELSEWHERE}")
+            }
+            Self::NonFiniteSensitivity { stage, of, by, value } => write!(
+                f,
+                "stage {stage}: the derivative of the solution `{of}` by `{by}` is {value}: other units of states, \
+                 controls and costs may help"
+            ),
+            Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Simulation { interval, state, value, error } => write!(
+                f,
+                "the simulation of the guess ends in interval {interval}, where `{state}` is {value:e}: {error}; \
+                 another first state or other controls may help, or an adaptive integrator \
+                 (`Ocp::guess_by_simulation_with`)"
+            ),
+            Self::NoIntegrator => f.write_str(
+                "collocation has no integrator for a simulation of the guess: give one to \
+                 `Ocp::guess_by_simulation_with`",
+            ),
+            Self::NotIdentifiable { name, stage } => write!(
+                f,
+                "`{name}` at stage {stage} is not identifiable and has no variance: see \
+                 `Covariance::unidentifiable` for what data cannot tell, and add an arrival cost, other \
+                 samples or a bound"
+            ),
+            Self::Integrator(error) => error.fmt(f),
+            #[cfg(feature = "alloc")]
+            Self::Batch(error) => error.fmt(f),
+            Self::Inconsistent(error) => error.fmt(f),
+            Self::Coupled => f.write_str(
+                "feedback gains are not defined for periodic states or shared controls: use `du/dx₀` of \
+                 `Ocp::differentiate`",
+            ),
+            Self::InvalidOption { name, value, allowed } => {
+                write!(f, "the option `{name}` is {value}: it has to be {allowed}")
+            }
+            Self::Qp(error) => error.fmt(f),
+            Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
+        }
+    }
+}
+
+/// Where it is, unless it is in one place alone.
+fn stage_of(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result {
+    match part {
+        Part::InitialState | Part::TerminalReference | Part::Memory => Ok(()),
+        _ => write!(f, "stage {stage}: "),
+    }
+}
+
+/// One of the elements of a part, which are outputs of a function or have names of their own.
+fn named(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fmt::Result {
+    match part {
+        Part::PathBounds | Part::TerminalBounds | Part::Reference | Part::TerminalReference => {
+            write!(f, "output {index} of `{name}`")
+        }
+        _ => write!(f, "`{name}`"),
+    }
+}
+
+fn list(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
+    for (i, name) in names.iter().enumerate() {
+        let comma = if i == 0 { "" } else { "," };
+        write!(f, "{comma} `{name}`")?;
+    }
+    Ok(())
+}
+
+debug_is_display!(OcpError);
+
+impl core::error::Error for OcpError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Integration { error, .. } | Self::Simulation { error, .. } | Self::Integrator(error) => {
+                Some(error)
+            }
+            #[cfg(feature = "alloc")]
+            Self::Batch(error) => Some(error),
+            Self::Inconsistent(error) => Some(error),
+            Self::Qp(error) => Some(error),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! How a run ended.
+
+use crate::ocp::formulation::error::{ConstraintName, OcpError};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::solution::log::{Iteration, Times};
+use crate::qp::{QpError, Residuals, StageDims, Violation};
+use crate::scalar::Real;
+use core::fmt;
+
+/// How a run ended.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem, Status};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// match outcome.status {
+///     Status::Converged | Status::Acceptable => println!("u = {:?}", ocp.solution()?.control("u")?),
+///     // Each of them prints what it is about, and which constraint is to blame.
+///     Status::Infeasible { constraint, violation } => println!("{constraint}: {violation}"),
+///     other => println!("{other}"),
+/// }
+/// assert_eq!(outcome.status, Status::Converged);
+///
+/// sqp.options.max_iterations = 0;
+/// ocp.guess(&[1.0], &[0.0])?;
+/// assert_eq!(sqp.solve(&mut ocp)?.status, Status::MaxIterations);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Status {
+    /// The conditions of optimality hold.
+    Converged,
+    /// The conditions of optimality hold to the acceptable tolerance, and no better point was
+    /// found.
+    Acceptable,
+    /// The maximum number of iterations was reached.
+    MaxIterations,
+    /// The observer stopped it.
+    Stopped,
+    /// The time limit was reached.
+    OutOfTime,
+    /// Variables grow without end at points that satisfy all constraints: something is missing that
+    /// bounds the objective. [`Ipm`](crate::ocp::Ipm) says so.
+    ///
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem, Status};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn push(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn gain(_x: f64, u: f64) -> f64 { -u }
+    ///
+    /// let mut ocp = Problem::new(Map::<Push, f64>::new())
+    ///     .stage_cost(GeneralCost::<Gain>::new())
+    ///     .on(Horizon::uniform(5, 1.0))?;
+    /// ocp.fix_initial_state(&[0.0])?.guess(&[0.0], &[0.0])?;
+    /// let mut ipm = HeapIpm::new(&ocp)?;
+    /// assert_eq!(ipm.solve(&mut ocp)?.status, Status::Unbounded);
+    /// // With a bound there is a solution.
+    /// ocp.bound("u", .., -1.0, 1.0)?.guess(&[0.0], &[0.0])?;
+    /// assert!(ipm.solve(&mut ocp)?.is_converged());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    Unbounded,
+    /// Locally infeasible: gaps are less than violations, and no step makes the sum of both smaller
+    /// by a thousandth, in [`Ipm`](crate::ocp::Ipm) that of violations by a hundredth, to first
+    /// order. Elsewhere there may be points that satisfy all constraints. This is the one that the
+    /// iterate violates most.
+    Infeasible {
+        /// The constraint.
+        constraint: ConstraintName,
+        /// By how much it is violated.
+        violation: f64,
+    },
+    /// A QP was infeasible, and elastic mode is off.
+    InfeasibleQp {
+        /// A constraint that cannot be satisfied.
+        constraint: ConstraintName,
+        /// By how much it is violated at least.
+        violation: f64,
+    },
+    /// A QP was not solved for another reason.
+    QpFailed(QpError),
+    /// No step was short enough to make progress.
+    NoProgress,
+}
+
+/// The outcome of a run. The iterate of the problem is the best one, whatever the status.
+///
+/// Runs return it; it prints itself in a line. Whether the iterate is a solution, `is_converged`
+/// says, and `is_solved` by a lower standard.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn price(x: f64, u: f64) -> f64 { x * x + u * u }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(GeneralCost::<Price>::new())
+///     .on(Horizon::uniform(5, 1.0))?;
+/// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// assert!(outcome.is_converged(), "{outcome}");
+/// println!("{}", outcome.objective);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Outcome {
+    /// How it ended.
+    pub status: Status,
+    /// Steps.
+    pub iterations: usize,
+    /// The objective at the iterate.
+    pub objective: f64,
+    /// The conditions of optimality at the iterate.
+    pub residuals: Residuals,
+    /// Iterations of all QPs.
+    pub qp_iterations: usize,
+    /// How long all of it took.
+    pub times: Times,
+}
+
+impl Outcome {
+    /// Of a run that begins.
+    pub(in crate::ocp) fn new() -> Self {
+        Self {
+            status: Status::MaxIterations,
+            iterations: 0,
+            objective: 0.0,
+            residuals: Residuals::default(),
+            qp_iterations: 0,
+            times: Times::default(),
+        }
+    }
+
+    /// Counts what an iteration took.
+    pub(in crate::ocp) fn count(&mut self, row: &Iteration) {
+        self.qp_iterations += row.qp_iterations;
+        self.times.linearise += row.times.linearise;
+        self.times.qp += row.times.qp;
+        self.times.search += row.times.search;
+    }
+
+    /// Whether the conditions of optimality hold to the tolerance: then multipliers are those of
+    /// the solution, too.
+    #[must_use]
+    pub fn is_converged(&self) -> bool {
+        self.status == Status::Converged
+    }
+
+    /// Whether states and controls are those of a solution: the conditions hold to the tolerance,
+    /// or to the acceptable one where rounding or scaling leaves no better point.
+    ///
+    /// ```
+    /// # use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem};
+    /// # use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn price(x: f64, u: f64) -> f64 { x * x + u * u }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(GeneralCost::<Price>::new())
+    /// #     .on(Horizon::uniform(5, 1.0))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    /// if !outcome.is_solved() {
+    ///     return Err(outcome.to_string().into());
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn is_solved(&self) -> bool {
+        matches!(self.status, Status::Converged | Status::Acceptable)
+    }
+}
+
+impl Status {
+    /// What it is.
+    fn what(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Converged => f.write_str("converged"),
+            Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
+            Self::MaxIterations => f.write_str("not converged: the maximum number of iterations was reached"),
+            Self::Stopped => f.write_str("stopped by the observer"),
+            Self::OutOfTime => f.write_str("not converged: the time limit was reached"),
+            Self::Unbounded => f.write_str("unbounded: variables grow without end"),
+            Self::Infeasible { constraint, violation } => {
+                write!(f, "locally infeasible: {constraint} is violated by {violation:.2e}")
+            }
+            Self::InfeasibleQp { constraint, violation } => {
+                write!(f, "the QP is infeasible: {constraint} is violated by {violation:.2e} at least")
+            }
+            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
+            Self::NoProgress => f.write_str("no step makes progress"),
+        }
+    }
+
+    /// What to do about it.
+    fn way_out(&self) -> &'static str {
+        match self {
+            Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
+            Self::MaxIterations => {
+                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; a larger \
+                 `options.max_iterations` or another guess may help, for `Sqp` also another `options.globalisation`, as \
+                 `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
+            }
+            Self::Unbounded => "; bounds of states and controls, or a cost of them, are missing",
+            Self::Infeasible { .. } => {
+                "; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"
+            }
+            Self::InfeasibleQp { .. } => "; `options.elastic` goes on where only QPs are",
+            Self::QpFailed(QpError::NotConvex { .. }) => {
+                "; another guess may help, and `Convexification::Reduced` where another one was chosen"
+            }
+            Self::QpFailed(_) => "; another guess may help",
+            Self::NoProgress => {
+                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; another \
+                 guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
+                 a smaller `options.shortest_step`, and exact Hessians (`Sqp::exact`) where it has others"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.what(f)?;
+        f.write_str(self.way_out())
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { status, iterations, objective, residuals, .. } = self;
+        status.what(f)?;
+        write!(
+            f,
+            " after {iterations} iterations: objective {objective:.8e}, {residuals}{}",
+            status.way_out()
+        )
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// The status of a run whose violations cannot be made smaller.
+    pub(in crate::ocp) fn status_of_worst(&self, worst: &Violation) -> Status {
+        let Violation { field, stage, index, side, violation } = *worst;
+        Status::Infeasible { constraint: self.name(field, stage, index, side), violation }
+    }
+
+    /// The status of a run whose QP or Newton's equations have no solution.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteDerivative`] if there is no such QP.
+    pub(in crate::ocp) fn status_of_error(&self, error: QpError) -> Result<Status, OcpError> {
+        match (self.infeasible(&error), error) {
+            (Some(constraint), QpError::Infeasible { violation, .. }) => {
+                Ok(Status::InfeasibleQp { constraint, violation })
+            }
+            _ => self.derivative(&error).map_or(Ok(Status::QpFailed(error)), Err),
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Adjoints of solutions and derivatives of optimal values, by the factors of a solution.
+
+use super::active::Springs;
+use super::answers::{SolutionAdjoint, ValueHessian};
+use super::border::Border;
+use super::column::Column;
+use super::factors::SolutionFactors;
+use super::{recursion, solve};
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::{get, set};
+use crate::qp::{QpView, Solution, StageDims, assign, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+impl<T: Real> SolutionFactors<T> {
+    /// The Hessian of the optimal value.
+    pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
+        let ([nx, _, np], given) = (self.dims, self.given());
+        let mut column = core::mem::take(&mut self.column);
+        for i in 0..given {
+            solve::solve_start(self, i, &mut column);
+            assign(part_mut(&mut self.of_start, i * nx, nx), column.multipliers(0));
+        }
+        for p in 0..np {
+            solve::solve_parameter(self, p, &mut column);
+            assign(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
+            for q in 0..np {
+                let value = get(&self.problem.square, p * np + q) + self.change(q, &column);
+                set(&mut self.square, p * np + q, value);
+            }
+        }
+        self.column = column;
+        ValueHessian {
+            xx: part(&self.of_start, 0, given * nx),
+            xp: part(&self.cross, 0, given * np),
+            pp: &self.square,
+        }
+    }
+
+    /// `λᵀ dw/dx₀` and `λᵀ dw/dp`, where states and controls of `seed` are `λ`; its multipliers are
+    /// not looked at.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`] if the seed has other dimensions; [`OcpError::InvalidValue`] if it is
+    /// not finite.
+    pub fn adjoint<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        seed: &Solution<T, D, M>,
+    ) -> Result<SolutionAdjoint<'_, T>, OcpError> {
+        self.check_seed(seed)?;
+        let mut column = core::mem::take(&mut self.column);
+        solve::solve_seed(self, seed, &mut column);
+        for p in 0..self.dims[2] {
+            let value = self.change(p, &column);
+            set(&mut self.adjoint, p, value);
+        }
+        self.column = column;
+        Ok(SolutionAdjoint { x0: part(self.column.multipliers(0), 0, self.given()), p: &self.adjoint })
+    }
+
+    /// The product of a solution of the conditions of optimality with what a parameter changes of
+    /// these.
+    fn change(&self, p: usize, column: &Column<T>) -> T {
+        let [nx, nu, _] = self.dims;
+        let mut sum = T::ZERO;
+        for k in 0..=self.intervals {
+            let gradient = part(self.problem.gradient(k), p * (nx + nu), nx + nu);
+            let (of_x, of_u) = gradient.split_at_checked(nx).unwrap_or_default();
+            let end = part(self.problem.end(k), p * nx, nx);
+            let pairs = of_x.iter().zip(column.state(k)).chain(of_u.iter().zip(column.control(k)));
+            let pairs = pairs.chain(end.iter().zip(column.multipliers(k + 1)));
+            sum = pairs.fold(sum, |sum, (&a, &b)| sum + a * b);
+        }
+        sum
+    }
+
+    fn check_seed<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &self,
+        seed: &Solution<T, D, M>,
+    ) -> Result<(), OcpError> {
+        let [nx, nu, _] = self.dims;
+        let (expected, found) = (self.intervals + 1, seed.dims().len());
+        if expected != found {
+            return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
+        }
+        for (stage, at) in seed.stages().enumerate() {
+            let controls = if stage < self.intervals { nu } else { 0 };
+            for (part, values, expected) in [(Part::States, at.x, nx), (Part::Controls, at.u, controls)] {
+                if values.len() != expected {
+                    return Err(OcpError::Length { part, stage, expected, found: values.len() });
+                }
+                if let Some((index, value)) = crate::finite::not_finite(values) {
+                    return Err(OcpError::InvalidValue { part, stage, name: "seed", index, value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The recursion, for the QP at the iterate.
+    ///
+    /// # Errors
+    /// [`OcpError::Qp`]
+    pub(super) fn fill<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        qp: QpView<'_, T>,
+        iterate: &Solution<T, D, M>,
+        parameters: bool,
+    ) -> Result<(), OcpError> {
+        let mut largest = T::ZERO;
+        for stage in qp.stages() {
+            for &value in stage.arrays().hessian {
+                largest = value.abs().max(largest);
+            }
+        }
+        let mut springs = Springs::new(largest, self.smoothing);
+        recursion::factorise(self, qp, iterate, &mut springs, parameters)?;
+        self.weak = springs.weak;
+        let mut column = core::mem::take(&mut self.column);
+        let result = Border::factorise(self, &mut column);
+        self.column = column;
+        recursion::gradient(qp, iterate, &mut self.gradient);
+        result
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Factorises the conditions of optimality at the iterate, for derivatives of the solution and
+    /// of its value: the iterate must be a solution.
+    ///
+    /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
+    /// the solution; with those of Gauss and Newton approximations, but for the gradient of the
+    /// value, which has no Hessian in it.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state;
+    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::InvalidOption`] of the
+    /// smoothing; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    pub fn factorise<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        factors: &mut SolutionFactors<T>,
+    ) -> Result<(), OcpError> {
+        self.prepare_factors(factors)?;
+        let problem = &mut factors.problem;
+        problem.begin();
+        self.linearise_watched(curvature, &mut |k, step| problem.take(k, step))?;
+        self.differentiate_functions(C::EXACT, problem)?;
+        factors.fill(self.qp.view(), &self.iterate, true)
+    }
+
+    /// Checks memory and options, and what has to be found beside the recursion.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`]
+    pub(super) fn prepare_factors(&self, factors: &mut SolutionFactors<T>) -> Result<(), OcpError> {
+        if self.initial == Initial::Unknown {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        let value = factors.smoothing.to_f64();
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(OcpError::InvalidOption {
+                name: "smoothing",
+                value,
+                allowed: "from 0 on and finite",
+            });
+        }
+        let (part, stage) = (Part::Memory, 0);
+        let given = [P::Shape::NX, P::Shape::NU, P::Shape::NP, self.intervals()];
+        let [nx, nu, np] = factors.dims;
+        for (expected, found) in given.into_iter().zip([nx, nu, np, factors.intervals]) {
+            if expected != found {
+                return Err(OcpError::Length { part, stage, expected, found });
+            }
+        }
+        factors.border.prepare(self.qp.view(), self.initial == Initial::Free, [nx, nu, self.intervals()])
+    }
+}

@@ -1,0 +1,185 @@
+//! The conditions of optimality at a solution, factorised once for any number of derivatives.
+
+use super::block;
+use super::border::Border;
+use super::column::Column;
+use super::parameters::Parameters;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{part, zeros};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+
+/// The conditions of optimality at a solution, factorised: adjoint derivatives of the solution, and
+/// derivatives of the optimal value, by the initial state and by parameters.
+///
+/// ```text
+/// adjoint(λ)              λᵀ dw/dx₀,  λᵀ dw/dp            w = (x₀, u₀, …, x_N) of the solution
+/// value_gradient_x0, _p   ∂V/∂x₀,  ∂V/∂p                   V(x₀, p) = min f
+/// value_hessian           ∂²V/∂x₀²,  ∂²V/∂x₀∂p,  ∂²V/∂p²
+/// ```
+///
+/// `p` are the parameters of all stages, which change together. [`Ocp::factorise`] fills it by one
+/// linearisation and one Riccati recursion, `O(N (NX + NU)³)`. An adjoint costs
+/// `O(N (NX + NU) (NX + NU + NP))`, however many parameters there are; the Hessian of the value one
+/// such solve for each parameter. The gradient of the value is that of the Lagrangian (envelope
+/// theorem), and costs nothing more.
+///
+/// A free initial state, periodic states and shared controls are unknowns beside the recursion.
+/// There are no derivatives by a free initial state.
+///
+/// Where bounds are active the derivatives are those along which the active set stays. At a bound
+/// that is active without a force solutions have two derivatives, one for each side. Then the bound
+/// counts as active if its multiplier is larger than its slack, and [`weakly_active`] says how many
+/// bounds are in question. [`smoothing`] gives derivatives that are continuous there.
+///
+/// [`weakly_active`]: SolutionFactors::weakly_active
+/// [`smoothing`]: SolutionFactors::smoothing
+///
+/// # Example
+/// The distance of a mass is a parameter: what does it change of the cost?
+/// ```
+/// use casados::ocp::{Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SolutionFactors};
+/// use casados::prelude::*;
+/// use casados::qp::HeapSolution;
+///
+/// #[function]
+/// fn push(x: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> f64 { x[0] + u[0] }
+/// #[function]
+/// fn away(x: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 2] { [x[0] - p[0], u[0]] }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(LeastSquaresCost::<Away>::diagonal(&[1.0, 1.0]))
+///     .on(Horizon::uniform(2, 1.0))?;
+/// ocp.fix_initial_state(&[0.0])?.set_parameters(.., &[1.0])?.guess(&[0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+///
+/// let mut factors = SolutionFactors::new(&ocp)?;
+/// ocp.factorise(Exact::default(), &mut factors)?;
+/// // V(x₀, p) = ½ (x₀ − p)² + ¼ (x₀ − p)², with u₀ = (p − x₀) / 2.
+/// assert!((factors.value_gradient_x0()[0] + 1.5).abs() < 1e-9);
+/// assert!((factors.value_hessian().pp[0] - 1.5).abs() < 1e-6);
+/// let mut seed = HeapSolution::new(ocp.qp().dims())?;
+/// seed.stage_mut(0).ok_or("a stage")?.u[0] = 1.0;
+/// let adjoint = factors.adjoint(&seed)?;
+/// assert!((adjoint.x0[0] + 0.5).abs() < 1e-6 && (adjoint.p[0] - 0.5).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SolutionFactors<T> {
+    /// The barrier parameter `μ` that the iterate solves, as that of [`Ipm`](crate::ocp::Ipm) with
+    /// [`IpmOptions::final_mu`](crate::ocp::IpmOptions::final_mu): bounds are springs `μ/s²`, and
+    /// derivatives those of the barrier problem, which are smooth. Zero, the default: solutions of
+    /// the problem itself, with active sets.
+    pub smoothing: T,
+    /// `NX`, `NU`, `NP`
+    pub(super) dims: [usize; 3],
+    pub(super) intervals: usize,
+    /// `K`, and factors of `M_uu`, of every interval.
+    pub(super) gains: Vec<T>,
+    pub(super) controls: Vec<T>,
+    /// `P` of every stage.
+    pub(super) costs_to_go: Vec<T>,
+    /// The rows of `[A B]` of every interval.
+    pub(super) dynamics: Vec<T>,
+    /// How many pivots of controls are negative.
+    pub(super) negative: usize,
+    pub(super) border: Border<T>,
+    pub(super) problem: Parameters<T>,
+    pub(super) column: Column<T>,
+    /// `∂V/∂x₀`, and the Hessian of the value.
+    pub(super) gradient: Vec<T>,
+    pub(super) of_start: Vec<T>,
+    pub(super) cross: Vec<T>,
+    pub(super) square: Vec<T>,
+    pub(super) adjoint: Vec<T>,
+    pub(super) weak: usize,
+    pub(super) work: Vec<T>,
+}
+
+impl<T: Real> SolutionFactors<T> {
+    /// Memory for a problem.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
+        let dims @ [nx, nu, np] = [P::Shape::NX, P::Shape::NU, P::Shape::NP];
+        let n = ocp.intervals();
+        Ok(Self {
+            smoothing: T::ZERO,
+            dims,
+            intervals: n,
+            gains: zeros(n * nu * nx)?,
+            controls: zeros(n * nu * nu)?,
+            costs_to_go: zeros((n + 1) * nx * nx)?,
+            dynamics: zeros(n * nx * (nx + nu))?,
+            negative: 0,
+            border: Border::default(),
+            problem: Parameters::new::<P>(n)?,
+            column: Column::new(dims, n)?,
+            gradient: zeros(nx)?,
+            of_start: zeros(nx * nx)?,
+            cross: zeros(nx * np)?,
+            square: zeros(np * np)?,
+            adjoint: zeros(np)?,
+            weak: 0,
+            work: zeros(work(nx, nu))?,
+        })
+    }
+
+    /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, column after column; empty where
+    /// there is none.
+    #[must_use]
+    pub fn gain(&self, stage: usize) -> &[T] {
+        let [nx, nu, _] = self.dims;
+        block(&self.gains, stage, nu * nx)
+    }
+
+    /// How many bounds have neither a slack nor a multiplier above `ε^¼` (1e-4 in double
+    /// precision): there, solutions have a derivative to either side. Zero where solutions are
+    /// smoothed.
+    #[must_use]
+    pub fn weakly_active(&self) -> usize {
+        self.weak
+    }
+
+    /// `∂V/∂x₀`, `NX`; empty where the initial state is free.
+    #[must_use]
+    pub fn value_gradient_x0(&self) -> &[T] {
+        part(&self.gradient, 0, self.given())
+    }
+
+    /// `∂V/∂p`, `NP`.
+    #[must_use]
+    pub fn value_gradient_p(&self) -> &[T] {
+        &self.problem.slopes_of_value
+    }
+
+    /// How many elements of the first state are given: all, or none.
+    pub(super) fn given(&self) -> usize {
+        if self.border.is_free() { 0 } else { self.dims[0] }
+    }
+    /// Columns of `P` of a stage.
+    pub(super) fn cost_to_go(&self, k: usize) -> impl Iterator<Item = &[T]> {
+        let [nx, _, _] = self.dims;
+        part(&self.costs_to_go, k * nx * nx, nx * nx).chunks_exact(nx.max(1))
+    }
+    /// Rows of `[A B]` of an interval.
+    pub(super) fn rows(&self, k: usize) -> impl Iterator<Item = &[T]> {
+        let [nx, nu, _] = self.dims;
+        part(&self.dynamics, k * nx * (nx + nu), nx * (nx + nu)).chunks_exact((nx + nu).max(1))
+    }
+    /// A column of `K` of an interval.
+    pub(super) fn gains(&self, k: usize, state: usize) -> &[T] {
+        let [nx, nu, _] = self.dims;
+        part(&self.gains, (k * nx + state) * nu, nu)
+    }
+}
+
+/// How many numbers `P [A B]`, `M`, a gradient and a state take.
+const fn work(nx: usize, nu: usize) -> usize {
+    let size = nx + nu;
+    nx * size + size * size + size + nx
+}

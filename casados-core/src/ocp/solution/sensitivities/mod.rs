@@ -1,0 +1,238 @@
+//! How a solution, and its value, change with the initial state and with parameters.
+//!
+//! | | |
+//! | --- | --- |
+//! | `factors` | the conditions of optimality, factorised: adjoints, derivatives of the value |
+//! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
+//! | `column`, `border` | solutions by its factors, and what couples stages |
+//! | `parameters` | what parameters change of the conditions |
+//! | `covariance` | the covariance of an estimate, and what data say nothing of |
+//! | `unknowns`, `gram` | its unknowns, and the reduced Hessian over these |
+
+mod active;
+mod answers;
+mod border;
+mod column;
+mod covariance;
+mod derivatives;
+mod factors;
+mod gram;
+mod parameters;
+mod recursion;
+mod solve;
+mod unknowns;
+
+use crate::qp::element::get;
+pub use answers::{SolutionAdjoint, ValueHessian};
+pub use covariance::{Covariance, Unidentifiable};
+pub use factors::SolutionFactors;
+
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::names::Names;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{StageDims, assign, part_mut, zeros};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+
+/// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback
+/// `u_k + K_k (x − x_k)`.
+///
+/// Derivatives with respect to `p` are those where the parameters of all stages change together.
+/// Where few functions of the solution are of interest, adjoints by [`SolutionFactors`] are
+/// cheaper.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let mut sensitivities = Sensitivities::new(&ocp)?;
+/// ocp.differentiate(Exact::default(), &mut sensitivities)?;
+/// // The linear-quadratic regulator: u = -0.618 x, x₊ = 0.382 x.
+/// assert!((sensitivities.gain(0)[0] + 0.618).abs() < 1e-3);
+/// assert!((sensitivities.du(0)[0] + 0.618).abs() < 1e-3);
+/// assert!((sensitivities.dx(1)[0] - 0.382).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Sensitivities<T> {
+    factors: SolutionFactors<T>,
+    /// `dx/dx₀`, `du/dx₀`: matrices column after column, one stage after the other.
+    x: Vec<T>,
+    u: Vec<T>,
+    /// `dx/dp`, and `du/dp`
+    x_p: Vec<T>,
+    u_p: Vec<T>,
+}
+
+impl<T: Real> Sensitivities<T> {
+    /// Memory for a problem.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(
+        ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
+    ) -> Result<Self, OcpError> {
+        let factors = SolutionFactors::new(ocp)?;
+        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
+        Ok(Self {
+            factors,
+            x: zeros((n + 1) * nx * nx)?,
+            u: zeros(n * nu * nx)?,
+            x_p: zeros((n + 1) * nx * np)?,
+            u_p: zeros(n * nu * np)?,
+        })
+    }
+
+    /// The factors, for adjoints and the value of the same solution, and their smoothing.
+    pub fn factors(&mut self) -> &mut SolutionFactors<T> {
+        &mut self.factors
+    }
+
+    /// `K_k`, `NU × NX`, column after column; empty where there is none.
+    #[must_use]
+    pub fn gain(&self, stage: usize) -> &[T] {
+        self.factors.gain(stage)
+    }
+    /// `dx_k/dx₀`, `NX × NX`, column after column; zero where the initial state is free.
+    #[must_use]
+    pub fn dx(&self, stage: usize) -> &[T] {
+        let [nx, _, _] = self.factors.dims;
+        block(&self.x, stage, nx * nx)
+    }
+    /// `du_k/dx₀`, `NU × NX`, column after column; zero where the initial state is free.
+    #[must_use]
+    pub fn du(&self, stage: usize) -> &[T] {
+        let [nx, nu, _] = self.factors.dims;
+        block(&self.u, stage, nu * nx)
+    }
+    /// `dx_k/dp`, `NX × NP`, column after column.
+    #[must_use]
+    pub fn dx_dp(&self, stage: usize) -> &[T] {
+        let [nx, _, np] = self.factors.dims;
+        block(&self.x_p, stage, nx * np)
+    }
+    /// `du_k/dp`, `NU × NP`, column after column.
+    #[must_use]
+    pub fn du_dp(&self, stage: usize) -> &[T] {
+        let [_, nu, np] = self.factors.dims;
+        block(&self.u_p, stage, nu * np)
+    }
+
+    fn by_initial_state(&mut self) {
+        let Self { factors, x, u, .. } = self;
+        let ([nx, nu, _], n) = (factors.dims, factors.intervals);
+        let mut column = core::mem::take(&mut factors.column);
+        x.fill(T::ZERO);
+        u.fill(T::ZERO);
+        for i in 0..factors.given() {
+            solve::solve_start(factors, i, &mut column);
+            for k in 0..=n {
+                assign(part_mut(x, (k * nx + i) * nx, nx), column.state(k));
+                assign(part_mut(u, (k * nx + i) * nu, nu), column.control(k));
+            }
+        }
+        factors.column = column;
+    }
+
+    /// A derivative that is not finite: the stage, which of `(x, u)` is differentiated by which of
+    /// `(x₀, p)`, and its value.
+    fn not_finite(&self) -> Option<(usize, usize, usize, f64)> {
+        let [nx, nu, np] = self.factors.dims;
+        let all = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
+        let by_parameters = [(&self.x_p, [0, nx], [nx, np]), (&self.u_p, [nx, nu], [nx, np])];
+        all.into_iter().chain(by_parameters).find_map(|(list, [row, rows], [column, columns])| {
+            let index = list.iter().position(|value| !value.is_finite())?;
+            let (i, j) = (index % rows, index / rows % columns);
+            Some((index / (rows * columns), row + i, column + j, list.get(index)?.to_f64()))
+        })
+    }
+
+    fn by_parameters(&mut self) {
+        let Self { factors, x_p, u_p, .. } = self;
+        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
+        let mut column = core::mem::take(&mut factors.column);
+        for p in 0..np {
+            solve::solve_parameter(factors, p, &mut column);
+            for k in 0..=n {
+                assign(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
+                assign(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
+            }
+        }
+        factors.column = column;
+    }
+}
+
+/// The matrix of a stage; empty where there is none.
+fn block<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
+    let begin = stage.checked_mul(length);
+    let end = begin.and_then(|begin| begin.checked_add(length));
+    begin.zip(end).and_then(|(begin, end)| matrices.get(begin..end)).unwrap_or_default()
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// How the solution changes with its initial state and with parameters, where the bounds that
+    /// are active stay so: [`Ocp::factorise`], and one solution for each of both.
+    ///
+    /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
+    /// the solution; with those of Gauss and Newton, which leave second derivatives of dynamics,
+    /// constraints and least squares out of what parameters change, too, they are approximations of
+    /// the same quality.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::factorise`]; [`OcpError::NonFiniteSensitivity`]
+    pub fn differentiate<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        result: &mut Sensitivities<T>,
+    ) -> Result<(), OcpError> {
+        self.factorise(curvature, &mut result.factors)?;
+        result.by_initial_state();
+        result.by_parameters();
+        match result.not_finite() {
+            Some((stage, of, by, value)) => {
+                let Names { x, u, p, .. } = <P::Dynamics as Dynamics<T>>::NAMES;
+                let name = |names: &[&'static str], i: usize| names.get(i).copied().unwrap_or("");
+                let nx = P::Shape::NX;
+                let of = if of < nx { name(x, of) } else { name(u, of - nx) };
+                let by = if by < nx { name(x, by) } else { name(p, by - nx) };
+                Err(OcpError::NonFiniteSensitivity { stage, of, by, value })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of
+    /// [`RealTime`](crate::ocp::RealTime) those of the feedback that was given, to be used until
+    /// the next one. Nothing is linearised for it, and nothing else than gains is in the result.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory
+    /// is of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian is not
+    /// positive definite.
+    pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
+        self.is_uncoupled()?;
+        if self.initial == Initial::Free {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        self.prepare_factors(&mut result.factors)?;
+        result.factors.fill(self.qp.view(), &self.iterate, false)?;
+        let Sensitivities { x, u, x_p, u_p, .. } = result;
+        for derivatives in [x, u, x_p, u_p] {
+            derivatives.fill(T::ZERO);
+        }
+        Ok(())
+    }
+}

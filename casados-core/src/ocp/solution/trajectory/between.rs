@@ -1,0 +1,150 @@
+//! The iterate with points between the nodes.
+
+use super::{Kind, Series, Trajectory};
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult};
+use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::element::get;
+use crate::qp::{StageDims, part, part_mut, zeros};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// How many points are inside of each interval, and what is found there.
+struct Inside<T> {
+    points: usize,
+    /// States, algebraic states and path constraints of one point after the other.
+    values: Vec<T>,
+    /// How many these are.
+    width: usize,
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// As [`Ocp::solution`], with this number of points inside of each interval, at equal
+    /// distances: by the dense output of implicit integrators, by shorter intervals of explicit
+    /// ones. Path constraints, which hold at nodes, are evaluated there too; bounds are those of
+    /// the node before, and there are no multipliers. Of a [`Map`](crate::ocp::Map) there are no
+    /// points between nodes.
+    ///
+    /// # Errors
+    /// As [`Ocp::linearise`].
+    ///
+    /// # Example
+    /// A fall from rest: half of the way in time is a quarter of the way.
+    /// ```
+    /// use casados::ocp::{Horizon, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[ode]
+    /// fn fall(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    ///
+    /// let irk = Irk::<Fall, Gauss<2>>::new(Options::default())?;
+    /// let mut ocp = Problem::new(irk).on(Horizon::uniform(1, 2.0))?;
+    /// ocp.fix_initial_state(&[0.0; 2])?.guess(&[0.0; 2], &[0.0])?;
+    /// ocp.guess_stage(0, &[0.0; 2], &[1.0])?.guess_stage(1, &[2.0, 2.0], &[])?;
+    /// let solution = ocp.dense_solution(3)?;
+    /// assert_eq!(solution.times(), [0.0, 0.5, 1.0, 1.5, 2.0]);
+    /// assert!((solution.state("x[0]")?[2] - 0.5).abs() < 1e-14);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn dense_solution(&mut self, points: usize) -> Result<Trajectory<T>, OcpError> {
+        let solution = self.solution()?;
+        let width = P::Shape::NX + P::Shape::NZ + P::Path::ROWS;
+        let count = self.intervals().saturating_mul(points).saturating_mul(width);
+        let values = zeros(count)?;
+        let count = T::from_whole(points + 1);
+        let parts: Vec<T> = (1..=points).map(|part| T::from_whole(part) / count).collect();
+        let Some(inside) = self.inside(&parts, values)? else { return Ok(solution) };
+        let Trajectory { model, times, series } = solution;
+        let mut dense = inside.spread(&times, |k, j| {
+            let [start, end] = [k, k + 1].map(|node| get(&times, node));
+            start + get(&parts, j) * (end - start)
+        });
+        dense.truncate(dense.len() - points);
+        // Those of which there is more inside come in the order in which that was found.
+        let mut own = 0..;
+        let own = |series: &Series<T>| if series.kind.is_found_inside() { own.next() } else { None };
+        let indices: Vec<Option<usize>> = series.iter().map(own).collect();
+        let pairs = series.iter().zip(indices);
+        let series = pairs.map(|(series, index)| inside.series(series, index)).collect();
+        Ok(Trajectory { model, times: dense, series })
+    }
+
+    /// What is inside of the intervals, in these places; nothing of maps.
+    fn inside(&mut self, parts: &[T], mut values: Vec<T>) -> Result<Option<Inside<T>>, OcpError> {
+        let (intervals, points) = (self.intervals(), parts.len());
+        let (nx, nz, np) = (P::Shape::NX, P::Shape::NZ, P::Shape::NP);
+        let width = nx + nz + P::Path::ROWS;
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, path, .. } = self.problem.parts();
+        let (v, multipliers) = self.iterate.vectors();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &IntervalResult<'_, T>| {
+            let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
+            to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
+        })?;
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, stage) in self.iterate.stages().enumerate().take(if is_there { intervals } else { 0 }) {
+            let [start, end] = [k, k + 1].map(|node| get(data.times, node));
+            for (j, &along) in parts.iter().enumerate() {
+                let here = part_mut(&mut values, (k * points + j) * width, width);
+                let (variables, g) = here.split_at_mut_checked(nx + nz).unwrap_or_default();
+                let (x, z) = variables.split_at_checked(nx).unwrap_or_default();
+                let p = part(data.p, k * np, np);
+                read::<P::Shape, T>(&mut point, [x, z, stage.u, p], start + along * (end - start));
+                path.value(&point, g, k)?;
+            }
+        }
+        Ok(is_there.then_some(Inside { points, values, width }))
+    }
+}
+
+impl<T: Real> Inside<T> {
+    /// Values at nodes, and those of points of the interval behind each.
+    fn spread<V: Copy>(&self, at_nodes: &[V], mut inside: impl FnMut(usize, usize) -> V) -> Vec<V> {
+        let mut values = Vec::new();
+        for (k, &value) in at_nodes.iter().enumerate() {
+            values.push(value);
+            values.extend((0..self.points).map(|j| inside(k, j)));
+        }
+        values
+    }
+
+    /// A series with points inside, where that is what has this index there.
+    fn series(&self, series: &Series<T>, index: Option<usize>) -> Series<T> {
+        let Series { kind, name, first, values, lower, upper, .. } = series;
+        let dense = Series::new(*kind, name.as_str(), first * (self.points + 1), Vec::new());
+        if *kind == Kind::Terminal {
+            return Series { values: values.clone(), lower: lower.clone(), upper: upper.clone(), ..dense };
+        }
+        let inside = |k: usize, j: usize| match index {
+            Some(index) => get(&self.values, (k * self.points + j) * self.width + index),
+            None => get(values, k),
+        };
+        let held = |list: &[Option<T>], k: usize| list.get(k).copied().flatten();
+        let mut dense = Series {
+            values: self.spread(values, inside),
+            lower: self.spread(lower, |k, _| held(lower, k)),
+            upper: self.spread(upper, |k, _| held(upper, k)),
+            ..dense
+        };
+        // Behind the last node there is nothing.
+        if matches!(kind, Kind::State | Kind::Parameter) {
+            dense.values.truncate(dense.values.len().saturating_sub(self.points));
+            dense.lower.truncate(dense.values.len());
+            dense.upper.truncate(dense.values.len());
+        }
+        dense
+    }
+}
+
+impl Kind {
+    fn is_found_inside(self) -> bool {
+        matches!(self, Self::State | Self::Algebraic | Self::Path)
+    }
+}

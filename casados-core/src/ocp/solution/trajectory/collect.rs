@@ -1,0 +1,128 @@
+//! The iterate of a problem as a trajectory.
+
+use super::{Kind, Series, Trajectory};
+use crate::ocp::assembly::algebraic;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::element::get;
+use crate::qp::{Bounds, SolutionStage, Stage, StageDims};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::string::{String, ToString};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// What constraints are called.
+pub(super) fn names<C: Constraints<S, T>, S: Shape, T: Real>() -> impl Iterator<Item = String> {
+    (0..C::ROWS).map(|row| output::<C, S, T>(row).to_string())
+}
+
+/// Where bounds and multipliers of one kind are in a stage.
+struct Places<T> {
+    bounds: for<'a> fn(&Stage<'a, T>) -> Bounds<'a, T>,
+    multipliers: for<'a> fn(&SolutionStage<'a, T>) -> [&'a [T]; 2],
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// The iterate by names, with algebraic states and constraints at it, bounds and multipliers:
+    /// after a solver the solution. Intervals are integrated once more where the model has
+    /// algebraic states.
+    ///
+    /// # Errors
+    /// As [`Ocp::linearise`].
+    pub fn solution(&mut self) -> Result<Trajectory<T>, OcpError> {
+        self.check()?;
+        let intervals = self.intervals();
+        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let mut values = vec![T::ZERO; rows];
+        if P::Shape::NZ > 0 && P::Dynamics::ALGEBRAIC {
+            self.find_algebraic()?;
+        }
+        if rows > 0 {
+            self.constraints(&mut values)?;
+        }
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let mut series = Vec::new();
+        let states =
+            Places { bounds: |stage| stage.x_bounds(), multipliers: |stage| [stage.x_lower, stage.x_upper] };
+        let controls =
+            Places { bounds: |stage| stage.u_bounds(), multipliers: |stage| [stage.u_lower, stage.u_upper] };
+        for (i, &name) in known.x.iter().enumerate() {
+            let values = self.iterate.stages().map(|stage| get(stage.x, i)).collect();
+            let mut state = self.bounded(Series::new(Kind::State, name, 0, values), i, &states);
+            state.costates =
+                self.iterate.stages().take(intervals).map(|stage| get(stage.dynamics, i)).collect();
+            series.push(state);
+        }
+        if P::Dynamics::ALGEBRAIC {
+            let all = split::<P, T>(self.data.as_mut(), intervals).algebraic;
+            for (i, &name) in known.z.iter().enumerate() {
+                let values = (0..intervals).map(|k| get(algebraic::at::<P::Shape, T>(all, k).0, i)).collect();
+                series.push(Series::new(Kind::Algebraic, name, 0, values));
+            }
+        }
+        for (i, &name) in known.u.iter().enumerate() {
+            let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, i)).collect();
+            series.push(self.bounded(Series::new(Kind::Control, name, 0, values), i, &controls));
+        }
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        for (i, &name) in known.p.iter().enumerate() {
+            let values = (0..=intervals).map(|k| get(data.p, k * P::Shape::NP + i)).collect();
+            series.push(Series::new(Kind::Parameter, name, 0, values));
+        }
+        for (row, name) in names::<P::Path, _, T>().enumerate() {
+            series.push(self.of_constraint(Kind::Path, name, row, &values));
+        }
+        for (row, name) in names::<P::Terminal, _, T>().enumerate() {
+            series.push(self.of_constraint(Kind::Terminal, name, row, &values));
+        }
+        Ok(Trajectory { model: known.model.into(), times: self.times().to_vec(), series })
+    }
+
+    /// Algebraic states of the iterate.
+    pub(super) fn find_algebraic(&mut self) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, .. } = self.problem.parts();
+        let (v, multipliers) = self.iterate.vectors();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        dynamics.simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, k, step))
+    }
+
+    /// With the bounds and multipliers of states or controls.
+    fn bounded(&self, mut series: Series<T>, i: usize, places: &Places<T>) -> Series<T> {
+        let finite = |bound: T| bound.is_finite().then_some(bound);
+        let count = series.values.len();
+        for (stage, point) in self.qp.view().stages().zip(self.iterate.stages()).take(count) {
+            let (bounds, [lower, upper]) = ((places.bounds)(&stage), (places.multipliers)(&point));
+            series.lower.push(finite(get(bounds.lower, i)));
+            series.upper.push(finite(get(bounds.upper, i)));
+            series.lower_multipliers.push(get(lower, i));
+            series.upper_multipliers.push(get(upper, i));
+        }
+        series
+    }
+
+    /// An output of the constraints, of whose values those of the last stage lie behind those of
+    /// all others.
+    fn of_constraint(&mut self, kind: Kind, name: String, row: usize, values: &[T]) -> Series<T> {
+        let intervals = self.intervals();
+        let stages = if kind == Kind::Path { 0..intervals } else { intervals..intervals + 1 };
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let all = |list: &[T]| stages.clone().map(|k| get(list, k * P::Path::ROWS + row)).collect::<Vec<_>>();
+        let finite = |bound: T| bound.is_finite().then_some(bound);
+        let mut series = Series::new(kind, name, stages.start, all(values));
+        series.lower = all(data.lower).into_iter().map(finite).collect();
+        series.upper = all(data.upper).into_iter().map(finite).collect();
+        for point in self.iterate.stages().skip(stages.start).take(stages.len()) {
+            series.lower_multipliers.push(get(point.g_lower, row));
+            series.upper_multipliers.push(get(point.g_upper, row));
+        }
+        series
+    }
+}

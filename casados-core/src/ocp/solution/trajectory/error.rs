@@ -1,0 +1,124 @@
+//! Why a name means nothing, or a trajectory is none of a problem.
+
+use crate::ocp::formulation::error::OcpError;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// Why a name means nothing, or a trajectory is none of a problem.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let solution = ocp.solution()?;
+/// let error = solution.state("speed").unwrap_err();
+/// println!("{error}"); // what there is
+/// assert!(matches!(error, TrajectoryError::Unknown { .. }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum TrajectoryError {
+    /// Nothing is called so.
+    Unknown {
+        /// The model.
+        model: String,
+        /// The name.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// Several are called so.
+    Ambiguous {
+        /// The name.
+        name: String,
+        /// Which ones.
+        found: Vec<String>,
+    },
+    /// The trajectory has not as many values, bounds or multipliers as the problem.
+    Length {
+        /// Of what.
+        name: String,
+        /// How many there are.
+        found: usize,
+        /// How many the problem has.
+        expected: usize,
+    },
+    /// A trajectory that was read has times that are not finite, or decrease.
+    Times,
+    /// A trajectory that was read has values without a time.
+    Beyond {
+        /// Of what.
+        name: String,
+        /// Which time is that of the first value.
+        first: usize,
+        /// How many values there are.
+        found: usize,
+        /// How many times the trajectory has.
+        times: usize,
+    },
+    /// The problem refuses a value.
+    Problem(OcpError),
+}
+
+impl fmt::Display for TrajectoryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown { model, name, known } if known.is_empty() => {
+                write!(f, "the solution of `{model}` has no `{name}`, nor anything else of this kind")
+            }
+            Self::Unknown { model, name, known } => {
+                write!(f, "the solution of `{model}` has no `{name}`: it has")?;
+                list(f, known)
+            }
+            Self::Ambiguous { name, found } => {
+                write!(f, "`{name}` means several: say which of")?;
+                list(f, found)
+            }
+            Self::Length { name, found, expected } => write!(
+                f,
+                "the trajectory has {found} values of `{name}`, and the problem {expected}: `guess_from` interpolates \
+                 where horizons differ"
+            ),
+            Self::Times => f.write_str("the times of the trajectory have to be finite and must not decrease"),
+            Self::Beyond { name, first, found, times } => write!(
+                f,
+                "`{name}` has {found} values from time {first} on, and the trajectory has {times} times"
+            ),
+            Self::Problem(error) => error.fmt(f),
+        }
+    }
+}
+
+fn list(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
+    for (i, name) in names.iter().enumerate() {
+        let comma = if i == 0 { "" } else { "," };
+        write!(f, "{comma} `{name}`")?;
+    }
+    Ok(())
+}
+
+debug_is_display!(TrajectoryError);
+
+impl core::error::Error for TrajectoryError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Problem(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl<E: Into<OcpError>> From<E> for TrajectoryError {
+    fn from(error: E) -> Self {
+        Self::Problem(error.into())
+    }
+}

@@ -1,0 +1,158 @@
+//! A trajectory as the iterate of a problem, or as its guess.
+
+use super::collect::names;
+use super::{Kind, Series, Trajectory, TrajectoryError};
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::{get, set};
+use crate::qp::{SolutionStageMut, StageDims};
+use crate::scalar::Real;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// Where values and multipliers of a kind are in a stage: values, `λ` of both sides.
+type Places<T> = for<'a, 'b> fn(&'b mut SolutionStageMut<'a, T>) -> [&'b mut [T]; 3];
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Makes a trajectory the iterate, with its multipliers: a run that starts warm goes on from
+    /// there. It is that of a problem with the same names and as many stages: one that was saved.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Unknown`] of what the trajectory has not, [`TrajectoryError::Length`];
+    /// [`TrajectoryError::Problem`] where a value is not finite. Then the iterate is as it was, but
+    /// in the last case.
+    pub fn restore(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
+        let intervals = self.intervals();
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let list = |names: &[&str]| names.iter().map(|&name| name.into()).collect::<Vec<String>>();
+        let kinds: [(Kind, Vec<String>, Places<T>); 4] = [
+            (Kind::State, list(known.x), |stage| [&mut *stage.x, &mut *stage.x_lower, &mut *stage.x_upper]),
+            (Kind::Control, list(known.u), |stage| [&mut *stage.u, &mut *stage.u_lower, &mut *stage.u_upper]),
+            (Kind::Path, names::<P::Path, _, T>().collect(), |stage| {
+                [&mut [], &mut *stage.g_lower, &mut *stage.g_upper]
+            }),
+            (Kind::Terminal, names::<P::Terminal, _, T>().collect(), |stage| {
+                [&mut [], &mut *stage.g_lower, &mut *stage.g_upper]
+            }),
+        ];
+        // All is found before anything is written.
+        let mut found = Vec::new();
+        for (kind, names, places) in kinds {
+            let (first, count) = match kind {
+                Kind::State => (0, intervals + 1),
+                Kind::Terminal => (intervals, 1),
+                _ => (0, intervals),
+            };
+            let of_kind = trajectory.series.iter().filter(|series| series.kind == kind);
+            let of_kind: Vec<_> = of_kind.collect();
+            for (index, name) in names.into_iter().enumerate() {
+                // Functions that are there twice have the same names, in the same order.
+                let series = match of_kind.get(index).filter(|series| series.name == name) {
+                    Some(&series) => series,
+                    None => trajectory.of(&name, kind)?,
+                };
+                let costates = if kind == Kind::State { intervals } else { 0 };
+                has(series, [count, count, count, costates])?;
+                found.push((index, first, series, places));
+            }
+        }
+        for (index, first, series, places) in found {
+            for (k, &value) in series.values.iter().enumerate() {
+                let Some(mut stage) = self.iterate.stage_mut(first + k) else { continue };
+                let multipliers =
+                    [&series.lower_multipliers, &series.upper_multipliers].map(|list| get(list, k));
+                let given = [value, multipliers[0], multipliers[1]];
+                for (to, from) in places(&mut stage).into_iter().zip(given) {
+                    set(to, index, from);
+                }
+                if let Some(&costate) = series.costates.get(k) {
+                    set(stage.dynamics, index, costate);
+                }
+            }
+        }
+        self.has_algebraic = false;
+        self.check_iterate()?;
+        Ok(self)
+    }
+
+    /// Makes a trajectory the guess, with states between its points on straight lines and the
+    /// controls that hold there, and no multipliers: horizons may differ, as those of a coarse and
+    /// a fine grid. Before its first time and after its last one the nearest values are taken.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Unknown`] of a state or control that it has not;
+    /// [`TrajectoryError::Problem`] where a value is not finite.
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[ode]
+    /// fn fall(x: f64, u: f64) -> f64 { u - x }
+    /// #[function]
+    /// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    ///
+    /// let problem = |intervals, length| {
+    ///     let erk = Erk::<Fall, Rk4>::new(Options::default())?;
+    ///     let cost = LeastSquaresCost::<Both>::diagonal(&[1.0, 0.1]);
+    ///     let mut ocp = Problem::new(erk).running_cost(cost).on(Horizon::uniform(intervals, length))?;
+    ///     ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    ///     Ok::<_, Box<dyn std::error::Error>>(ocp)
+    /// };
+    /// let (mut coarse, mut fine) = (problem(5, 0.2)?, problem(20, 0.05)?);
+    /// HeapSqp::new(&coarse)?.solve(&mut coarse)?;
+    /// fine.guess_from(&coarse.solution()?)?;
+    /// assert_eq!(fine.stage(8)?.x, coarse.stage(2)?.x);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn guess_from(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let all = |names: &[&str], kind| {
+            names.iter().map(|&name| trajectory.of(name, kind)).collect::<Result<Vec<_>, _>>()
+        };
+        let (states, controls) = (all(known.x, Kind::State)?, all(known.u, Kind::Control)?);
+        let (mut x, mut u) = (Vec::new(), Vec::new());
+        for k in 0..=self.intervals() {
+            let time = get(self.times(), k);
+            let (before, along) = place(&trajectory.times, time);
+            x.clear();
+            u.clear();
+            x.extend(states.iter().map(|series| {
+                let [start, end] = [before, before + 1].map(|k| held(&series.values, k));
+                start + along * (end - start)
+            }));
+            if k < self.intervals() {
+                u.extend(controls.iter().map(|series| held(&series.values, before)));
+            }
+            self.guess_stage(k, &x, &u)?;
+        }
+        Ok(self)
+    }
+}
+
+/// The point at or before a time, but for rounding, and which part of the way to the next one it
+/// is.
+fn place<T: Real>(times: &[T], time: T) -> (usize, T) {
+    let rounding = T::from_f64(16.0 * T::EPSILON) * (held(times, times.len()) - held(times, 0));
+    let next = times.iter().position(|&other| time + rounding < other).unwrap_or(times.len());
+    let before = next.saturating_sub(1);
+    let (start, end) = (held(times, before), held(times, before + 1));
+    if start < time && start < end { (before, (time - start) / (end - start)) } else { (before, T::ZERO) }
+}
+
+/// An element, or the last one.
+fn held<T: Real>(values: &[T], index: usize) -> T {
+    values.get(index).or(values.last()).copied().unwrap_or(T::ZERO)
+}
+
+/// Whether a series has these lengths: values, multipliers of both sides, costates.
+fn has<T>(series: &Series<T>, expected: [usize; 4]) -> Result<(), TrajectoryError> {
+    let Series { values, lower_multipliers, upper_multipliers, costates, name, .. } = series;
+    let lists = [values, lower_multipliers, upper_multipliers, costates].map(Vec::len);
+    match lists.into_iter().zip(expected).find(|(found, expected)| found != expected) {
+        None => Ok(()),
+        Some((found, expected)) => Err(TrajectoryError::Length { name: name.clone(), found, expected }),
+    }
+}
