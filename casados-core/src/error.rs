@@ -116,6 +116,10 @@ pub enum Error {
         /// An algebraic state of these, and its start value; if there is one, and the start was no
         /// continuation of a solution.
         started: Option<Started>,
+        /// The algebraic state along which `∂f/∂z` becomes singular between the start values and
+        /// where the iteration led to, if it does: the equations may have lost their solution at a
+        /// fold.
+        singular: Option<&'static str>,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.
@@ -291,6 +295,12 @@ pub enum Refusal {
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
+    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
+    /// equations meet there, and none is beyond (a fold).
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+    },
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
     /// The interval is shorter than the distance of the time from the next number.

@@ -126,6 +126,24 @@ use stages::Stages;
 pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 
 /// A method that an adaptive integrator takes.
+///
+/// ```
+/// use casados::adaptive::AdaptiveMethod;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn decay(x: f64) -> f64 { -x }
+///
+/// /// An integrator of a method by its options alone.
+/// type Of<B> = <B as AdaptiveMethod>::Integrator<Decay, f64>;
+///
+/// let mut explicit = Of::<DormandPrince5>::new(AdaptiveOptions::default())?;
+/// let mut implicit = Of::<Radau>::new(AdaptiveOptions::default())?;
+/// let (a, b) = (explicit.solve(&vector![1.0], &vector![], 1.0)?, implicit.solve(&vector![1.0], &vector![], 1.0)?);
+/// assert!((a.x[0] - b.x[0]).abs() < 1e-4);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a method with an estimate of its error",
     note = "`Radau`, `RadauIIA<3>`, `RadauIIA<5>`, `RadauIIA<7>` and `Gauss<2>` to `Gauss<6>` are, and for explicit models \

@@ -101,12 +101,19 @@ impl fmt::Display for Error {
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, started, singular } => {
                 write!(
                     f,
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
+                if let Some(unknown) = singular {
+                    write!(
+                        f,
+                        "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \
+                         equations may have lost their solution"
+                    )?;
+                }
                 match started {
                     Some(Started { unknown, value }) => write!(
                         f,
@@ -137,7 +144,12 @@ impl fmt::Display for Error {
                 write!(f, "output {output} of the function {function} is {value} at {at}")
             }
             Error::StepSizeUnderflow { t, h, reason, unsettled } => {
-                let reason = match reason {
+                write!(f, "the step size falls to {h:e} at t = {t}: ")?;
+                let reason_text = match reason {
+                    Refusal::SingularAlgebraic { unknown } => {
+                        write!(f, "∂f/∂z becomes singular there along `{unknown}`")?;
+                        ", where the algebraic equations lose their solution"
+                    }
                     Refusal::Error => {
                         "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
                          too large for some states"
@@ -147,22 +159,23 @@ impl fmt::Display for Error {
                     Refusal::NotFinite => "the model is not finite",
                     Refusal::Resolution => "the time does not resolve it",
                 };
-                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")?;
+                f.write_str(reason_text)?;
                 let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
                     return Ok(());
                 };
                 write!(
                     f,
                     "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
-                     is {value:e} at this time, does not settle: "
+                     is {value:e} at this time, does not settle"
                 )?;
-                f.write_str(match algebraic {
-                    true => {
-                        "the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
+                f.write_str(match (reason, algebraic) {
+                    (Refusal::SingularAlgebraic { .. }, _) => "",
+                    (_, true) => {
+                        ": the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
                          declare an event"
                     }
-                    false => {
-                        "the solution may end there, or the model jump: then declare an event, or write the condition as \
+                    (_, false) => {
+                        ": the solution may end there, or the model jump: then declare an event, or write the condition as \
                          `if` or `max`"
                     }
                 })

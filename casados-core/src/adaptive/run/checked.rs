@@ -4,6 +4,7 @@ use super::cross::shortest;
 use super::walk::Walk;
 use super::*;
 use crate::error::Unsettled;
+use crate::irk::{eliminate, unknown_name};
 
 /// A step that is this much shorter than others of the run, and still not solved, stands for all
 /// shorter ones.
@@ -49,11 +50,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let unsettled = Unsettled {
             equation: culprit.equation,
             residual: culprit.residual,
-            unknown: crate::irk::unknown_name::<M>(unknown),
+            unknown: unknown_name::<M>(unknown),
             value: self.base.point[nx + unknown].to_f64(),
             algebraic: unknown >= nx,
         };
-        let (t, h, reason) = (walk.t.to_f64(), walk.h.to_f64(), Refusal::NotConverged);
+        let (t, h) = (walk.t.to_f64(), walk.h.to_f64());
+        let reason = self.singular_algebraic(Refusal::NotConverged).unwrap_or(Refusal::NotConverged);
         Err(Error::StepSizeUnderflow { t, h, reason, unsettled: Some(unsettled) })
     }
 
@@ -65,8 +67,26 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let tenth = T::from_f64(0.1) * h;
         let part = if tenth == T::ZERO { h } else { tenth };
         if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + part == t {
+            let reason = self.singular_algebraic(reason).unwrap_or(reason);
             return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason, unsettled: None });
         }
         Ok(())
+    }
+
+    /// Whether `∂f/∂z` becomes singular at the point that was reached, where that may be the
+    /// reason.
+    fn singular_algebraic(&self, reason: Refusal) -> Option<Refusal> {
+        let possible = matches!(reason, Refusal::Error | Refusal::NotConverged | Refusal::Singular);
+        if M::Shape::NZ == 0 || !possible {
+            return None;
+        }
+        let (mut f, mut jacobian) = (ArrayK::<M, T>::zeroed(), M::Jacobian::<T>::zeroed());
+        M::jacobian_constants::<T>(&mut jacobian);
+        M::residual_jacobian::<T>(&self.base.point, &mut f, &mut jacobian);
+        let number = |of: &[T], at: usize| of.get(at).map_or(f64::NAN, |v| v.to_f64());
+        let (entries, point) = (jacobian.as_ref(), self.base.point.as_ref());
+        let found = eliminate::<M>(|entry| number(entries, entry), |variable| number(point, variable))?;
+        let unknown = unknown_name::<M>(found.unknown.filter(|_| found.is_singular::<T>())?);
+        Some(Refusal::SingularAlgebraic { unknown })
     }
 }
