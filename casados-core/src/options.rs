@@ -111,9 +111,9 @@ pub enum Jacobian {
     Simplified,
     /// Evaluated and factorised in every iteration.
     Full,
-    /// Evaluated and factorised once in each step, at the start values; once more only where an
-    /// increment would be larger than the last one. (With a fixed number of iterations this is not
-    /// asked.)
+    /// Evaluated and factorised once in each step, at the start values; once more only where
+    /// increments do not shrink to half of the last one. (With a fixed number of iterations this is
+    /// not asked.)
     Frozen,
 }
 

@@ -14,14 +14,14 @@ mod rate;
 mod roughness;
 mod scheme;
 
-use super::branches::{Branches, Look};
-use super::control::LENIENT;
+use super::branches::{Branches, DefectCheck};
+use super::control::ORDER_REDUCTION_RATIO;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
-use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
+use super::orders::weighted;
 use super::point::variable;
-use super::stages::{Convergence, Culprit, Failure, FilteredDefect, MOST, Sides, Stages, Start};
+use super::stages::{Convergence, Culprit, Failure, FilteredDefect, MOST, Sides, Stages, StepContext};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;
@@ -40,7 +40,7 @@ use points::{combine, evaluate_polynomial, last_stage, take};
 use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
-const UNDOUBTED: f64 = 0.25;
+const SAFE_ESTIMATE: f64 = 0.25;
 
 /// Memory of a step.
 #[derive(Zeroable)]
@@ -94,7 +94,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         self.memory.factors.set_pivoted(pivoted);
     }
 
-    fn factors_hold(&self, start: &Start<'_, M, T>) -> bool {
+    fn factors_hold(&self, start: &StepContext<'_, M, T>) -> bool {
         let factors = &self.memory.factors;
         if !factors.are_planned() {
             return true;
@@ -107,7 +107,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         error * error <= T::EPSILON
     }
 
-    fn culprit(&self, start: &Start<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit {
+    fn culprit(&self, start: &StepContext<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit {
         let Memory { rows, f, .. } = &*self.memory;
         let (mut culprit, mut largest, nx) = (Culprit::default(), 0.0, M::Shape::NX);
         for (unknown, ([[row]], scale)) in rows.as_ref().iter().zip(start.scale.as_ref()).enumerate() {
@@ -150,7 +150,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
     }
 
-    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>) {
+    fn predict(&self, start: &StepContext<'_, M, T>, middle: &mut ArrayV<M, T>) {
         let (nx, stage) = (M::Shape::NX, S / 2);
         *middle = *start.point;
         let to = middle.as_mut();
@@ -181,7 +181,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn solve(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         tolerance: f64,
         convergence: &mut Convergence,
         residuals: &mut usize,
@@ -229,7 +229,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         Err(Failure::Diverges)
     }
 
-    fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
+    fn estimates(&self, start: &StepContext<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
         *point = *start.point;
         if !self.scheme.stiffly_accurate {
             self.extrapolate(start.h, point);
@@ -279,7 +279,12 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
     }
 
-    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+    fn error(
+        &mut self,
+        start: &StepContext<'_, M, T>,
+        again: bool,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
         let mut point = ArrayV::<M, T>::zeroed();
         let at_end = self.estimates(start, &mut point);
         self.memory.point = point;
@@ -299,7 +304,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
         // What the model is on the other side of a border says nothing of this one.
         let branches = Branches::of::<M, T>(start.point);
-        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(Look::Branch) {
+        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(DefectCheck::Switch) {
             return Ok(error);
         }
         self.estimate(start, at_end, residuals)
@@ -307,15 +312,15 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn roughness(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         growth: f64,
-        look: Look,
+        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, look, residuals)
+        self.roughness(start, growth, check, residuals)
     }
 
-    fn change(&mut self, start: &Start<'_, M, T>) -> Option<Look> {
+    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck> {
         self.change(start)
     }
 

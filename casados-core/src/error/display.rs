@@ -144,13 +144,11 @@ impl fmt::Display for Error {
                 write!(f, "output {output} of the function {function} is {value} at {at}")
             }
             Error::StepSizeUnderflow { t, h, reason, unsettled } => {
-                let reason = match reason {
+                write!(f, "the step size falls to {h:e} at t = {t}: ")?;
+                let reason_text = match reason {
                     Refusal::SingularAlgebraic { unknown } => {
-                        return write!(
-                            f,
-                            "the step size falls to {h:e} at t = {t}: ∂f/∂z becomes singular there along `{unknown}`, \
-                             where the algebraic equations lose their solution"
-                        );
+                        write!(f, "∂f/∂z becomes singular there along `{unknown}`")?;
+                        ", where the algebraic equations lose their solution"
                     }
                     Refusal::Error => {
                         "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
@@ -161,22 +159,23 @@ impl fmt::Display for Error {
                     Refusal::NotFinite => "the model is not finite",
                     Refusal::Resolution => "the time does not resolve it",
                 };
-                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")?;
+                f.write_str(reason_text)?;
                 let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
                     return Ok(());
                 };
                 write!(
                     f,
                     "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
-                     is {value:e} at this time, does not settle: "
+                     is {value:e} at this time, does not settle"
                 )?;
-                f.write_str(match algebraic {
-                    true => {
-                        "the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
+                f.write_str(match (reason, algebraic) {
+                    (Refusal::SingularAlgebraic { .. }, _) => "",
+                    (_, true) => {
+                        ": the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
                          declare an event"
                     }
-                    false => {
-                        "the solution may end there, or the model jump: then declare an event, or write the condition as \
+                    (_, false) => {
+                        ": the solution may end there, or the model jump: then declare an event, or write the condition as \
                          `if` or `max`"
                     }
                 })

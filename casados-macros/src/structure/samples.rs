@@ -66,8 +66,8 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
 }
 
 /// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`;
-/// how many of these are at rest, the last ones: the first `states` of the variables are zero there,
-/// or at their nominal values, or as near to zero as their range allows.
+/// how many of these are at rest, the last ones: the first `states` of the variables are zero
+/// there, or at their nominal values, or as near to zero as their range allows.
 pub fn sample(
     graph: &Graph,
     (jacobian, positions): (&[(u32, u32, Node)], &[Position]),

@@ -4,7 +4,8 @@ use super::{assert_close, differentiate, options};
 use casados::prelude::*;
 use nalgebra::{Vector1, vector};
 
-/// A capacitor that is discharged, and the voltage of a divider: `ẋ = −p x + u`, `z + z³ = p x + u`.
+/// A capacitor that is discharged, and the voltage of a divider: `ẋ = −p x + u`, `z + z³ = p x +
+/// u`.
 #[dae]
 fn relay(xdot: f64, x: f64, z: f64, u: f64, p: f64) -> [f64; 2] {
     [xdot + p * x - u, z + z * z * z - p * x - u]
@@ -69,8 +70,8 @@ fn two_volts(_x: f64, z: f64) -> f64 {
     z - 2.0
 }
 
-/// `e⁻ᵗ + t² = 2` is solved; its derivatives are not known, since nobody differentiates the model by
-/// the time.
+/// `e⁻ᵗ + t² = 2` is solved; its derivatives are not known, since nobody differentiates the model
+/// by the time.
 #[test]
 fn equations_that_depend_on_the_time() {
     let event = Event::terminal::<TwoVolts>(Crossing::Rising);

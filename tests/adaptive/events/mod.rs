@@ -131,8 +131,8 @@ fn a_bouncing_ball() {
     bounces!(DormandPrince8);
 }
 
-/// Bounces come sooner and sooner, without end before `t₁ + 2 v₁ r/(g (1 − r))`, where the ball lies
-/// on the ground.
+/// Bounces come sooner and sooner, without end before `t₁ + 2 v₁ r/(g (1 − r))`, where the ball
+/// lies on the ground.
 #[test]
 fn accumulating_events_are_an_error() {
     let event = Event::jump::<Height, Bounce>(Crossing::Falling);

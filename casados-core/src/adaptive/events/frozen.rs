@@ -18,9 +18,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// be the same, unless an event ends it before.
     ///
     /// Times of events still depend on everything, and the steps between two events are stretched
-    /// with the time between them. Events that happened at one time have to do so still. That events happen in this order, once each, and others do not,
-    /// is not looked at again. Derivatives at events are those of the solution, as without it: they
-    /// belong to this function up to the errors of its steps.
+    /// with the time between them. Events that happened at one time have to do so still. That
+    /// events happen in this order, once each, and others do not, is not looked at again.
+    /// Derivatives at events are those of the solution, as without it: they belong to this function
+    /// up to the errors of its steps.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following

@@ -66,21 +66,20 @@ use bytemuck::Zeroable;
 /// #[function]
 /// fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 ///
-/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
-/// let end = ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?;
-/// // It hits the ground after a second, at 10 m/s.
-/// assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
+/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling); let mut ball =
+/// Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?; let end =
+/// ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?; // It hits the ground after
+/// a second, at 10 m/s. assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
 /// assert!((end.solution.nominal.x - vector![8.0 * 0.5 - 1.25, 8.0 - 5.0]).norm() < 1e-11);
 /// # Ok::<(), casados::Error>(())
 /// ```
 ///
 /// **Events at one time.** Events happen where the solution brings their functions to zero. All
 /// functions that are zero at the same time, to rounding, happen there in the order of the list;
-/// each is looked at again after the jumps before it, and happens if it is still zero. An event that
-/// ends the integration ends it before those behind it in the list. What a jump takes from one side
-/// of zero to the other does not happen, and neither does what is zero at the start: a function that
-/// begins at zero is on the side to which it goes.
+/// each is looked at again after the jumps before it, and happens if it is still zero. An event
+/// that ends the integration ends it before those behind it in the list. What a jump takes from one
+/// side of zero to the other does not happen, and neither does what is zero at the start: a
+/// function that begins at zero is on the side to which it goes.
 ///
 /// **Algebraic states.** Functions may look at `z`; jumps change `x` alone. Of such an event
 /// derivatives follow by the theorem of implicit functions, first ones, where the equations of the

@@ -1,7 +1,7 @@
 //! From event to event: the steps up to each, shortened to its time, and what happens there.
 
 use super::super::point::{At, place_inputs};
-use super::super::replay::{Replay, Taken};
+use super::super::replay::{AcceptedStep, StepDifferentiator};
 use super::super::run::Span;
 use super::super::sealed::Engine;
 use super::super::segment::add;
@@ -169,7 +169,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     fn find_signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
         let start = self.integrator.start;
         let forward = if t_end < start { -1.0 } else { 1.0 };
-        // A segment after an event begins where a function is zero but for the rounding of the time.
+        // A segment after an event begins where a function is zero but for the rounding of the
+        // time.
         let time = if k == 0 { T::ZERO } else { start };
         let given = self.integrator.base.given;
         // Where there is none the integration says so.
@@ -240,7 +241,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = At { x: &x, u: &segment.u, p: &integrator.base.parameters, t: entry.t };
-        let taken = Taken { at, h, y, level: entry.level, near: false };
+        let taken = AcceptedStep { at, h, y, level: entry.level, near: false };
         Ok(B::replays(&mut integrator.state).solve(&taken, None)?.x)
     }
 

@@ -1,7 +1,7 @@
 //! What a step needs, and errors where it is not there: a finite Jacobian, a length.
 
 use super::cross::shortest;
-use super::walk::Walk;
+use super::step_state::StepState;
 use super::*;
 use crate::error::Unsettled;
 use crate::irk::{eliminate, unknown_name};
@@ -16,7 +16,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// # Errors
     /// A value that is not finite.
     pub(super) fn evaluate_jacobian(&mut self, middle: bool, step: usize) -> Result<(), Error> {
-        let Base { point, middle: foreseen, f, jacobian, .. } = &mut *self.base;
+        let Workspace { point, middle: foreseen, f, jacobian, .. } = &mut *self.base;
         self.statistics.jacobians += 1;
         M::residual_jacobian::<T>(if middle { foreseen } else { point }, f, jacobian);
         let at = Place { step, stage: 0, iteration: 0 };
@@ -37,15 +37,15 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     pub(super) fn check_convergence(
         &self,
         stages: &dyn Stages<M, T>,
-        walk: &Walk<T>,
+        state: &StepState<T>,
         span: Span<T>,
     ) -> Result<(), Error> {
-        let size = walk.h.abs();
-        let is_short = size < shortest(span, walk.t) && size < T::from_f64(SHRUNK) * walk.longest_so_far;
-        if !(walk.is_unsolved() && is_short) {
+        let size = state.h.abs();
+        let is_short = size < shortest(span, state.t) && size < T::from_f64(SHRUNK) * state.longest_so_far;
+        if !(state.is_unsolved() && is_short) {
             return Ok(());
         }
-        let culprit = stages.culprit(&self.base.step(walk), &self.base.jacobian);
+        let culprit = stages.culprit(&self.base.step(state), &self.base.jacobian);
         let (nx, unknown) = (M::Shape::NX, culprit.unknown);
         let unsettled = Unsettled {
             equation: culprit.equation,
@@ -54,8 +54,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             value: self.base.point[nx + unknown].to_f64(),
             algebraic: unknown >= nx,
         };
+        let (t, h) = (state.t.to_f64(), state.h.to_f64());
         let reason = self.singular_algebraic(Refusal::NotConverged).unwrap_or(Refusal::NotConverged);
-        let (t, h) = (walk.t.to_f64(), walk.h.to_f64());
         Err(Error::StepSizeUnderflow { t, h, reason, unsettled: Some(unsettled) })
     }
 

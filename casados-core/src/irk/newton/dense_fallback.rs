@@ -1,5 +1,5 @@
 //! The careful way: Newton's method with the current Jacobian in every iteration, or that of the
-//! first one, as long as increments shrink with it, if it is to be [frozen](Jacobian::Frozen); the
+//! first one, as long as increments shrink by it, if it is to be [frozen](Jacobian::Frozen); the
 //! whole matrix pivoted, and every value looked at. It is taken where there is no plan of
 //! elimination, and where the fast way did not arrive: then it gives the solution, or says what is
 //! wrong.
@@ -92,12 +92,15 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             let increment = self.update(y);
             iteration += 1;
             statistics.iterations += 1;
-            // An increment by the first Jacobian that is no smaller than the last one is not made.
-            let stagnates = increment.size <= T::from_f64(T::STAGNATION);
-            if test && !current && !stagnates && increment.size >= last.size {
-                self.take_back(y);
+            // The first Jacobian does as long as increments shrink to half; one that is no smaller
+            // than the last one is not made.
+            let noise = increment.size <= T::from_f64(T::STAGNATION);
+            if test && !current && !noise && increment.size + increment.size >= last.size {
                 frozen = false;
-                continue;
+                if increment.size >= last.size {
+                    self.take_back(y);
+                    continue;
+                }
             }
             if !increment.size.is_finite() {
                 return Err(Error::Overflow { step, index: increment.unknown });

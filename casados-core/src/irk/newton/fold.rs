@@ -115,7 +115,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         self.place(coefficients, n, x, y);
         self.evaluate_jacobian();
         let (entries, points) = (self.linear.jacobian.as_ref(), self.points.as_ref());
-        let last = |of: &[[T; S]], at: usize| of.get(at).and_then(|of| of.last()).map_or(f64::NAN, |v| v.to_f64());
+        let last =
+            |of: &[[T; S]], at: usize| of.get(at).and_then(|of| of.last()).map_or(f64::NAN, |v| v.to_f64());
         eliminate::<M>(|entry| last(entries, entry), |variable| last(points, variable))
     }
 }

@@ -183,7 +183,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
             let growth;
-            (status, growth) = self.apply_increment(equations, y, &mut test, &policy, tolerances, take(&mut anew));
+            (status, growth) =
+                self.apply_increment(equations, y, &mut test, &policy, tolerances, take(&mut anew));
             if !status.active {
                 return self.solved(&test, policy.shared);
             }
@@ -310,8 +311,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             full: policy.full,
             measure: anew,
         });
-        let kind =
-            if anew { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
+        let kind = if anew { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
         let status = test.take(kind, size, next);
         if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
             let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };

@@ -2,9 +2,10 @@
 //!
 //! The [`iteration`] finds [increments](increment), whose [`norm`] the test of [`convergence`]
 //! takes; the [policy](jacobian_policy) says which Jacobian they are found with, and increments by
-//! an old one that grow are [rejected](rejection). Where it does not arrive, the [dense fallback](dense_fallback) pivots the whole matrix; linear equations are asked
-//! whether they are [nearly singular](near_singular), and errors say where the iteration
-//! [started](start_errors), or that a fold is between
+//! an old one that grow are [rejected](rejection). Where it does not arrive, the
+//! [dense fallback](dense_fallback) pivots the whole matrix; linear equations are asked whether
+//! they are [nearly singular](near_singular), and errors say where the iteration
+//! [started](start_errors), and whether a fold is between.
 
 mod convergence;
 pub(super) mod dense_fallback;

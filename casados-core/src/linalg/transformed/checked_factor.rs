@@ -140,9 +140,9 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         }
     }
 
-    /// The componentwise backward error of a solution by these factors, the largest of all equations
-    /// and eigenvalues (W. Oettli, W. Prager, Numer. Math. 6 (1964)): the solution is known, and each
-    /// of its unknowns is of the size of its `unit`.
+    /// The componentwise backward error of a solution by these factors, the largest of all
+    /// equations and eigenvalues (W. Oettli, W. Prager, Numer. Math. 6 (1964)): the solution is
+    /// known, and each of its unknowns is of the size of its `unit`.
     #[inline(never)]
     pub fn backward_error(&self, units: &ArrayK<M, T>) -> f64 {
         let mut right = Rows::<M, T>::zeroed();
@@ -190,7 +190,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         largest
     }
 
-    /// The terms of the product of the matrices with a solution, each with the slot of its equation.
+    /// The terms of the product of the matrices with a solution, each with the slot of its
+    /// equation.
     fn multiply(&self, solution: &Rows<M, T>, mut term: impl FnMut(usize, Complex<T, PARTS>)) {
         let square = self.scale * self.scale;
         each_entry::<M, _>(self.jacobian.as_ref(), |place, &value, minus_c| {

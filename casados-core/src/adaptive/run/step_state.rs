@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{Predictive, Refusals, Roughness, Trend};
+use crate::adaptive::control::{DiscontinuityDetector, ErrorHistory, GustafssonController, RejectionHistory};
 use crate::adaptive::stages::Convergence;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -63,7 +63,7 @@ impl Order {
 }
 
 /// A run on its way.
-pub(super) struct Walk<T> {
+pub(super) struct StepState<T> {
     span: Span<T>,
     direction: f64,
     /// The longest step.
@@ -88,10 +88,10 @@ pub(super) struct Walk<T> {
     same_matrix: bool,
     pub order: Order,
     pub convergence: Convergence,
-    pub controller: Predictive,
-    pub refusals: Refusals,
-    pub trend: Trend,
-    pub roughness: Roughness,
+    pub controller: GustafssonController,
+    pub rejections: RejectionHistory,
+    pub error_history: ErrorHistory,
+    pub discontinuities: DiscontinuityDetector,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
@@ -104,7 +104,7 @@ pub(super) struct Walk<T> {
     pub verifies_pivots: bool,
 }
 
-impl<T: Real> Walk<T> {
+impl<T: Real> StepState<T> {
     pub fn new(span: Span<T>, max_step: f64) -> Self {
         let length = span.end - span.start;
         Self {
@@ -123,10 +123,10 @@ impl<T: Real> Walk<T> {
             same_matrix: false,
             order: Order::default(),
             convergence: Convergence::default(),
-            controller: Predictive::default(),
-            refusals: Refusals::default(),
-            trend: Trend::default(),
-            roughness: Roughness::default(),
+            controller: GustafssonController::default(),
+            rejections: RejectionHistory::default(),
+            error_history: ErrorHistory::default(),
+            discontinuities: DiscontinuityDetector::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
@@ -229,7 +229,7 @@ impl<T: Real> Walk<T> {
     /// The error is too large.
     pub fn refuse(&mut self, error: f64, factor: f64) {
         self.refusal = Refusal::Error;
-        self.refusals.refused(error);
+        self.rejections.refused(error);
         self.again(if self.accepted.is_none() { 0.1 } else { factor });
     }
 
