@@ -106,7 +106,7 @@ pub enum Error {
         /// The residual of an equation relative to the magnitude of its terms, the largest.
         residual: f64,
         /// The equation that has it.
-        equation: usize,
+        equation: u32,
         /// The unknown with the largest last increment relative to its size.
         unknown: &'static str,
         /// This increment.
@@ -114,12 +114,11 @@ pub enum Error {
         /// Where it ended.
         at: Place,
         /// An algebraic state of these, and its start value; if there is one, and the start was no
-        /// continuation of a solution.
+        /// continuation of a solution, or `∂f/∂z` becomes singular along it.
         started: Option<Started>,
-        /// The algebraic state along which `∂f/∂z` becomes singular between the start values and
-        /// where the iteration led to, if it does: the equations may have lost their solution at a
-        /// fold.
-        singular: Option<&'static str>,
+        /// Whether `∂f/∂z` becomes singular along that algebraic state between its start value and
+        /// where the iteration led to: the equations may have lost their solution at a fold.
+        singular: bool,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.

@@ -107,7 +107,7 @@ impl fmt::Display for Error {
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
-                if let Some(unknown) = singular {
+                if let (true, Some(Started { unknown, .. })) = (singular, started) {
                     write!(
                         f,
                         "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \

@@ -76,12 +76,12 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 if iteration == most {
                     return Err(Error::NotConverged {
                         residual: residual.to_f64(),
-                        equation,
+                        equation: equation as u32,
                         unknown: unknown_name::<M>(last.unknown),
                         increment: last.size.to_f64(),
                         at: Place { step, stage, iteration },
                         started: None,
-                        singular: None,
+                        singular: false,
                     });
                 }
             }
