@@ -116,9 +116,15 @@ pub enum Error {
         /// An algebraic state of these, and its start value; if there is one, and the start was no
         /// continuation of a solution, or `∂f/∂z` becomes singular along it.
         started: Option<Started>,
-        /// Whether `∂f/∂z` becomes singular along that algebraic state between its start value and
-        /// where the iteration led to: the equations may have lost their solution at a fold.
-        singular: bool,
+    },
+    /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
+    /// start values of that step and where the iteration led to: the algebraic equations may have
+    /// lost their solution at a fold.
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+        /// Where the iteration ended.
+        at: Place,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.

@@ -54,7 +54,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         start: &ArrayK<M, [T; S]>,
         y: &mut ArrayK<M, [T; S]>,
     ) -> Error {
-        let Error::NotConverged { residual, equation, unknown, increment, at, .. } = error else {
+        let Error::NotConverged { at, .. } = error else {
             return error;
         };
         if const { M::Shape::NZ == 0 } {
@@ -76,10 +76,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             found
         });
-        let Some(index) = singular else { return error };
-        let value = start.as_ref().get(index).map_or(f64::NAN, |stages| stages[S - 1].to_f64());
-        let started = Some(Started { unknown: unknown_name::<M>(index), value });
-        Error::NotConverged { residual, equation, unknown, increment, at, started, singular: true }
+        singular.map_or(error, |index| Error::SingularAlgebraic { unknown: unknown_name::<M>(index), at })
     }
 
     /// The sign of the determinant at the start values, if it has the other one at `y`, or where a
