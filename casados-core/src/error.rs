@@ -106,7 +106,7 @@ pub enum Error {
         /// The residual of an equation relative to the magnitude of its terms, the largest.
         residual: f64,
         /// The equation that has it.
-        equation: u32,
+        equation: usize,
         /// The unknown with the largest last increment relative to its size.
         unknown: &'static str,
         /// This increment.
@@ -114,7 +114,7 @@ pub enum Error {
         /// Where it ended.
         at: Place,
         /// An algebraic state of these, and its start value; if there is one, and the start was no
-        /// continuation of a solution, or `∂f/∂z` becomes singular along it.
+        /// continuation of a solution.
         started: Option<Started>,
     },
     /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the

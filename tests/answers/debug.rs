@@ -51,7 +51,6 @@ fn of_integrators() -> Vec<Error> {
         increment: 2.0,
         at,
         started,
-        singular: false,
     };
     let inconsistent = |singular| Error::InconsistentStart {
         t: 0.0,

@@ -129,7 +129,7 @@ impl<M: Dae, T: Real> Consistent<M, T> {
 fn explain<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> Error {
     let (unknown, worst) = match error {
         Error::Singular { unknown, .. } => (unknown, None),
-        Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation as usize)),
+        Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),
         other => return other,
     };
     let Ok(points) = euler.run.points() else { return error };

@@ -76,7 +76,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 if iteration == most {
                     return Err(Error::NotConverged {
                         residual: residual.to_f64(),
-                        equation: equation as u32,
+                        equation,
                         unknown: unknown_name::<M>(last.unknown),
                         increment: last.size.to_f64(),
                         at: Place { step, stage, iteration },

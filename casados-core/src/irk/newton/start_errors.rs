@@ -50,7 +50,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
                 let own = (nx..M::Shape::NK).find(|index| unknown_name::<M>(*index) == unknown);
-                let own = own.or_else(|| Self::find_algebraic(equation as usize, &mut |_| true));
+                let own = own.or_else(|| Self::find_algebraic(equation, &mut |_| true));
                 let started = own.map(started);
                 Error::NotConverged { residual, equation, unknown, increment, at, started }
             }
