@@ -116,10 +116,15 @@ pub enum Error {
         /// An algebraic state of these, and its start value; if there is one, and the start was no
         /// continuation of a solution.
         started: Option<Started>,
-        /// The algebraic state along which `∂f/∂z` becomes singular between the start values and
-        /// where the iteration led to, if it does: the equations may have lost their solution at a
-        /// fold.
-        singular: Option<&'static str>,
+    },
+    /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
+    /// start values of that step and where the iteration led to: the algebraic equations may have
+    /// lost their solution at a fold.
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+        /// Where the iteration ended.
+        at: Place,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.

@@ -1,6 +1,7 @@
 //! Bergman's minimal model of glucose and insulin: parameters from the intravenous glucose
 //! tolerance test of G. Pacini, R. N. Bergman, "MINMOD", Comput. Methods Programs Biomed. 23
-//! (1986), from a guess by simulation; against an implementation that has nothing in common with this one.
+//! (1986), from a guess by simulation; against an implementation that has nothing in common with
+//! this one.
 
 use crate::Test;
 use casados::ocp::{GaussNewton, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem};

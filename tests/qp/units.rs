@@ -123,8 +123,8 @@ fn solve(
     mark(&mut scaled);
     let statistics = HeapInteriorPoint::new().solve(scaled.view(), QpStart::Cold, solution.view_mut())?;
     let (found, objective) = residuals(qp.view(), &units.back(solution)?);
-    // The tolerance is in units, and sizes of what was drawn are up to a hundred. Each of some tens of
-    // sides may cost the tolerance.
+    // The tolerance is in units, and sizes of what was drawn are up to a hundred. Each of some tens
+    // of sides may cost the tolerance.
     let mut wrong = (!(found.largest() <= 100.0 * TOLERANCE)).then(|| format!("{found}"));
     let expected = statistics.objective / units.objective;
     if (expected - objective).abs() > 100.0 * TOLERANCE * (1.0 + objective.abs()) {

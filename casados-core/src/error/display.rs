@@ -101,19 +101,12 @@ impl fmt::Display for Error {
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at, started, singular } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
                 write!(
                     f,
                     "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                      relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
                 )?;
-                if let Some(unknown) = singular {
-                    write!(
-                        f,
-                        "; between the start values and there ∂f/∂z becomes singular along `{unknown}`: the algebraic \
-                         equations may have lost their solution"
-                    )?;
-                }
                 match started {
                     Some(Started { unknown, value }) => write!(
                         f,
@@ -122,6 +115,11 @@ impl fmt::Display for Error {
                     None => Ok(()),
                 }
             }
+            Error::SingularAlgebraic { unknown, at } => write!(
+                f,
+                "Newton's method did not converge: between the start values and where it ended, at {at}, ∂f/∂z becomes \
+                 singular along `{unknown}`: the algebraic equations may have lost their solution"
+            ),
             Error::InconsistentStart { t, equation, residual, unknown, value, singular } => {
                 write!(f, "there are no consistent derivatives and algebraic states at t = {t}: ")?;
                 match singular {

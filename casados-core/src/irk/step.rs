@@ -149,9 +149,12 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 Ok(false)
             }
             Err(error) => {
+                if n == 0 {
+                    return Err(self.explain_start(error, guess));
+                }
                 #[cfg(feature = "alloc")]
                 let error = self.explain_fold(error, coefficients, (n, x), &from, y);
-                Err(if n == 0 { self.explain_start(error, guess) } else { error })
+                Err(error)
             }
         }
     }

@@ -81,7 +81,6 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                         increment: last.size.to_f64(),
                         at: Place { step, stage, iteration },
                         started: None,
-                        singular: None,
                     });
                 }
             }

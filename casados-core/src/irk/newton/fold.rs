@@ -5,7 +5,7 @@
 //! 1998, chapter 9), so that Newton's method beyond the fold goes from one side to the other.
 
 use super::dense_fallback::unknown_name;
-use crate::error::Error;
+use crate::error::{Error, Started};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::Work;
 use crate::memory::Fallback;
@@ -54,7 +54,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         start: &ArrayK<M, [T; S]>,
         y: &mut ArrayK<M, [T; S]>,
     ) -> Error {
-        let Error::NotConverged { residual, equation, unknown, increment, at, started, .. } = error else {
+        let Error::NotConverged { at, .. } = error else {
             return error;
         };
         if const { M::Shape::NZ == 0 } {
@@ -76,8 +76,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             found
         });
-        let singular = singular.map(unknown_name::<M>);
-        Error::NotConverged { residual, equation, unknown, increment, at, started, singular }
+        singular.map_or(error, |index| Error::SingularAlgebraic { unknown: unknown_name::<M>(index), at })
     }
 
     /// The sign of the determinant at the start values, if it has the other one at `y`, or where a

@@ -48,11 +48,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 let started = started(to_blame);
                 Error::NonFiniteStart { quantity, equation, value, started, at }
             }
-            Error::NotConverged { residual, equation, unknown, increment, at, singular, .. } => {
+            Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
                 let own = (nx..M::Shape::NK).find(|index| unknown_name::<M>(*index) == unknown);
                 let own = own.or_else(|| Self::find_algebraic(equation, &mut |_| true));
                 let started = own.map(started);
-                Error::NotConverged { residual, equation, unknown, increment, at, started, singular }
+                Error::NotConverged { residual, equation, unknown, increment, at, started }
             }
             other => other,
         }

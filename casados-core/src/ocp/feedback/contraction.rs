@@ -21,9 +21,9 @@ use crate::scalar::Real;
 /// with the state and the parameters of this sample. `φ` is the exact merit function of `l₁` type,
 /// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract
 /// have a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near
-/// a solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of active
-/// constraints, the contraction rate, is above one. A disturbance, noise and a reference that moves
-/// lengthen steps, and do not change what a step gains.
+/// a solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of
+/// active constraints, the contraction rate, is above one. A disturbance, noise and a reference
+/// that moves lengthen steps, and do not change what a step gains.
 ///
 /// Source: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2nd edition, (4.4) and section 18.5;
 /// contraction: M. Diehl, H. G. Bock, J. P. Schlöder, SIAM J. Control Optim. 43, 2005.

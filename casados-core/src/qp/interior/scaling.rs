@@ -6,8 +6,8 @@
 //! r     constraint     |c| u
 //! ```
 //!
-//! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where that is zero, and `d` the distance of
-//! the bounds from zero. Where no size is far from one all units are one.
+//! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where that is zero, and `d` the
+//! distance of the bounds from zero. Where no size is far from one all units are one.
 //!
 //! No number of the QP is scaled: units are what the algorithm compares with. Slacks begin at `u`
 //! and multipliers at `f / u`, a row gives way `√ε u² / f` to a unit of force, and residuals are
