@@ -5,7 +5,7 @@
 //! 1998, chapter 9), so that Newton's method beyond the fold goes from one side to the other.
 
 use super::dense_fallback::unknown_name;
-use crate::error::{Error, Started};
+use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::Work;
 use crate::memory::Fallback;
