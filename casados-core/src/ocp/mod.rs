@@ -129,5 +129,4 @@ pub use solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
 pub use solution::sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
 #[cfg(feature = "alloc")]
-pub use formulation::functions::fits::{ConstraintsOf, CostOf, HasArgumentsOf, IsConstraint, IsCost};
-pub use formulation::functions::least_squares::LeastSquaresCost;
+pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};

@@ -162,7 +162,7 @@ pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
 /// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
 /// determine does not move: that multiplier would go by steps as small as the distance. Others
 /// take over its force.
-pub(super) fn release<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
+pub(super) fn reset_small_slacks<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
     let small = T::from_f64(small);
     for ((slack, multiplier), residual) in
         sides.slack.iter_mut().zip(&mut *sides.multiplier).zip(&mut *sides.residual)

@@ -2,7 +2,7 @@
 
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{attach, attach_to_new, evaluate_values};
+use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp};
 use super::kkt::work::Work;
 use super::state::{GAMMA_PHI, State};
 use crate::ocp::formulation::error::OcpError;
@@ -27,7 +27,7 @@ const CORRECTED: f64 = 0.99;
 
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
+pub(super) struct FilterModel {
     pub here: Measure,
     /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
@@ -40,7 +40,7 @@ pub(super) struct Expected {
     pub delta: f64,
 }
 
-impl Expected {
+impl FilterModel {
     /// Whether the barrier function decides after a step of this length.
     fn decides(&self, alpha: f64) -> bool {
         self.here.violation <= self.small_violation
@@ -86,7 +86,7 @@ pub(super) struct Accepted {
 
 /// What a line search finds.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Found {
+pub(super) enum SearchOutcome {
     /// A step.
     Step(Accepted),
     /// No step is short enough.
@@ -95,7 +95,7 @@ pub(super) enum Found {
     OutOfTime,
 }
 
-impl Found {
+impl SearchOutcome {
     /// The step.
     pub fn accepted(self) -> Option<Accepted> {
         match self {
@@ -106,7 +106,7 @@ impl Found {
 }
 
 /// The memory that a line search works on.
-pub(super) struct Room<'r, 'w, T, D, M, N, I> {
+pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
     pub lengths: &'r Lengths,
     pub numbers: &'r mut N,
     pub indices: &'r mut I,
@@ -114,7 +114,7 @@ pub(super) struct Room<'r, 'w, T, D, M, N, I> {
     pub work: &'r mut Work<'w, T>,
 }
 
-impl<T, D, M, N, I> Room<'_, '_, T, D, M, N, I>
+impl<T, D, M, N, I> LineSearch<'_, '_, T, D, M, N, I>
 where
     T: Real,
     D: AsRef<[StageDims]>,
@@ -127,7 +127,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &Expected,
+        expected: &FilterModel,
         alpha: f64,
     ) -> bool {
         self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
@@ -141,17 +141,17 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
-        expected: &Expected,
+        expected: &FilterModel,
         longest: f64,
         tau: f64,
-    ) -> Result<Found, OcpError> {
+    ) -> Result<SearchOutcome, OcpError> {
         let State { filter, over, .. } = state;
         let mut alpha = longest;
         let shortest = expected.shortest();
         while alpha >= shortest {
             let there = self.measure(ocp, expected.mu, alpha);
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
-                return Ok(Found::Step(Accepted { alpha, corrected: false }));
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
             let bends =
@@ -160,14 +160,14 @@ where
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
             {
-                return Ok(Found::Step(Accepted { alpha, corrected: true }));
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: true }));
             }
             if over() {
-                return Ok(Found::OutOfTime);
+                return Ok(SearchOutcome::OutOfTime);
             }
             alpha *= 0.5;
         }
-        Ok(Found::Nothing)
+        Ok(SearchOutcome::Nothing)
     }
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
@@ -181,7 +181,7 @@ where
         let part_of_step = T::from_f64(alpha);
         ocp.step_length = Some(part_of_step);
         {
-            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
             let to = self.trial.view_mut();
             for place in Places::<T>::new(iterate.qp.dims) {
@@ -204,7 +204,7 @@ where
         if P::Dynamics::LIFTED {
             gaps += ocp.stages[0].to_f64();
         }
-        let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+        let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
         let mut violation =
             gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
@@ -225,11 +225,11 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &Expected,
+        expected: &FilterModel,
         tau: f64,
     ) -> Result<Option<f64>, OcpError> {
         {
-            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
             assign(self.work.step, iterate.step);
             assign(self.work.slack_step, iterate.sides.slack_step);
             assign(self.work.multiplier_step, iterate.sides.multiplier_step);
@@ -241,7 +241,7 @@ where
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
                 let mut iterate =
-                    attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                    kkt_view_of_new_qp(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
                 iterate.units = self.work.units;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
@@ -263,7 +263,7 @@ where
             violation = there.violation;
         }
         if accepted.is_none() {
-            let iterate: Iterate<'_, T> = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            let iterate: Iterate<'_, T> = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
             assign(iterate.step, self.work.step);
             assign(iterate.sides.slack_step, self.work.slack_step);
             assign(iterate.sides.multiplier_step, self.work.multiplier_step);

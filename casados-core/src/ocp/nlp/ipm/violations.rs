@@ -10,7 +10,7 @@ use crate::scalar::Real;
 pub(super) const SMALL: f64 = 1e-4;
 /// Violations are there to stay where no step makes more than this part of them less, to first
 /// order.
-const STAYS: f64 = 1e-4;
+const STATIONARY_DECREASE: f64 = 1e-4;
 /// What is left of the dynamics by then, as a part of the violations.
 const EXACT: f64 = 1e-5;
 /// So many phases there may be in a run.
@@ -41,7 +41,7 @@ pub(super) struct Phase {
 
 impl Phase {
     /// Whether another phase may help.
-    pub fn may_begin(&self) -> bool {
+    pub fn may_enter(&self) -> bool {
         self.force.is_none() && self.count < PHASES
     }
 
@@ -76,8 +76,8 @@ impl Violations {
     }
 
     /// Whether they are stationary.
-    pub fn stay(&self) -> bool {
+    pub fn is_stationary(&self) -> bool {
         let Self { sum, better, gaps } = *self;
-        sum > SMALL && better <= STAYS * sum && gaps <= EXACT * sum
+        sum > SMALL && better <= STATIONARY_DECREASE * sum && gaps <= EXACT * sum
     }
 }

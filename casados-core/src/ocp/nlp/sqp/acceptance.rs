@@ -30,7 +30,7 @@ pub(super) struct Line {
 impl Line {
     /// Whether the merit function, if it is a parabola along the step, has its least before the end
     /// of a step of this length: whether it shrinks by less than half of what its slope promises.
-    pub fn turns_before(&self, length: f64, there: &Measure) -> bool {
+    pub fn overshoots(&self, length: f64, there: &Measure) -> bool {
         let promised = length * (self.slope - self.here.violation);
         there.merit() - self.here.merit() > 0.5 * promised.min(0.0) + self.noise()
     }

@@ -44,7 +44,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let by = state.globalisation(&self.options);
         let weighted = by == Globalisation::Merit;
-        let line = self.line(ocp, state);
+        let line = self.merit_model(ocp, state);
         let mut written = true;
         if state.search.full {
             if self.try_linearised(ocp, state, &line) {
@@ -56,7 +56,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !written {
             self.curvature.follow(f64::INFINITY);
         }
-        let passing = state.passing && weighted && line.here.violation > line.slope.abs();
+        let passing = state.may_reject_short_steps && weighted && line.here.violation > line.slope.abs();
         let shortest = if passing { 2.0 * SHORT } else { self.options.shortest_step };
         let mut length = 1.0;
         while length >= shortest {
@@ -65,7 +65,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if let Some(there) = there
                 && state.search.accepts(by, length, &line, &there)
             {
-                let length = self.shortened(ocp, state, &line, length, there);
+                let length = self.backtrack_to_minimiser(ocp, state, &line, length, there);
                 return Ok(Some(Taken { length, corrected: false }));
             }
             if length == 1.0 && there.is_some_and(|there| there.is_finite()) {
@@ -121,12 +121,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let weighted = state.globalisation(&self.options) == Globalisation::Merit;
-        weighted && self.curvature.update().is_none() && line.turns_before(length, there)
+        weighted && self.curvature.update().is_none() && line.overshoots(length, there)
     }
 
     /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
     /// function says that its least is before, and shrinks. The length.
-    fn shortened<P: Formulation<T>>(
+    fn backtrack_to_minimiser<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -151,14 +151,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
-    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
-        let (here, slope) = self.weigh(ocp, state);
+    fn merit_model<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
+        let (here, slope) = self.update_weights(ocp, state);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn weigh<P: Formulation<T>>(
+    fn update_weights<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,

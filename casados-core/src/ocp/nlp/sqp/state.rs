@@ -4,6 +4,7 @@ use super::acceptance::Search;
 use super::options::{Globalisation, SqpOptions};
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::solution::log::Iteration;
+use crate::ocp::solution::outcome::Status;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
@@ -16,7 +17,7 @@ pub(super) struct State<'c, T> {
     /// Nothing has been done yet.
     pub begins: bool,
     /// The run began again.
-    pub again: bool,
+    pub second_attempt: bool,
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
@@ -27,7 +28,7 @@ pub(super) struct State<'c, T> {
     /// The regularisation of the last step that was short, and less after others.
     pub failed: f64,
     /// Whether the last direction was that of the violations alone.
-    pub nearest: bool,
+    pub feasibility_step: bool,
     /// Whether the QP that the last direction comes from was overwritten.
     pub rewritten: bool,
     /// Steps with penalties in a row.
@@ -35,7 +36,7 @@ pub(super) struct State<'c, T> {
     /// The penalty that violations were found to need; zero at first.
     pub penalty: f64,
     /// Whether a short step may be refused, because more damping can be tried.
-    pub passing: bool,
+    pub may_reject_short_steps: bool,
     /// Whether QPs are solved to as many digits as there are.
     pub exact: bool,
     /// The largest violation of the guess.
@@ -52,6 +53,8 @@ pub(super) struct State<'c, T> {
     pub short_steps: usize,
     /// The largest change of a variable by the last full step; infinite at first.
     pub reach: f64,
+    /// Infeasible, where bounds contradict each other.
+    pub contradiction: Option<Status>,
     pub number: PhantomData<T>,
 }
 
@@ -61,7 +64,7 @@ const SHORT: f64 = 1.0 / 16.0;
 const GROWTH: f64 = 4.0;
 /// After so many short steps more than full ones the merit function gives way to the filter: where
 /// constraints bend more than its weights let pass, it creeps along them.
-const CREEPING: usize = 5;
+const SHORT_STEPS_BEFORE_FILTER: usize = 5;
 const ROOT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
@@ -78,15 +81,15 @@ impl<T> State<'_, T> {
             over: None,
             late: false,
             begins: true,
-            again: false,
+            second_attempt: false,
             search: Search::new(),
             elastic: false,
             regularisation: 0.0,
             damping: 0.0,
             failed: 0.0,
-            passing: false,
+            may_reject_short_steps: false,
             exact: false,
-            nearest: false,
+            feasibility_step: false,
             rewritten: false,
             penalty: 0.0,
             elastic_steps: 0,
@@ -97,6 +100,7 @@ impl<T> State<'_, T> {
             sizes: None,
             short_steps: 0,
             reach: f64::INFINITY,
+            contradiction: None,
             number: PhantomData,
         }
     }
@@ -115,15 +119,15 @@ impl<T> State<'_, T> {
     /// How far steps go: as options say, but by the filter where the merit function creeps.
     pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
         match options.globalisation {
-            Globalisation::Merit if self.short_steps >= CREEPING => Globalisation::Filter,
+            Globalisation::Merit if self.short_steps >= SHORT_STEPS_BEFORE_FILTER => Globalisation::Filter,
             given => given,
         }
     }
 
     /// Counts short steps, less full ones without a correction. Whether it was the short one after
     /// which the filter decides.
-    pub fn creeps(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
-        if options.globalisation != Globalisation::Merit || self.short_steps >= CREEPING {
+    pub fn switches_to_filter(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
+        if options.globalisation != Globalisation::Merit || self.short_steps >= SHORT_STEPS_BEFORE_FILTER {
             return false;
         }
         if self.is_short(row) && !row.elastic {
@@ -131,7 +135,7 @@ impl<T> State<'_, T> {
         } else if row.step == 1.0 && !row.corrected {
             self.short_steps = self.short_steps.saturating_sub(1);
         }
-        self.short_steps == CREEPING
+        self.short_steps == SHORT_STEPS_BEFORE_FILTER
     }
 
     /// Whether a step was so short that damping helps.

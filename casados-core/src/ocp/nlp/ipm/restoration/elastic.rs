@@ -14,7 +14,7 @@ use crate::scalar::Real;
 /// Penalties grow to this multiple of the first.
 const LARGEST: f64 = 1e4;
 /// A violation that larger penalties do not make smaller than this part of it is there to stay.
-const STAYS: f64 = 0.9;
+const STATIONARY_UNDER_PENALTIES: f64 = 0.9;
 /// The barrier parameter of new penalties, in units of forces.
 const BARRIER: f64 = 0.1;
 
@@ -50,7 +50,7 @@ pub(in crate::ocp::nlp::ipm) fn verdict<
 ) -> Option<Status> {
     let worst = worst(ocp, state, (given, units)).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
-    let stays = worst.violation > STAYS * state.stationary_violation
+    let stays = worst.violation > STATIONARY_UNDER_PENALTIES * state.stationary_violation
         && cost >= (ocp.objective.to_f64() - state.first_objective).abs();
     if stays || penalty >= LARGEST * options.elastic_penalty {
         return Some(ocp.status_of_worst(&worst));

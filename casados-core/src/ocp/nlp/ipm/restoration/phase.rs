@@ -1,4 +1,4 @@
-//! The feasibility phase: violations of hard bounds alone are made small, from where no step made
+//! The restoration phase: violations of hard bounds alone are made small, from where no step made
 //! progress. Either a point without violations is found, and the run goes on from there, or one
 //! where the sum of violations is stationary.
 //!
@@ -51,14 +51,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 return None;
             }
             state.phase.count = PHASES;
-            leave(ocp, state, penalties, &self.options);
+            exit(ocp, state, penalties, &self.options);
             ocp.recall(&self.best);
             soften(ocp, state, (penalties, units), self.options.elastic_penalty);
             return None;
         }
         // Near a feasible point it is not violations that hinder a first attempt.
         let is_violated = state.violation > if state.progress.adapts() { FAR_OFF } else { SMALL };
-        if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_begin() {
+        if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_enter() {
             if state.violation > state.best_violation {
                 ocp.recall(&self.best);
             }
@@ -66,7 +66,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 self.close_gaps(ocp, capacity);
             }
             let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
-            begin(ocp, state, (&*given.penalties, &*given.units));
+            enter(ocp, state, (&*given.penalties, &*given.units));
             return None;
         }
         if state.progress.adapts() {
@@ -97,7 +97,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 /// Begins a phase.
-fn begin<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
     given: (&[T], &[T]),
@@ -110,7 +110,7 @@ fn begin<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 }
 
 /// Ends it: bounds are as hard as they were.
-pub(in crate::ocp::nlp::ipm) fn leave<
+pub(in crate::ocp::nlp::ipm) fn exit<
     P: Formulation<T>,
     T: Real,
     D: AsRef<[StageDims]>,
@@ -130,7 +130,7 @@ pub(in crate::ocp::nlp::ipm) fn leave<
 }
 
 /// What follows an iterate of a phase: the end of the run, the end of the phase, or nothing.
-pub(in crate::ocp::nlp::ipm) fn judge<
+pub(in crate::ocp::nlp::ipm) fn check_convergence<
     P: Formulation<T>,
     T: Real,
     D: AsRef<[StageDims]>,
@@ -142,13 +142,13 @@ pub(in crate::ocp::nlp::ipm) fn judge<
     options: &IpmOptions,
 ) -> Option<Next> {
     let violations = state.phase.violations;
-    if violations.stay()
+    if violations.is_stationary()
         && let Some(worst) = elastic::worst(ocp, state, (penalties, units))
     {
         return Some(Next::End(ocp.status_of_worst(&worst)));
     }
     if violations.are_small() || state.error <= options.tolerance {
-        leave(ocp, state, penalties, options);
+        exit(ocp, state, penalties, options);
         return Some(Next::NewPenalties);
     }
     None
