@@ -9,21 +9,19 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::nlp::filter::{
-    Filter, GAMMA_THETA, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides,
-};
+use crate::ocp::nlp::filter::{Filter, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides};
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `η_φ`
-const ARMIJO: f64 = 1e-8;
+const ETA_PHI: f64 = 1e-8;
 /// `γ_α`
-const SAFETY: f64 = 0.05;
+const ALPHA_MIN_FRAC: f64 = 0.05;
 /// Corrections of one step.
-const CORRECTIONS: usize = 4;
+const MAX_SOC: usize = 4;
 /// `κ_soc`: a correction that leaves more of the violation is the last one.
-const CORRECTED: f64 = 0.99;
+const KAPPA_SOC: f64 = 0.99;
 
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
@@ -54,12 +52,11 @@ impl FilterModel {
         if self.slope < 0.0 {
             least = least.min(GAMMA_PHI * violation / -self.slope);
             if violation <= self.small_violation {
-                let powers =
-                    (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
+                let powers = (Scalar::powf(violation, S_THETA), Scalar::powf(-self.slope, S_PHI));
                 least = least.min(powers.0 / powers.1);
             }
         }
-        (SAFETY * least).max(1e-14)
+        (ALPHA_MIN_FRAC * least).max(1e-14)
     }
 
     /// Whether a point after a step of this length is good enough; the filter grows where the
@@ -71,7 +68,7 @@ impl FilterModel {
             return false;
         }
         if self.decides(alpha) {
-            return there.objective <= self.here.objective + ARMIJO * alpha * self.slope + noise;
+            return there.objective <= self.here.objective + ETA_PHI * alpha * self.slope + noise;
         }
         filter.improves(there, &self.here, noise)
     }
@@ -236,7 +233,7 @@ where
         }
         let mut violation = expected.here.violation;
         let mut accepted = None;
-        for _ in 0..CORRECTIONS {
+        for _ in 0..MAX_SOC {
             ocp.correct(self.trial, self.work.ends);
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
@@ -257,7 +254,7 @@ where
                 accepted = Some(alpha);
                 break;
             }
-            if there.violation > CORRECTED * violation {
+            if there.violation > KAPPA_SOC * violation {
                 break;
             }
             violation = there.violation;

@@ -16,7 +16,7 @@ use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
 /// First multipliers that are more units are discarded.
-const LARGEST: f64 = 1e3;
+const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Slacks and multipliers of the first iteration, or of new penalties.
@@ -52,7 +52,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work, force).is_ok() {
-            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(LARGEST * force);
+            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * force);
             let sides = scaling::of_sides(iterate.sides.rows, work.hessian_multipliers, rows);
             if scaling::of_gaps(iterate.qp.dims, work.pi, rows).chain(sides).all(is_small) {
                 assign(view.dynamics, work.pi);

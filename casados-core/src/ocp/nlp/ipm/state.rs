@@ -21,7 +21,7 @@ const COMPLEMENTARITY_STALL: usize = 3;
 const STALLED_DECREASE: f64 = 0.9;
 
 /// Steps that are no longer lead nowhere if there are many of them.
-const SHORT: f64 = 1.0 / 32.0;
+const SHORT_STEP: f64 = 1.0 / 32.0;
 
 /// What a run remembers from one iteration to the next.
 pub(super) struct State<'c> {
@@ -127,7 +127,7 @@ impl<'c> State<'c> {
 
     /// Counts a step of this length.
     pub fn count_stalled(&mut self, step: f64) {
-        let stalls = self.phase.force.is_some() || step <= SHORT;
+        let stalls = self.phase.force.is_some() || step <= SHORT_STEP;
         self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 

@@ -6,7 +6,7 @@ use crate::ocp::nlp::filter::{Filter, Measure, objective_decides};
 /// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
 const GAMMA_PHI: f64 = 1e-5;
 /// The part of the expected decrease that is enough.
-const ARMIJO: f64 = 1e-4;
+const ETA: f64 = 1e-4;
 
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
@@ -57,14 +57,14 @@ impl Search {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;
-                there.merit() <= here.merit() + ARMIJO * length * slope.min(0.0) + noise
+                there.merit() <= here.merit() + ETA * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 if !self.filter.admits(there, noise) {
                     return false;
                 }
                 if objective_decides(length, *slope, here.violation) {
-                    return there.objective <= here.objective + ARMIJO * length * slope + noise;
+                    return there.objective <= here.objective + ETA * length * slope + noise;
                 }
                 self.filter.improves(there, here, noise)
             }

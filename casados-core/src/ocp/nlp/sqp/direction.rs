@@ -15,32 +15,32 @@ use crate::qp::{QpError, QpSolver, QpStart, StageDims};
 use crate::scalar::Real;
 
 /// The first regularisation that is tried, and the smallest one.
-const FIRST: f64 = 1e-6;
-const LEAST: f64 = 1e-8;
+const FIRST_REGULARISATION: f64 = 1e-6;
+const MIN_REGULARISATION: f64 = 1e-8;
 /// The largest one.
-const MOST: f64 = 1e10;
+const MAX_REGULARISATION: f64 = 1e10;
 /// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
 const MOST_AT_FIRST: f64 = 1e-2;
 /// What it grows by where it is not enough, and shrinks by from one iteration to the next.
-const FACTOR: f64 = 4.0;
+const REGULARISATION_FACTOR: f64 = 4.0;
 /// It grows so many times because a QP was not solved for a reason that is not known.
-const UNKNOWN: usize = 1;
+const RETRIES_OF_UNSOLVED_QPS: usize = 1;
 /// Penalties grow by this, once, to see whether the objective is what holds violations back.
-const GROWTH: f64 = 100.0;
+const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
-const MOST_ELASTIC: f64 = 1e4;
+const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
-const DIGITS: f64 = 1e-13;
+const QP_ROUNDING: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
 const STATIONARY_VIOLATION: f64 = 1.0 - 1e-3;
 /// Gaps are closed that are no more than this part of the violations of bounds.
-const CLOSED: f64 = 1e-2;
+const CLOSED_GAPS: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
-const CLOSING: usize = 4;
+const STEPS_THAT_CLOSE_GAPS: usize = 4;
 /// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
 /// penalty; then those of an easier QP.
-const PROXIMAL_WEIGHTS: [(f64, f64); 2] = [(2e-5, DIGITS), (2e-3, 1e-9)];
+const PROXIMAL_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -133,7 +133,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let wrong = part * state.force();
         let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
         let permitted = if begins || state.exact { 0.0 } else { part };
-        self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
+        self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
@@ -163,7 +163,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
-        self.qp_solver.permit(DIGITS * penalty);
+        self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
         let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
         let gaps = ocp.gaps();
@@ -187,19 +187,19 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
-        penalty *= GROWTH;
+        penalty *= PENALTY_FACTOR;
         self.set_elastic(ocp, state, penalty);
         // Forces are as large as penalties, and have as many digits.
-        self.qp_solver.permit(DIGITS * penalty);
+        self.qp_solver.permit(QP_ROUNDING * penalty);
         let solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
         if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
             // It is, and from now on it does.
-            state.penalty = penalty.min(self.options.elastic_penalty * MOST_ELASTIC / GROWTH);
+            state.penalty = penalty.min(self.options.elastic_penalty * MAX_PENALTY_FACTOR / PENALTY_FACTOR);
             return Ok(Direction::Step);
         }
         // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
         // gaps are closed.
-        if gaps <= CLOSED * bounds {
+        if gaps <= CLOSED_GAPS * bounds {
             let is_near = self.feasibility_step(ocp, state, row, before).is_ok();
             if is_near && self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
                 return Ok(Direction::Infeasible(worst));
@@ -211,7 +211,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             state.rewritten = true;
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if solved && gaps <= bounds && state.elastic_steps >= CLOSING {
+        if solved && gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
             return Ok(Direction::Infeasible(worst));
         }
         state.penalty = 0.0;
@@ -240,7 +240,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         row: &mut Iteration,
         violation: f64,
     ) -> Result<(), QpError> {
-        let (one, alone) = (self.options.elastic_penalty, MOST_ELASTIC * self.options.elastic_penalty);
+        let (one, alone) = (self.options.elastic_penalty, MAX_PENALTY_FACTOR * self.options.elastic_penalty);
         // Of soft bounds that were given there are costs.
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
@@ -292,26 +292,26 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 QpError::NotConvex { .. } => true,
                 QpError::MaxIterations { .. } | QpError::Stalled { .. } => {
                     unknown += 1;
-                    unknown <= UNKNOWN
+                    unknown <= RETRIES_OF_UNSOLVED_QPS
                 }
                 _ => false,
             };
-            if !(reduced && is_curvature && row.regularisation < MOST) {
+            if !(reduced && is_curvature && row.regularisation < MAX_REGULARISATION) {
                 return Err(error);
             }
             let more = if row.regularisation > 0.0 {
-                FACTOR * row.regularisation
+                REGULARISATION_FACTOR * row.regularisation
             } else if state.regularisation > 0.0 {
-                (state.regularisation / FACTOR).max(LEAST)
+                (state.regularisation / REGULARISATION_FACTOR).max(MIN_REGULARISATION)
             } else {
-                FIRST
+                FIRST_REGULARISATION
             };
             ocp.regularise(T::from_f64(more - row.regularisation));
             row.regularisation = more;
-            state.regularisation = more.min(MOST);
+            state.regularisation = more.min(MAX_REGULARISATION);
         }
         if row.regularisation == 0.0 {
-            state.regularisation /= FACTOR;
+            state.regularisation /= REGULARISATION_FACTOR;
         }
         Ok(())
     }

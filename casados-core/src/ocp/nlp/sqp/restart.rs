@@ -14,9 +14,9 @@ use crate::qp::{QpSolver, Residuals, StageDims, larger};
 use crate::scalar::Real;
 
 /// The regularisation of the first direction.
-const DAMPING: f64 = 1.0;
+const RESTART_DAMPING: f64 = 1.0;
 /// A simulation that violates more than this multiple of what the guess does has gone astray.
-const FAR: f64 = 1e3;
+const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Whether a run begins again, with steps that are damped as those of Gauss and Newton are:
@@ -52,7 +52,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             state.search.linearised = None;
             return false;
         }
-        found = found.filter(|&violation| violation <= FAR * state.violation_of_guess);
+        found = found.filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.violation_of_guess);
         if found.is_none() {
             ocp.iterate.copy_from(&self.weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -61,7 +61,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let &mut State { sizes, best_residual, best_iteration, .. } = state;
         let over = state.over.take();
         let best = State { best_residual, best_iteration, ..State::new() };
-        *state = State { over, second_attempt: true, damping: DAMPING, sizes, ..best };
+        *state = State { over, second_attempt: true, damping: RESTART_DAMPING, sizes, ..best };
         self.forget_weights(ocp, state);
         true
     }

@@ -17,15 +17,15 @@ use crate::scalar::Real;
 
 /// Weights are at least this part of the largest multiplier: constraints without a force, as at
 /// states that cost nothing, would be left far behind otherwise.
-const LEAST: f64 = 1e-2;
+const MIN_WEIGHT: f64 = 1e-2;
 /// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
-const SHARE: f64 = 0.1;
+const RHO: f64 = 0.1;
 /// A step of Gauss and Newton that is no longer is refused where gaps and violations count more
 /// than the objective, if damping can be larger: a shorter step shrinks all linear gaps by the same
 /// part, a damped one goes less far in what would have to go farthest.
-const SHORT: f64 = 0.25;
+const SHORTEST_UNDAMPED_STEP: f64 = 0.25;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short
@@ -57,7 +57,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.curvature.follow(f64::INFINITY);
         }
         let passing = state.may_reject_short_steps && weighted && line.here.violation > line.slope.abs();
-        let shortest = if passing { 2.0 * SHORT } else { self.options.shortest_step };
+        let shortest = if passing { 2.0 * SHORTEST_UNDAMPED_STEP } else { self.options.shortest_step };
         let mut length = 1.0;
         while length >= shortest {
             // A point without a value is one that is not good enough.
@@ -171,7 +171,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale_weights(ocp, state, Way::Into);
         let multipliers = self.solution.multipliers_mut();
         let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
-        let (half, least) = (T::from_f64(0.5), T::from_f64(LEAST) * largest);
+        let (half, least) = (T::from_f64(0.5), T::from_f64(MIN_WEIGHT) * largest);
         // Those of this step count at least.
         self.weights.update_multipliers(&self.solution, |w, multiplier| {
             let size = multiplier.abs();
@@ -180,7 +180,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale_weights(ocp, state, Way::Back);
         let here = ocp.measure_here(&self.weights);
         let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
-        let factor = slope / ((1.0 - SHARE) * here.violation);
+        let factor = slope / ((1.0 - RHO) * here.violation);
         if !(factor > 1.0 && factor.is_finite()) {
             return (here, slope);
         }

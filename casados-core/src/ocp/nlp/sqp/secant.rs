@@ -35,7 +35,7 @@ const LEAST: f64 = 0.2;
 /// Steps that are shorter, as a part of the point, tell of rounding alone.
 const SHORT: f64 = 1e-12;
 /// `sᵀr` is this part of `‖s‖ ‖r‖` at least, or a rank-one update is left out.
-const PROXIMAL_WEIGHTS: f64 = 1e-8;
+const FLAT: f64 = 1e-8;
 /// Variables without curvature begin with this part of the largest one, or of one.
 const FIRST: f64 = 1e-2;
 
@@ -273,7 +273,7 @@ fn rank_one<T: Real>(b: &mut [T], ld: usize, [s, v]: [&[T]; 2], y: &mut [T], bs:
         *r = *r - bs;
     }
     let along = dot(y, s);
-    let (short, flat) = (T::from_f64(SHORT * SHORT), T::from_f64(PROXIMAL_WEIGHTS * PROXIMAL_WEIGHTS));
+    let (short, flat) = (T::from_f64(SHORT * SHORT), T::from_f64(FLAT * FLAT));
     let is_step = dot(s, s) > short * dot(v, v) && along * along > flat * dot(s, s) * dot(y, y);
     if !(is_step && along.is_finite()) {
         return;

@@ -60,19 +60,19 @@ pub(super) struct State<'c, T> {
 
 /// Steps that are no longer are followed by more damping: by that factor, or by what would leave
 /// of the step along a curvature the cube root of the part that was gone.
-const SHORT: f64 = 1.0 / 16.0;
-const GROWTH: f64 = 4.0;
+const SHORT_STEP: f64 = 1.0 / 16.0;
+const DAMPING_FACTOR: f64 = 4.0;
 /// After so many short steps more than full ones the merit function gives way to the filter: where
 /// constraints bend more than its weights let pass, it creeps along them.
 const SHORT_STEPS_BEFORE_FILTER: usize = 5;
-const ROOT: f64 = -1.0 / 3.0;
+const DAMPING_EXPONENT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
-const RELIEF: f64 = 0.2;
-const FORGET: f64 = 0.1;
+const DAMPING_DECREASE: f64 = 0.2;
+const FAILED_DECREASE: f64 = 0.1;
 /// The least and the most of it.
-const LEAST: f64 = 1e-8;
-const MOST: f64 = 1e2;
+const MIN_DAMPING: f64 = 1e-8;
+const MAX_DAMPING: f64 = 1e2;
 
 impl<T> State<'_, T> {
     /// That of a run that begins.
@@ -140,18 +140,19 @@ impl<T> State<'_, T> {
 
     /// Whether a step was so short that damping helps.
     pub fn is_short(&self, row: &Iteration) -> bool {
-        row.step <= SHORT
+        row.step <= SHORT_STEP
     }
 
     /// Damping of the next direction, after a step with such a curvature of the QP along it.
     pub fn damp(&mut self, row: &Iteration, curvature: f64) {
         if self.is_short(row) {
-            let by_curvature = curvature.max(0.0) * (Scalar::powf(row.step, ROOT) - 1.0);
-            self.failed = row.regularisation.max(LEAST);
-            self.damping = by_curvature.max(GROWTH * row.regularisation).clamp(LEAST, MOST);
-        } else if self.damping > LEAST {
-            self.damping = (RELIEF * self.damping).max(Scalar::sqrt(self.damping * self.failed));
-            self.failed *= FORGET;
+            let by_curvature = curvature.max(0.0) * (Scalar::powf(row.step, DAMPING_EXPONENT) - 1.0);
+            self.failed = row.regularisation.max(MIN_DAMPING);
+            self.damping =
+                by_curvature.max(DAMPING_FACTOR * row.regularisation).clamp(MIN_DAMPING, MAX_DAMPING);
+        } else if self.damping > MIN_DAMPING {
+            self.damping = (DAMPING_DECREASE * self.damping).max(Scalar::sqrt(self.damping * self.failed));
+            self.failed *= FAILED_DECREASE;
         } else {
             self.damping = 0.0;
         }

@@ -19,7 +19,7 @@ use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::{Next, State};
-use crate::ocp::nlp::ipm::violations::{PHASES, SMALL};
+use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
 use crate::qp::interior::{Sides, at};
@@ -28,11 +28,11 @@ use crate::scalar::{Real, Scalar};
 
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
 /// of the objective is small.
-const FORCE: f64 = 1e3;
+const PENALTY_SCALING: f64 = 1e3;
 /// Where violations are no more than this, a run begins with a monotone barrier parameter first.
-const FAR_OFF: f64 = 1e-2;
+const MONOTONE_FIRST_BELOW: f64 = 1e-2;
 /// A simulation is not far away if states move by no more than this times the gaps.
-const FAR: f64 = 100.0;
+const MAX_SIMULATED_DISTANCE: f64 = 100.0;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Goes on where no step makes progress: violations alone, then with a monotone barrier
@@ -50,19 +50,20 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 state.begin_monotone(&self.options);
                 return None;
             }
-            state.phase.count = PHASES;
+            state.phase.count = MAX_RESTORATION_PHASES;
             exit(ocp, state, penalties, &self.options);
             ocp.recall(&self.best);
             soften(ocp, state, (penalties, units), self.options.elastic_penalty);
             return None;
         }
         // Near a feasible point it is not violations that hinder a first attempt.
-        let is_violated = state.violation > if state.progress.adapts() { FAR_OFF } else { SMALL };
+        let is_violated =
+            state.violation > if state.progress.adapts() { MONOTONE_FIRST_BELOW } else { SMALL_VIOLATION };
         if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_enter() {
             if state.violation > state.best_violation {
                 ocp.recall(&self.best);
             }
-            if state.gaps >= SMALL && !P::Dynamics::LIFTED {
+            if state.gaps >= SMALL_VIOLATION && !P::Dynamics::LIFTED {
                 self.close_gaps(ocp, capacity);
             }
             let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
@@ -90,7 +91,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let Self { trial, work, .. } = self;
         let work = Work::new(ocp.ends(), capacity, work.as_mut());
         trial.copy_from(&ocp.iterate);
-        if ocp.simulate(trial, work.ends, work.units, FAR) {
+        if ocp.simulate(trial, work.ends, work.units, MAX_SIMULATED_DISTANCE) {
             ocp.iterate.copy_from(trial);
         }
     }
@@ -104,7 +105,7 @@ fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 ) {
     state.phase.force = Some(state.lengths.sizes.force);
     state.phase.count += 1;
-    state.lengths.sizes.force *= FORCE;
+    state.lengths.sizes.force *= PENALTY_SCALING;
     soften(ocp, state, given, 1.0);
     state.lengths.alone = true;
 }
