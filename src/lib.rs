@@ -110,7 +110,7 @@ pub mod options {
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub mod error {
-    pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started};
+    pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started, Unsettled};
 }
 
 /// Vectors and matrices of a model, and what is known about it before it runs.

@@ -117,6 +117,15 @@ pub enum Error {
         /// continuation of a solution.
         started: Option<Started>,
     },
+    /// Newton's method did not converge in a later step, and `∂f/∂z` becomes singular between the
+    /// start values of that step and where the iteration led to: the algebraic equations may have
+    /// lost their solution at a fold.
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+        /// Where the iteration ended.
+        at: Place,
+    },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
     /// integration starts, or Newton's method does not find them from the values of `set_start`.
     InconsistentStart {
@@ -160,6 +169,8 @@ pub enum Error {
         h: f64,
         /// Why the one before was refused.
         reason: Refusal,
+        /// Where Newton's method did not converge: what does not settle.
+        unsettled: Option<Unsettled>,
     },
     /// An adaptive integrator needs more steps than its options allow.
     TooManySteps {
@@ -191,7 +202,19 @@ pub enum Error {
         /// The end.
         end: f64,
     },
-    /// More events than are allowed: each comes sooner after the one before, or without end.
+    /// Events come sooner and sooner after each other, without end before a time (the paradox of
+    /// Zeno): from there on a ball that bounces lies on the ground.
+    AccumulatingEvents {
+        /// The time at which they accumulate, as far as the last three foretell it.
+        t: f64,
+        /// The function of the event.
+        function: &'static str,
+        /// Which event it is.
+        event: usize,
+        /// How many events happened.
+        events: usize,
+    },
+    /// More events than are allowed.
     TooManyEvents {
         /// The time that was reached.
         t: f64,
@@ -205,7 +228,13 @@ pub enum Error {
         /// Its time.
         t: f64,
     },
-    /// Second derivatives over an event need that nothing there depends on the time.
+    /// Second derivatives over an event of a function that looks at algebraic states.
+    GuardOfAlgebraicStates {
+        /// The function.
+        function: &'static str,
+    },
+    /// Second derivatives over an event need that nothing there depends on the time; first ones
+    /// over that of a function of algebraic states need it of the model.
     DependsOnTime {
         /// What does.
         function: &'static str,
@@ -271,6 +300,12 @@ pub enum Refusal {
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
+    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
+    /// equations meet there, and none is beyond (a fold).
+    SingularAlgebraic {
+        /// The algebraic state along which it does.
+        unknown: &'static str,
+    },
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
     /// The interval is shorter than the distance of the time from the next number.
@@ -302,6 +337,38 @@ pub struct Started {
     pub unknown: &'static str,
     /// Its start value.
     pub value: f64,
+}
+
+/// What does not settle where Newton's method converges in no step, however short.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// /// A load that grows, and the voltage that supplies it: `z = √(1 − x)`.
+/// #[dae(nominal(z = 1.0))]
+/// fn collapse(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - 1.0, z * z - 1.0 + x] }
+///
+/// let mut radau = Adaptive::<Collapse, Radau>::new(AdaptiveOptions::default())?;
+/// let error = radau.solve(&vector![0.0], &vector![], 2.0).unwrap_err();
+/// let Error::StepSizeUnderflow { t, unsettled: Some(unsettled), .. } = error else { panic!("{error}") };
+/// assert!((t - 1.0).abs() < 1e-6);
+/// assert_eq!((unsettled.equation, unsettled.unknown), (1, "z"));
+/// # Ok::<(), casados::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Unsettled {
+    /// The equation with the largest residual beside its terms, where the last iteration ended.
+    pub equation: usize,
+    /// This residual relative to the terms.
+    pub residual: f64,
+    /// The unknown that the last increment changed most beside its tolerance: the state whose
+    /// derivative it is, or the algebraic state.
+    pub unknown: &'static str,
+    /// The value of this state at the time that was reached.
+    pub value: f64,
+    /// Whether it is an algebraic state.
+    pub algebraic: bool,
 }
 
 /// Where in a run: all counted from zero.

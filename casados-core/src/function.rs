@@ -47,6 +47,17 @@ pub type ArrayV<F, T> = <<F as Function>::Shape as Shape>::ArrayV<T>;
 /// ```
 pub type VectorY<F, T> = <<F as Function>::Outputs as Outputs>::VectorY<T>;
 /// `SMatrix<T, NY, NY>` of a function.
+///
+/// ```
+/// # use casados::function::MatrixYY;
+/// # use casados::prelude::*;
+/// # /// A deviation of two outputs.
+/// # #[function]
+/// # fn deviation(x: [f64; 2], u: f64) -> [f64; 2] { [x[0], u] }
+/// // The weights of least squares: SMatrix<f64, 2, 2>.
+/// let weights: MatrixYY<Deviation, f64> = nalgebra::matrix![2.0, 0.5; 0.5, 1.0];
+/// assert_eq!(weights, weights.transpose());
+/// ```
 pub type MatrixYY<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYY<T>;
 /// `SMatrix<T, NY, NX>` of a function.
 ///

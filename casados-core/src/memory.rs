@@ -144,6 +144,22 @@ pub trait WithForward: Memory {
 }
 
 /// Memory with a place for `C` directions.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// # use casados::memory::WithDirectional;
+/// /// What a force does to the velocity in a second, as one direction.
+/// fn gain<W: WithDirectional<1>>(irk: &mut Irk<Cart, Gauss<2>, f64, W>) -> Result<f64, Error> {
+///     let seeds = Seeds { u: SMatrix::<f64, 1, 1>::identity(), ..Default::default() };
+///     Ok(irk.directional(&vector![0.0, 0.0], &vector![2.0], 1.0, &seeds)?.dx[1])
+/// }
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// assert!((gain(&mut irk)? - 1.0).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "this memory has no place for {C} directions",
     note = "use `Heap` or `Inline<mode::Directional<{C}>>`"

@@ -177,8 +177,43 @@ pub type MatrixXP<M, T> = <<M as Dae>::Shape as Shape>::MatrixXP<T>;
 /// ```
 pub type MatrixZX<M, T> = <<M as Dae>::Shape as Shape>::MatrixZX<T>;
 /// `SMatrix<T, NZ, NU>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixZU;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let by_force: MatrixZU<Spring, f64> = irk.forward(&x0, &u, h)?.dz0_du; // SMatrix<f64, 1, 1>
+/// // The force is that of the state at the start; stages are continued to there, to h²/3 here.
+/// assert!(by_force.amax() < 5e-3);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixZU<M, T> = <<M as Dae>::Shape as Shape>::MatrixZU<T>;
 /// `SMatrix<T, NZ, NP>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixZP;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let by_p: MatrixZP<Spring, f64> = irk.forward(&x0, &u, h)?.dz0_dp; // SMatrix<f64, 1, 2>
+/// assert!((by_p - SMatrix::<f64, 1, 2>::new(1.0, 0.0)).amax() < 0.01); // z₀ = p[0] x[0] + p[1] x[1]
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixZP<M, T> = <<M as Dae>::Shape as Shape>::MatrixZP<T>;
 /// `SMatrix<T, NU, NU>` of a model.
 ///
@@ -201,16 +236,126 @@ pub type MatrixZP<M, T> = <<M as Dae>::Shape as Shape>::MatrixZP<T>;
 /// ```
 pub type MatrixUU<M, T> = <<M as Dae>::Shape as Shape>::MatrixUU<T>;
 /// `SMatrix<T, NU, NP>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixUP;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let lambda = vector![1.0, 0.0];
+/// let h_up: MatrixUP<Spring, f64> = irk.hessian(&x0, &u, h, &lambda)?.h_up; // SMatrix<f64, 1, 2>
+/// assert!(h_up.amax() < h.powi(3)); // a stiffer spring takes little from what the force does
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixUP<M, T> = <<M as Dae>::Shape as Shape>::MatrixUP<T>;
 /// `SMatrix<T, NP, NP>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixPP;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let lambda = vector![1.0, 0.0];
+/// let h_pp: MatrixPP<Spring, f64> = irk.hessian(&x0, &u, h, &lambda)?.h_pp; // SMatrix<f64, 2, 2>
+/// assert!((h_pp - h_pp.transpose()).amax() < 1e-15);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixPP<M, T> = <<M as Dae>::Shape as Shape>::MatrixPP<T>;
 /// `SMatrix<T, NX, C>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixXC;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let seeds = Seeds { x0: SMatrix::<f64, 2, 1>::new(0.0, 1.0), ..Default::default() };
+/// let dx: MatrixXC<Spring, f64, 1> = irk.directional(&x0, &u, h, &seeds)?.dx; // SMatrix<f64, 2, 1>
+/// assert!((dx[0] - h).abs() < 2e-3); // a velocity moves it for a tenth of a second
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixXC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixXC<T, C>;
 /// `SMatrix<T, NZ, C>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixZC;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let seeds = Seeds { x0: SMatrix::<f64, 2, 1>::new(1.0, 0.0), ..Default::default() };
+/// let dz: MatrixZC<Spring, f64, 1> = irk.directional(&x0, &u, h, &seeds)?.dz0; // SMatrix<f64, 1, 1>
+/// assert!((dz[0] - 4.0).abs() < 0.05); // the stiffness
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixZC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixZC<T, C>;
 /// `SMatrix<T, NU, C>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixUC;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let force: MatrixUC<Spring, f64, 1> = vector![1.0]; // SMatrix<f64, 1, 1>
+/// let seeds = Seeds { u: force, ..Default::default() };
+/// let dx = irk.directional(&x0, &u, h, &seeds)?.dx;
+/// assert!((dx - vector![0.5 * h * h, h]).amax() < 2e-3);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixUC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixUC<T, C>;
 /// `SMatrix<T, NP, C>` of a model.
+///
+/// ```
+/// # use casados::model::MatrixPC;
+/// # use casados::prelude::*;
+/// # use nalgebra::{SMatrix, vector};
+/// # /// An oscillator with a force z: two states, one control, two parameters.
+/// # #[dae]
+/// # fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
+/// #     [xdot[0] - x[1], xdot[1] + z - u, z - p[0] * x[0] - p[1] * x[1]]
+/// # }
+/// # let mut irk = Irk::<Spring, Gauss<2>>::new(Options::default())?;
+/// # irk.set_parameters(&vector![4.0, 0.1])?;
+/// # let (x0, u, h) = (vector![1.0, 0.0], vector![0.5], 0.1);
+/// let stiffer: MatrixPC<Spring, f64, 1> = vector![1.0, 0.0]; // SMatrix<f64, 2, 1>
+/// let seeds = Seeds { p: stiffer, ..Default::default() };
+/// let dx = irk.directional(&x0, &u, h, &seeds)?.dx;
+/// assert!((dx - vector![-0.5 * h * h, -h]).amax() < 5e-3); // as by `dx_dp`
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type MatrixPC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixPC<T, C>;
 
 /// A differential-algebraic equation with its derivatives: written by `#[dae]` and `#[ode]`.

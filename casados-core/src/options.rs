@@ -33,15 +33,17 @@ const MOST_ITERATIONS: usize = 10_000;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Steps of equal size in one interval, at least one.
+    /// Steps of equal size in one interval, at least one. Default 1.
     pub steps: usize,
     /// How the stages of an implicit method are solved; explicit methods do not read it.
+    /// Default: those of [`Newton`].
     pub newton: Newton,
-    /// Where Newton's method starts.
+    /// Where Newton's method starts. Default [`Start::Nominal`].
     pub start: Start,
     /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's
     /// summation), and implicit methods compute the sums of their stages with twice the digits: for
     /// thousands of steps in one interval, where rounding errors of `x` would add up.
+    /// Default false.
     pub compensated: bool,
 }
 
@@ -74,9 +76,10 @@ pub struct Newton {
     /// 10000; 50 by default.
     pub max_iterations: usize,
     /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
+    /// Default [`Jacobian::Auto`].
     pub jacobian: Jacobian,
     /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run
-    /// time in every call.
+    /// time in every call. Default `None`: as many as the tolerance asks for.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -108,7 +111,9 @@ pub enum Jacobian {
     Simplified,
     /// Evaluated and factorised in every iteration.
     Full,
-    /// Evaluated and factorised once in each step, at the start values.
+    /// Evaluated and factorised once in each step, at the start values; once more only where
+    /// increments do not shrink to half of the last one. (With a fixed number of iterations this is
+    /// not asked.)
     Frozen,
 }
 

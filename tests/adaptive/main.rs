@@ -2,6 +2,7 @@
 //! piecewise constant controls.
 
 mod consistent;
+mod convergence;
 mod events;
 mod gauss;
 mod piecewise;

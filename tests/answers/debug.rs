@@ -43,7 +43,7 @@ fn of_integrators() -> Vec<Error> {
     let started = Started { unknown: "z", value: 0.5 };
     let input = |argument, name| Error::NonFiniteInput { argument, index: 1, name, value: f64::NAN };
     let model = |quantity| Error::NonFiniteModel { quantity, equation: 1, value: f64::NAN, at };
-    let underflow = |reason| Error::StepSizeUnderflow { t: 1.0, h: 1e-15, reason };
+    let underflow = |reason| Error::StepSizeUnderflow { t: 1.0, h: 1e-15, reason, unsettled: None };
     let not_converged = |started| Error::NotConverged {
         residual: 1.0,
         equation: 0,

@@ -285,6 +285,23 @@ fn absurd_sizes() {
     }
 }
 
+#[ode]
+fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[1], u]
+}
+
+/// Of functions for CasADi patterns are made before anybody calls them.
+#[test]
+fn exported_horizons_of_absurd_sizes() {
+    type Exported = casados::casadi::Horizons<Batch<Cart, Gauss<2>>>;
+    for intervals in [usize::MAX, usize::MAX / 64, 1 << 58] {
+        let failure = Exported::new(casados::casadi::Settings::new(0.1), intervals).err();
+        let said = failure.map_or(String::new(), |failure| failure.0);
+        assert!(said.ends_with("bytes of memory could not be allocated"), "{intervals}: {said}");
+    }
+    assert!(Exported::new(casados::casadi::Settings::new(0.1), 3).is_ok());
+}
+
 /// Functions of what does not exist where they are evaluated.
 #[test]
 fn what_does_not_exist() {

@@ -5,6 +5,7 @@ mod models {
     pub mod ivp;
 }
 
+mod algebraic;
 mod ends;
 mod explicit;
 mod far_below;

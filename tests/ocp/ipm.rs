@@ -223,8 +223,7 @@ fn distance(x: [f64; 5], _u: [f64; 2]) -> f64 {
 const FASTEST: f64 = 2.826135876986;
 
 fn race(end: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, OcpError> {
-    let erk = Erk::<Car, Rk4>::new(Options::default())
-        .map_err(|error| OcpError::Integration { interval: 0, error })?;
+    let erk = Erk::<Car, Rk4>::new(Options::default())?;
     let problem = Problem::new(erk)
         .terminal_cost(GeneralCost::<Duration>::new())
         .path_constraints(Constraint::<Distance>::new([1.0], [f64::INFINITY]));

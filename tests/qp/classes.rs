@@ -79,7 +79,9 @@ fn wrong(known: &Known, found: &HeapSolution<f64>, tolerance: f64) -> Option<Str
     let largest = judged[..4].iter().fold(0.0, |largest: f64, &r| largest.max(r));
     // Sums of some tens of terms as large as the numbers of the point, or 10, in another order.
     let size = numbers(found).fold(10.0, |size: f64, number| size.max(number.abs()));
-    if judged.iter().any(|r| !r.is_finite()) || largest > tolerance + 32.0 * f64::EPSILON * size {
+    // Where numbers are above 32 the tolerance is meant in units.
+    let allowed = tolerance * (size / 32.0).max(1.0) + 32.0 * f64::EPSILON * size;
+    if judged.iter().any(|r| !r.is_finite()) || largest > allowed {
         return Some(format!("{r}, of numbers up to {size:.1e}"));
     }
     let (_, expected) = residuals(known.qp.view(), &known.solution);

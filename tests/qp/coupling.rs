@@ -19,7 +19,7 @@ impl Numbers {
 
 /// Strictly convex, with bounds of controls and of a general constraint, some of them active. The
 /// first state is given by two problems of three that have no periodic states.
-fn problem(seed: u64, stages: usize) -> Result<HeapQp<f64>, QpError> {
+pub fn problem(seed: u64, stages: usize) -> Result<HeapQp<f64>, QpError> {
     let mut random = Numbers(seed);
     let [nx, nu] = [4, 3];
     let mut dims = vec![StageDims::new(nx, nu, 1); stages];
@@ -49,20 +49,27 @@ fn problem(seed: u64, stages: usize) -> Result<HeapQp<f64>, QpError> {
             stage.g_bounds_mut().soften(0, 2.0, 0.5);
         }
     }
+    if seed % 8 == 1 && !seed.is_multiple_of(3) {
+        qp.fix_initial_state(&[0.5, -0.3, 0.2, 0.1])?;
+    }
+    couple(seed, &mut qp);
+    assert!(qp.view().is_coupled() || seed % 8 == 1);
+    Ok(qp)
+}
+
+/// Makes states periodic, unless the first one may be given, and shares controls.
+pub fn couple(seed: u64, qp: &mut HeapQp<f64>) {
+    let [nx, nu] = [4, 3];
     let marks = seed % 8;
     let periodic = 1 + (seed / 8) as usize % nx;
     if marks != 1 {
         for i in 0..periodic {
             assert!(qp.make_periodic(i));
         }
-    } else if !seed.is_multiple_of(3) {
-        qp.fix_initial_state(&[0.5, -0.3, 0.2, 0.1])?;
     }
     for j in (0..nu).filter(|j| marks & (1 << j) > 0) {
         assert!(qp.share(j));
     }
-    assert!(qp.view().is_coupled() || marks == 1);
-    Ok(qp)
 }
 
 /// Both find the same minimum. Products of slacks and multipliers of 1e-9, of at most 200 sides,

@@ -13,6 +13,7 @@ mod errors;
 mod hard;
 mod known;
 mod random;
+mod units;
 mod unstable;
 
 use casados::qp::{

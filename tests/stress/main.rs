@@ -42,6 +42,7 @@ mod failures;
 mod identities;
 mod jumps;
 mod precision;
+mod roots;
 mod scaling;
 mod sensitivities;
 mod starts;

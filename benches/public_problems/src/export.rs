@@ -13,7 +13,7 @@ fn named() -> Result<Box<dyn Program>, Box<dyn std::error::Error>> {
     entry.ok_or_else(|| format!("no problem is called {name}"))?.program()
 }
 
-static LIBRARY: Library<Problems> = Library::new(|| Problems::new(named));
+static LIBRARY: Library<Problems> = Library::new(|| Ok(Problems::new(named)));
 casados_core::__casadi_function!(LIBRARY, 0, "", nlp, "");
 casados_core::__casadi_function!(LIBRARY, 1, "", nlp, "_f");
 casados_core::__casadi_function!(LIBRARY, 2, "", nlp, "_g");

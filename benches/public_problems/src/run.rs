@@ -1,9 +1,7 @@
 //! One problem, one solver, timed.
 
 use crate::Failure;
-use casados::ocp::{
-    Formulation, HeapIpm, HeapOcp, HeapSqp, Iteration, Outcome, SecondOrder,
-};
+use casados::ocp::{Formulation, HeapIpm, HeapOcp, HeapSqp, Iteration, Outcome, SecondOrder};
 use cpu_time::ThreadTime;
 use std::ops::ControlFlow;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! The sets: problems of public collections, the twenty of `examples/models/ocps`, their variations.
+//! The sets: public problems, the twenty of `examples/models/ocps`, and variations of these.
 
 use crate::ocps::{self, Failure, Grid};
 use crate::variations::{GIVEN, VARIATIONS, Variation};
@@ -16,7 +16,7 @@ where
 {
     let name = format!("{name}{}", variation.name);
     let source = "examples/models/ocps";
-    let facts = Facts { name, source, published: None, tolerance: 0.0, tags: &["tuned on"] };
+    let facts = Facts { name, source, published: None, precision: 0.0, tags: &["tuned on"] };
     Entry::new(facts, move || {
         let mut ocp = make(variation.grid)?;
         variation.apply(&mut ocp)?;

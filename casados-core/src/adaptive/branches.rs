@@ -7,15 +7,15 @@ use bytemuck::Zeroable;
 
 /// Why the shape of a defect is looked at, the strongest reason last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Look {
+pub enum DefectCheck {
     /// Its size is unusual.
-    Unusual,
+    Suspicious,
     /// The step is watched, whatever its size is.
-    Watched,
+    AfterRejection,
     /// A spline changes its piece: no lower derivative jumps than its highest.
-    Knot,
+    SplineKnot,
     /// The model changes its branch: the step is rough, whatever its shape is.
-    Branch,
+    Switch,
 }
 
 /// A number of the conditions and linear tables of a model, and one of its splines.
@@ -36,11 +36,11 @@ impl Branches {
     }
 
     /// How a step is to be looked at that has both.
-    pub fn change(self, other: Self) -> Option<Look> {
+    pub fn change(self, other: Self) -> Option<DefectCheck> {
         if self.kinks != other.kinks {
-            Some(Look::Branch)
+            Some(DefectCheck::Switch)
         } else {
-            (self.knots != other.knots).then_some(Look::Knot)
+            (self.knots != other.knots).then_some(DefectCheck::SplineKnot)
         }
     }
 }

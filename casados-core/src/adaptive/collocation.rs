@@ -14,14 +14,14 @@ mod rate;
 mod roughness;
 mod scheme;
 
-use super::branches::{Branches, Look};
-use super::control::LENIENT;
+use super::branches::{Branches, DefectCheck};
+use super::control::ORDER_REDUCTION_RATIO;
 use super::defect_filter::{DefectFilter, RelativeErrors};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
-use super::levels::weighted;
 use super::norm::{FEW, mean, norm};
+use super::orders::weighted;
 use super::point::variable;
-use super::stages::{Convergence, Failure, FilteredDefect, MOST, Sides, Stages, Start};
+use super::stages::{Convergence, Culprit, Failure, FilteredDefect, MOST, Sides, Stages, StepContext};
 use crate::error::Error;
 use crate::finite::not_finite;
 use crate::irk::dot;
@@ -29,7 +29,7 @@ use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispat
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
-use crate::shape::{Plain, Shape};
+use crate::shape::{Array, Plain, Shape};
 use crate::tableau::Tableau;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -40,7 +40,7 @@ use points::{combine, evaluate_polynomial, last_stage, take};
 use scheme::Scheme;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
-const UNDOUBTED: f64 = 0.25;
+const SAFE_ESTIMATE: f64 = 0.25;
 
 /// Memory of a step.
 #[derive(Zeroable)]
@@ -94,6 +94,48 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         self.memory.factors.set_pivoted(pivoted);
     }
 
+    fn factors_hold(&self, start: &StepContext<'_, M, T>) -> bool {
+        let factors = &self.memory.factors;
+        if !factors.are_planned() {
+            return true;
+        }
+        let units = ArrayK::<M, T>::from_fn(|unknown| {
+            let unit = T::ONE / start.scale[unknown];
+            if unknown < M::Shape::NX { unit / start.h.abs() } else { unit }
+        });
+        let error = factors.backward_error(&units);
+        error * error <= T::EPSILON
+    }
+
+    fn culprit(&self, start: &StepContext<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit {
+        let Memory { rows, f, .. } = &*self.memory;
+        let (mut culprit, mut largest, nx) = (Culprit::default(), 0.0, M::Shape::NX);
+        for (unknown, ([[row]], scale)) in rows.as_ref().iter().zip(start.scale.as_ref()).enumerate() {
+            let unit = if unknown < nx { start.h.abs() * *scale } else { *scale };
+            let increment = row.parts.iter().fold(0.0f64, |most, part| most.max(part.abs().to_f64()));
+            // Written so that the first one that is not finite counts.
+            let increment = increment * unit.to_f64();
+            if increment > largest || increment.is_nan() && largest < f64::INFINITY {
+                largest = if increment.is_nan() { f64::INFINITY } else { increment };
+                culprit.unknown = unknown;
+            }
+        }
+        let mut terms: ArrayK<M, T> = Zeroable::zeroed();
+        for (entry, value) in jacobian.as_ref().iter().enumerate() {
+            let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
+            terms[equation] = terms[equation] + (*value * start.point[variable]).abs();
+        }
+        for (equation, terms) in terms.as_ref().iter().enumerate() {
+            let all = f.iter().flat_map(|group| &group[equation]);
+            let residual = all.fold(0.0f64, |most, f| most.max(f.abs().to_f64()));
+            let relative = residual / (residual + terms.to_f64());
+            if relative > culprit.residual {
+                (culprit.equation, culprit.residual) = (equation, relative);
+            }
+        }
+        culprit
+    }
+
     fn begin(&mut self, point: &ArrayV<M, T>) {
         let nx = M::Shape::NX;
         let (xdot, z) = (&point.as_ref()[..nx], &point.as_ref()[2 * nx..]);
@@ -108,7 +150,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
     }
 
-    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>) {
+    fn predict(&self, start: &StepContext<'_, M, T>, middle: &mut ArrayV<M, T>) {
         let (nx, stage) = (M::Shape::NX, S / 2);
         *middle = *start.point;
         let to = middle.as_mut();
@@ -139,7 +181,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn solve(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         tolerance: f64,
         convergence: &mut Convergence,
         residuals: &mut usize,
@@ -187,7 +229,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         Err(Failure::Diverges)
     }
 
-    fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
+    fn estimates(&self, start: &StepContext<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
         *point = *start.point;
         if !self.scheme.stiffly_accurate {
             self.extrapolate(start.h, point);
@@ -237,7 +279,12 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
     }
 
-    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+    fn error(
+        &mut self,
+        start: &StepContext<'_, M, T>,
+        again: bool,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
         let mut point = ArrayV::<M, T>::zeroed();
         let at_end = self.estimates(start, &mut point);
         self.memory.point = point;
@@ -257,7 +304,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
         // What the model is on the other side of a border says nothing of this one.
         let branches = Branches::of::<M, T>(start.point);
-        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(Look::Branch) {
+        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(DefectCheck::Switch) {
             return Ok(error);
         }
         self.estimate(start, at_end, residuals)
@@ -265,15 +312,15 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
 
     fn roughness(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         growth: f64,
-        look: Look,
+        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, look, residuals)
+        self.roughness(start, growth, check, residuals)
     }
 
-    fn change(&mut self, start: &Start<'_, M, T>) -> Option<Look> {
+    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck> {
         self.change(start)
     }
 

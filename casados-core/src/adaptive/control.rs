@@ -4,13 +4,13 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use super::branches::Look;
+use super::branches::DefectCheck;
 use crate::scalar::{Real, Scalar};
 
 /// Where the first estimate is asked for this much less than the solution, or even less, its
 /// tolerance says nothing of components that lose their order; where it is asked for about as much,
 /// it says all, and the second one fades out.
-pub(super) const LENIENT: f64 = 4.0;
+pub(super) const ORDER_REDUCTION_RATIO: f64 = 4.0;
 
 /// A step of an implicit method is this much shorter than the one that would just be accepted,
 const SAFETY: f64 = 0.9;
@@ -21,11 +21,11 @@ const GROW: f64 = 8.0;
 
 /// What is remembered of the last accepted step.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Predictive {
+pub struct GustafssonController {
     last: Option<(f64, f64)>,
 }
 
-impl Predictive {
+impl GustafssonController {
     /// The factor for the step size after a step of size `h` with the estimated error `error`,
     /// relative to the tolerance, that behaves like `h^(1/exponent)`. `effort` is one, or less if
     /// the step took many iterations.
@@ -52,12 +52,12 @@ impl Predictive {
 /// The errors of the last two accepted steps with this number of stages, from which that of the
 /// next one is foreseen: of a smooth solution an estimate of order `s` behaves like `h^(s+1)`.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Trend {
+pub struct ErrorHistory {
     /// Lengths and errors, the last one first.
     last: [Option<(f64, f64)>; 2],
 }
 
-impl Trend {
+impl ErrorHistory {
     /// The error that is foreseen grows by this factor at most from step to step: what stands out
     /// tells of a jump, not of the steps that follow.
     const STEEP: f64 = 20.0;
@@ -90,10 +90,10 @@ impl Trend {
     }
 }
 
-/// Refusals of rough steps from one point. The error of a jump falls with the step size at least;
-/// what does not fall are rounding errors, which are rough too.
+/// RejectionHistory of rough steps from one point. The error of a jump falls with the step size at
+/// least; what does not fall are rounding errors, which are rough too.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Roughness {
+pub struct DiscontinuityDetector {
     /// The length and the error of the step that was refused last.
     last: Option<(f64, f64)>,
     /// How often the error did not fall.
@@ -102,9 +102,9 @@ pub struct Roughness {
     noise: f64,
 }
 
-impl Roughness {
+impl DiscontinuityDetector {
     /// So often an error may stay: a jump is elsewhere in the next step.
-    const KEPT: usize = 3;
+    const STAGNATIONS: usize = 3;
 
     /// Whether an error may be that of a jump.
     pub fn may_be(&self, error: f64) -> bool {
@@ -122,7 +122,7 @@ impl Roughness {
         {
             self.kept += 1;
         }
-        if self.kept >= Self::KEPT {
+        if self.kept >= Self::STAGNATIONS {
             self.noise = 2.0 * error;
             self.accepted();
             return false;
@@ -140,46 +140,91 @@ impl Roughness {
 /// Where steps are refused by much again and again the solution is not smooth: methods have no
 /// higher order than their estimates there.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Refusals {
+pub struct RejectionHistory {
     /// Those by much count twice, and accepted steps take one away.
     count: usize,
     /// So many steps more are looked at whatever their estimates are.
-    watched: usize,
+    after_rejection: usize,
 }
 
 /// An error that is refused by much.
-const MUCH: f64 = 8.0;
+const STRONG_REJECTION: f64 = 8.0;
 
-impl Refusals {
+impl RejectionHistory {
     /// Where so much is left, as after refusals of two steps one after the other, the solution is
     /// not smooth.
-    const NOT_SMOOTH: usize = 3;
+    const NONSMOOTH_COUNT: usize = 3;
     /// So many steps after a refusal by much are watched: those that become shorter until an
     /// estimate is small by chance, and those that become longer behind a jump.
-    const WATCHED: usize = 10;
+    const STEPS_AFTER_REJECTION: usize = 10;
 
     /// How often an estimate counts that is asked for this much less than the solution.
-    pub fn weight(&self, finer: f64) -> f64 {
-        if self.count >= Self::NOT_SMOOTH { (finer / LENIENT).max(1.0) } else { 1.0 }
+    pub fn weight(&self, tolerance_ratio: f64) -> f64 {
+        if self.count >= Self::NONSMOOTH_COUNT {
+            (tolerance_ratio / ORDER_REDUCTION_RATIO).max(1.0)
+        } else {
+            1.0
+        }
     }
 
     /// A step with this error was refused.
     pub fn refused(&mut self, error: f64) {
-        if error >= MUCH {
-            self.count = (self.count + 2).min(2 * Self::NOT_SMOOTH);
-            self.watched = Self::WATCHED;
+        if error >= STRONG_REJECTION {
+            self.count = (self.count + 2).min(2 * Self::NONSMOOTH_COUNT);
+            self.after_rejection = Self::STEPS_AFTER_REJECTION;
         }
     }
 
     /// Whether a small estimate is to be doubted.
-    pub fn is_watched(&self) -> bool {
-        self.watched > 0
+    pub fn is_after_rejection(&self) -> bool {
+        self.after_rejection > 0
     }
 
     /// A step was accepted.
     pub fn accepted(&mut self) {
         self.count = self.count.saturating_sub(1);
-        self.watched = self.watched.saturating_sub(1);
+        self.after_rejection = self.after_rejection.saturating_sub(1);
+    }
+}
+
+/// Rounding errors of the model in the difference of an explicit pair: of shorter steps from one
+/// point that of a smooth solution falls like a high power of the length, rounding errors fall like
+/// the length. They are of any sign from step to step, and do not add up like errors that nothing
+/// damps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RoundingNoise {
+    /// The largest that was seen, over the length of the step.
+    per_length: f64,
+    /// The length and the difference of the first step from here that was refused.
+    refused: Option<(f64, f64)>,
+}
+
+impl RoundingNoise {
+    /// A step is this much shorter before it is compared with the one that was refused.
+    const SHORTER: f64 = 0.8;
+
+    /// The error of a difference of which the smooth part counts so often, and rounding errors
+    /// once.
+    pub fn error(&self, h: f64, difference: f64, count: f64) -> f64 {
+        let noise = (2.0 * self.per_length * h).min(difference);
+        noise + count * (difference - noise)
+    }
+
+    /// A step from the same point as the last one, unless that was accepted; both may be refused.
+    pub fn attempted(&mut self, h: f64, difference: f64, accepted: bool) {
+        let is_small = difference <= 1.0;
+        if let Some((before, larger)) = self.refused
+            && is_small
+            && h <= Self::SHORTER * before
+            && difference * before * before >= larger * h * h
+        {
+            self.per_length = self.per_length.max(difference / h);
+        }
+        self.refused = match self.refused {
+            _ if accepted => None,
+            None if is_small => Some((h, difference)),
+            refused => refused,
+        };
     }
 }
 
@@ -205,7 +250,7 @@ pub struct Control {
 /// Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods,
 /// ACM Trans. Math. Softw. 17 (1991)).
 #[derive(Clone, Copy, Debug)]
-pub struct Proportional {
+pub struct PiController {
     control: Control,
     /// The length of the last accepted step, and its error.
     last: (f64, f64),
@@ -222,7 +267,7 @@ pub struct ExplicitStep {
     /// its length,
     pub h: f64,
     /// and how it changes the branches of the model, if it does.
-    pub change: Option<Look>,
+    pub change: Option<DefectCheck>,
 }
 
 impl ExplicitStep {
@@ -233,7 +278,7 @@ impl ExplicitStep {
     }
 }
 
-impl Proportional {
+impl PiController {
     /// Where a force jumps between two stages, or its slope, the error of a step is up to so many
     /// times the difference of the two methods, whose weights cancel there.
     const OVER_DIFFERENCE: f64 = 8.0;
@@ -249,12 +294,12 @@ impl Proportional {
     /// over a jump one has a small difference by chance, and would be accepted.
     pub fn error_of_difference<T: Real>(&mut self, step: ExplicitStep, difference: f64) -> f64 {
         let is_over_jump = step.t < self.refused_to;
-        if difference >= MUCH {
+        if difference >= STRONG_REJECTION {
             self.refused_to = self.refused_to.max(step.t + step.h);
         }
         let count = match step.change {
             _ if !step.is_above_rounding::<T>(1.0) => 1.0,
-            Some(Look::Branch) => Self::OVER_BRANCH,
+            Some(DefectCheck::Switch) => Self::OVER_BRANCH,
             None if !is_over_jump => 1.0,
             _ => Self::OVER_DIFFERENCE,
         };
@@ -269,7 +314,7 @@ impl Proportional {
         let present = power(error, exponent - 0.75 * memory);
         if error > 1.0 {
             let over_branch = (0.9 / Scalar::cbrt(error)).clamp(0.1, 0.9);
-            let is_over_branch = step.change == Some(Look::Branch);
+            let is_over_branch = step.change == Some(DefectCheck::Switch);
             return if is_over_branch && step.is_above_rounding::<T>(over_branch) {
                 over_branch
             } else {

@@ -25,7 +25,7 @@
 //! solve with the factors that Newton's method has gives it. The same solve gives `r(z)/z²`: of an
 //! oscillation it points against the error, of a decay along it.
 
-use super::control::{LENIENT, power};
+use super::control::{ORDER_REDUCTION_RATIO, power};
 use crate::linalg::{Complex, PARTS};
 use crate::scalar::Scalar;
 
@@ -113,12 +113,12 @@ impl DefectFilter {
     }
 
     /// The estimate of lower order or, if that is larger, the power of this one that behaves like
-    /// it; the tolerance that was asked for is `finer` than that of the first as a factor.
-    pub fn larger(&self, first: f64, finer: f64, relative: &RelativeErrors) -> f64 {
+    /// it; the tolerance of the first is `tolerance_ratio` times the one that was asked for.
+    pub fn larger(&self, first: f64, tolerance_ratio: f64, relative: &RelativeErrors) -> f64 {
         let RelativeErrors { square, product, divided_square, count } = *relative;
         // The square of the cosine between them, where they point against each other.
         let against = if product < 0.0 { product / square * (product / divided_square) } else { 0.0 };
-        let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);
+        let needed = Scalar::powi((tolerance_ratio / ORDER_REDUCTION_RATIO).min(1.0), 4);
         let kept = KEPT[0] + (KEPT[1] - KEPT[0]) * needed;
         let share = needed * (DAMPED + (kept - DAMPED) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);

@@ -1,13 +1,13 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::control::{ExplicitStep, Proportional};
+use super::control::{ExplicitStep, PiController, RoundingNoise};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
 use super::point::At;
-use super::replay::{Replay, Taken};
-use super::run::{Accepted, After, Base, Run, Span};
+use super::replay::{AcceptedStep, StepDifferentiator};
+use super::run::{Accepted, After, Run, Span, Workspace};
 use super::sealed::{Engine, Kind};
 use super::start::first_length;
 use super::tape::Entry;
@@ -53,7 +53,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
     }
 
     /// At the start of a step.
-    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+    fn go(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
         let erk = self.erk()?;
         if M::Shape::NP > 0 {
             erk.set_parameters(step.at.p)?;
@@ -63,10 +63,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T, S> {
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
@@ -74,7 +74,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
 
     fn forward(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
@@ -82,7 +82,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
 
     fn hessian(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -91,7 +91,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
 
     fn adjoint(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -128,7 +128,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
         let nx = M::Shape::NX;
         let step = self.open()?;
         step.go(run.base.point.as_ref(), x0.as_slice());
-        let result = walk::<M, B, T, S>(step, run, span, after);
+        let result = integrate_steps::<M, B, T, S>(step, run, span, after);
         run.statistics.residuals += step.count();
         run.base.point.as_mut()[nx..2 * nx].copy_from_slice(match &result {
             Ok(end) => end.as_slice(),
@@ -141,7 +141,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
 }
 
 /// The steps of an interval; the state at its end.
-fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
     span: Span<T>,
@@ -158,7 +158,8 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
     let mut t = span.start;
     let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
-    let mut controller = Proportional::new(B::CONTROL);
+    let mut controller = PiController::new(B::CONTROL);
+    let mut noise = RoundingNoise::default();
     let mut refusal = Refusal::Error;
     let (mut rejected, mut tried) = (false, 0);
     loop {
@@ -171,7 +172,8 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let error = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
+        let (difference, count) = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
+        let error = noise.error(h.to_f64().abs(), difference, count);
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -183,6 +185,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
         let error = controller.error_of_difference::<T>(tried_step, error);
         let factor = controller.factor::<T>(tried_step, error);
+        noise.attempted(tried_step.h, difference, error <= 1.0);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
@@ -222,7 +225,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
 }
 
 /// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
-/// of derivatives too if they take part; NaN if there is none.
+/// of derivatives too if they take part, and how often it counts; NaN if there is none.
 fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
@@ -230,22 +233,25 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     t: T,
     h: T,
     steps: f64,
-) -> f64 {
+) -> (f64, f64) {
     let error = step.take(t, h).and_then(|()| {
         let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
         step.error(t, h, steps, rtol, atol)
     });
-    let error = error.unwrap_or(f64::NAN);
+    let (error, count) = error.unwrap_or((f64::NAN, 1.0));
     match &mut run.sensitivities {
-        Some(sensitivities) if error <= 1.0 => {
-            let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
-            let taken = Taken { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
+        Some(sensitivities) if error * count <= 1.0 => {
+            let Workspace { point, u, parameters, rtol, atol, .. } = &*run.base;
+            let taken = AcceptedStep { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
             let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
             let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
             // Written so that NaN stays.
-            other.map_or(f64::NAN, |other| if error >= other { error } else { other })
+            match other {
+                Ok(other) if error * count >= other => (error, count),
+                other => (other.unwrap_or(f64::NAN), 1.0),
+            }
         }
-        _ => error,
+        _ => (error, count),
     }
 }
 

@@ -1,6 +1,6 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
-use super::branches::{Branches, Look};
+use super::branches::{Branches, DefectCheck};
 use super::norm::norm;
 use super::pairs::Pair;
 use crate::erk::{Grid, Own, Point, Record, Scheme};
@@ -51,14 +51,15 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated, where the interval has so many steps; the
-    /// derivative at the end is there if that is at most one.
+    /// The difference of the two methods relative to what is tolerated, and how often it counts
+    /// where the interval has so many steps; the derivative at the end is there if it is at most
+    /// one.
     ///
     /// # Errors
     /// A value that is not finite.
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<(f64, f64), Error>;
     /// How the step that was taken changes the branches of the model, if it does.
-    fn change(&self) -> Option<Look>;
+    fn change(&self) -> Option<DefectCheck>;
     /// The state at the end.
     fn end(&self) -> &[T];
     /// The end is the next start.
@@ -79,7 +80,7 @@ pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<Memory<M, T, S>>,
     /// How the step that was taken changes the branches of the model, if it does.
-    change: Option<Look>,
+    change: Option<DefectCheck>,
     /// Steps at the bound of stability less those that are not.
     at_bound: i64,
     method: PhantomData<fn() -> B>,
@@ -116,19 +117,20 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     /// How often an error counts in an interval of so many steps: once where the Jacobian takes it
-    /// back, as where it is damped, and by [`Pair::PERSISTENCE`] where it turns it or lets it grow.
-    /// The last stage `Y` is at the end, as the step is; of the difference `d` of the two and `J d`
-    /// the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of stability, or not
-    /// (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.2).
-    fn persistence(&mut self, steps: f64) -> f64 {
-        let count = B::PERSISTENCE.count(steps);
+    /// back, as where it is damped, and by [`Pair::GLOBAL_ERROR_FACTOR`] where it turns it or lets
+    /// it grow. The last stage `Y` is at the end, as the step is; of the difference `d` of the two
+    /// and `J d` the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of
+    /// stability, or not (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section
+    /// IV.2).
+    fn global_error_factor(&mut self, steps: f64) -> f64 {
+        let count = B::GLOBAL_ERROR_FACTOR.count(steps);
         if count <= 1.0 {
             return 1.0;
         }
         let Memory { record, end_slope, difference, scale, .. } = &mut *self.memory;
         let Some(last) = record.k.last() else { return 1.0 };
         difference.as_mut().fill(T::ZERO);
-        combine(&B::LAST, &record.k, difference.as_mut());
+        combine(&B::FSAL_DIFFERENCE, &record.k, difference.as_mut());
         let (mut along, mut distances, mut changes) = (T::ZERO, T::ZERO, T::ZERO);
         let slopes = end_slope.as_ref().iter().zip(last.as_ref());
         for ((distance, (end, last)), scale) in difference.as_ref().iter().zip(slopes).zip(scale.as_ref()) {
@@ -138,7 +140,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
             changes = changes + change * change;
         }
         // Scales have the factor `h`, and so have the changes.
-        let is_at_bound = changes.to_f64() > B::STABLE * B::STABLE * distances.to_f64();
+        let is_at_bound = changes.to_f64() > B::STABILITY_BOUND * B::STABILITY_BOUND * distances.to_f64();
         self.at_bound += if is_at_bound { 1 } else { -1 };
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
         let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
@@ -196,7 +198,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Ok(())
     }
 
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<(f64, f64), Error> {
         let (stages, last) = B::DIFFERENCE;
         if last != 0.0 {
             self.arrive(t, h)?;
@@ -217,19 +219,19 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
             norm(difference.as_ref(), scale.as_ref())
         };
         let fine = difference_of(&stages);
-        let coarse = B::COARSE.as_ref().map(difference_of);
+        let coarse = B::THIRD_ORDER.as_ref().map(difference_of);
         let error = B::combined(fine, coarse);
         // Written so that NaN stays.
         if error > 1.0 {
-            return Ok(error);
+            return Ok((error, 1.0));
         }
         if last == 0.0 {
             self.arrive(t, h)?;
         }
-        Ok(error * self.persistence(steps))
+        Ok((error, self.global_error_factor(steps)))
     }
 
-    fn change(&self) -> Option<Look> {
+    fn change(&self) -> Option<DefectCheck> {
         self.change
     }
 
@@ -247,8 +249,8 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {
         let Memory { point, record, end, end_slope, more, difference: x, .. } = &mut *self.memory;
         let last = core::slice::from_ref(&*end_slope);
-        for index in 0..B::MORE.len().min(more.len()) {
-            let Some(stage) = B::MORE.get(index) else { break };
+        for index in 0..B::DENSE_STAGES.len().min(more.len()) {
+            let Some(stage) = B::DENSE_STAGES.get(index) else { break };
             x.as_mut().fill(T::ZERO);
             combine(&stage.stages, &record.k, x.as_mut());
             combine(&[stage.end], last, x.as_mut());

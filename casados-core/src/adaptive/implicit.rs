@@ -1,6 +1,6 @@
 //! A family of implicit methods as one engine.
 
-use super::levels::{Levels, interpolate};
+use super::orders::{Orders, interpolate};
 use super::run::{After, Run, Span};
 use super::sealed::{Engine, Family, Kind};
 use super::tape::Entry;
@@ -11,13 +11,13 @@ use crate::scalar::Real;
 
 /// What a family remembers: the steps that it takes, and those that it takes again.
 pub struct Implicit<M: Dae, B: Family, T: Real> {
-    levels: Levels<M, T>,
+    levels: Orders<M, T>,
     replays: B::Replays<M, T>,
 }
 
 impl<M: Dae, B: Family, T: Real> Default for Implicit<M, B, T> {
     fn default() -> Self {
-        Self { levels: Levels::default(), replays: Default::default() }
+        Self { levels: Orders::default(), replays: Default::default() }
     }
 }
 

@@ -7,7 +7,7 @@ mod settings;
 use super::consistent::Consistent;
 use super::options::{AdaptiveOptions, check_absolute, check_relative};
 use super::point::place_inputs;
-use super::run::{Accepted, Base, Run, Span};
+use super::run::{Accepted, Run, Span, Workspace};
 use super::sealed::{Engine, Kind};
 use super::sensitivities::{Frozen, Memory};
 use super::statistics::AdaptiveStatistics;
@@ -57,7 +57,7 @@ use core::marker::PhantomData;
 /// ```
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
-    pub(super) base: Box<Base<M, T>>,
+    pub(super) base: Box<Workspace<M, T>>,
     pub(super) consistent: Consistent<M, T>,
     pub(super) state: B::State,
     /// Derivatives, if they take part in the choice of the steps.
@@ -93,7 +93,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
         options.check::<T>()?;
-        let mut base: Box<Base<M, T>> = allocate()?;
+        let mut base: Box<Workspace<M, T>> = allocate()?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
         base.atol.as_mut().fill(T::from_f64(options.atol));
         for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
@@ -206,7 +206,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             Ok(())
         })?;
         // Of an interval without length.
-        let Base { result, dense, .. } = &mut *self.base;
+        let Workspace { result, dense, .. } = &mut *self.base;
         (dense.x, dense.z) = (result.x, result.z);
         for t in times {
             output(t, dense);
@@ -233,7 +233,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             return Err(Error::OutsideInterval { t, start, end });
         }
         let step = self.tape.find(t);
-        let Base { point, result, dense, .. } = &mut *self.base;
+        let Workspace { point, result, dense, .. } = &mut *self.base;
         match self.tape.entries().get(step) {
             Some(entry) => {
                 let numbers = self.tape.numbers(step, M::Shape::NX);
@@ -284,7 +284,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let end = self.start + h;
         if end == self.start && h != T::ZERO {
             let (t, h) = (self.start.to_f64(), h.to_f64());
-            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution });
+            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution, unsettled: None });
         }
         Ok(end)
     }
@@ -332,7 +332,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
         frozen.check_is(span.start, span.end)?;
         // Dense output of explicit methods takes steps again.
-        let Base { point, u, parameters, .. } = &mut *self.base;
+        let Workspace { point, u, parameters, .. } = &mut *self.base;
         place_inputs::<M, T>(point.as_mut(), u, parameters);
         Ok(span)
     }

@@ -12,7 +12,7 @@
 //! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that are not stiff.
 //!
 //! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels`
-//! its loops, `defect_filter` the second estimate of its error, `levels` the methods of a family
+//! its loops, `defect_filter` the second estimate of its error, `orders` the methods of a family
 //! and `implicit` the engine of them, `control` the step size, `start` where a run begins and
 //! `consistent` at which derivatives, those of explicit models by `rates`, at a `point`, `run` the
 //! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit`
@@ -35,9 +35,9 @@ mod implicit;
 mod integrals;
 mod integrator;
 mod kernels;
-mod levels;
 mod norm;
 mod options;
+mod orders;
 mod pairs;
 mod piecewise;
 mod point;
@@ -68,7 +68,7 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, Method, RadauIIA};
 use alloc::boxed::Box;
-use replay::{Single, Three};
+use replay::{OneMethod, ThreeMethods};
 use stages::Stages;
 
 /// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
@@ -126,6 +126,24 @@ use stages::Stages;
 pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 
 /// A method that an adaptive integrator takes.
+///
+/// ```
+/// use casados::adaptive::AdaptiveMethod;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn decay(x: f64) -> f64 { -x }
+///
+/// /// An integrator of a method by its options alone.
+/// type Of<B> = <B as AdaptiveMethod>::Integrator<Decay, f64>;
+///
+/// let mut explicit = Of::<DormandPrince5>::new(AdaptiveOptions::default())?;
+/// let mut implicit = Of::<Radau>::new(AdaptiveOptions::default())?;
+/// let (a, b) = (explicit.solve(&vector![1.0], &vector![], 1.0)?, implicit.solve(&vector![1.0], &vector![], 1.0)?);
+/// assert!((a.x[0] - b.x[0]).abs() < 1e-4);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a method with an estimate of its error",
     note = "`Radau`, `RadauIIA<3>`, `RadauIIA<5>`, `RadauIIA<7>` and `Gauss<2>` to `Gauss<6>` are, and for explicit models \
@@ -162,7 +180,7 @@ mod sealed {
     use super::*;
     use crate::model::VectorX;
     use crate::result::Dense;
-    use replay::Replay;
+    use replay::StepDifferentiator;
     use run::{After, Run, Span};
     use tape::Entry;
 
@@ -178,7 +196,7 @@ mod sealed {
         /// equations.
         const ENDS_ON_STAGE: bool;
         /// What takes its steps again.
-        type Replays: Replay<M, T>;
+        type Replays: StepDifferentiator<M, T>;
         /// Integrates an interval; `after` is called after each accepted step.
         ///
         /// # Errors
@@ -214,7 +232,7 @@ mod sealed {
         /// See [`Engine`].
         const ENDS_ON_STAGE: bool;
         /// What takes their steps again.
-        type Replays<M: Dae, T: Real>: Replay<M, T> + Default + Send + Sync;
+        type Replays<M: Dae, T: Real>: StepDifferentiator<M, T> + Default + Send + Sync;
         /// One of them.
         ///
         /// # Errors
@@ -227,8 +245,11 @@ use sealed::Family;
 impl Family for Radau {
     const LEVELS: usize = 3;
     const ENDS_ON_STAGE: bool = true;
-    type Replays<M: Dae, T: Real> =
-        Three<Single<M, RadauIIA<3>, T, 3>, Single<M, RadauIIA<5>, T, 5>, Single<M, RadauIIA<7>, T, 7>>;
+    type Replays<M: Dae, T: Real> = ThreeMethods<
+        OneMethod<M, RadauIIA<3>, T, 3>,
+        OneMethod<M, RadauIIA<5>, T, 5>,
+        OneMethod<M, RadauIIA<7>, T, 7>,
+    >;
     fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
         match level {
             0 => RadauIIA::<3>::open(0),
@@ -243,7 +264,7 @@ macro_rules! single {
         $(impl Family for $method<$stages> {
             const LEVELS: usize = 1;
             const ENDS_ON_STAGE: bool = $ends_on_stage;
-            type Replays<M: Dae, T: Real> = Single<M, Self, T, $stages>;
+            type Replays<M: Dae, T: Real> = OneMethod<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
                 // As many lanes as there are eigenvalues, filled up to registers; stages in groups
                 // of four.

@@ -27,10 +27,13 @@ use crate::scalar::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptiveOptions {
     /// Relative tolerance of the error of one step, between 10 ε of the number type and 1.
+    /// Default 1e-6.
     pub rtol: f64,
     /// Absolute tolerance of the error of one step, finite and above zero in the number type.
+    /// Default 1e-9.
     pub atol: f64,
-    /// The length of the first step, finite and above zero; chosen if it is not given.
+    /// The length of the first step, finite and above zero; chosen if it is `None`, the
+    /// default.
     pub initial_step: Option<f64>,
     /// No step is longer; above zero, infinite by default. After a long rest steps are long, and
     /// all points at which the model is evaluated may lie beside a short pulse: give its length.
@@ -39,9 +42,10 @@ pub struct AdaptiveOptions {
     /// default, and `max_step`.
     pub min_step: f64,
     /// More steps than these, refused ones included, are the error `TooManySteps`; at least one.
+    /// Default 100,000.
     pub max_steps: usize,
     /// Whether steps are remembered: dense output over the whole interval and sensitivities need
-    /// them.
+    /// them. Default true.
     pub keep_steps: bool,
 }
 

@@ -15,13 +15,13 @@ pub trait Pair<const S: usize>: Method<S> {
     const DIFFERENCE: ([f64; S], f64);
     /// The difference to a third one of low order: the estimate is then that of higher order, as
     /// far as the two agree.
-    const COARSE: Option<[f64; S]>;
+    const THIRD_ORDER: Option<[f64; S]>;
     /// How often the error counts of what is not damped.
-    const PERSISTENCE: Persistence;
+    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor;
     /// Steps are at the bound of stability where `h |J d|/|d|` is this much, on the real axis.
-    const STABLE: f64;
+    const STABILITY_BOUND: f64;
     /// `b` less the coefficients of the last stage, which is at the end of the step.
-    const LAST: [f64; S] = {
+    const FSAL_DIFFERENCE: [f64; S] = {
         let mut last = *Self::TABLEAU.b();
         let (mut column, row) = (0, &Self::TABLEAU.a()[S - 1]);
         while column < S {
@@ -34,7 +34,7 @@ pub trait Pair<const S: usize>: Method<S> {
     const CONTROL: Control;
     /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one
     /// at the end and of the ones before it.
-    const MORE: &'static [More<S>];
+    const DENSE_STAGES: &'static [More<S>];
     /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end,
     /// of those above.
     const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
@@ -50,14 +50,14 @@ pub trait Pair<const S: usize>: Method<S> {
 /// How often the error of a step counts that nothing damps: it is there at the end, together with
 /// those of all other steps.
 #[derive(Clone, Copy, Debug)]
-pub struct Persistence {
+pub struct GlobalErrorFactor {
     /// Once for so many steps of this length as the interval has,
     pub steps: f64,
     /// but no more often than this.
     pub most: f64,
 }
 
-impl Persistence {
+impl GlobalErrorFactor {
     /// In an interval of so many steps; once at least.
     pub fn count(&self, steps: f64) -> f64 {
         (steps / self.steps).min(self.most).max(1.0)
@@ -81,12 +81,12 @@ impl Pair<6> for DormandPrince5 {
         [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0],
         -1.0 / 40.0,
     );
-    const COARSE: Option<[f64; 6]> = None;
-    const PERSISTENCE: Persistence = Persistence { steps: 180.0, most: 16.0 };
-    const STABLE: f64 = 3.25;
+    const THIRD_ORDER: Option<[f64; 6]> = None;
+    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor = GlobalErrorFactor { steps: 180.0, most: 16.0 };
+    const STABILITY_BOUND: f64 = 3.25;
     const CONTROL: Control =
         Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
-    const MORE: &'static [More<6>] = &[];
+    const DENSE_STAGES: &'static [More<6>] = &[];
     const POLYNOMIAL: &'static [([f64; 6], f64, [f64; 3])] = &[(
         [
             -12715105075.0 / 11282082432.0,
@@ -119,15 +119,15 @@ impl Pair<12> for DormandPrince8 {
         ],
         0.0,
     );
-    const COARSE: Option<[f64; 12]> = {
+    const THIRD_ORDER: Option<[f64; 12]> = {
         let mut coarse = *<Self as Method<12>>::TABLEAU.b();
         coarse[0] -= 0.2440944881889764;
         coarse[8] -= 0.7338466882816118;
         coarse[11] -= 0.022058823529411766;
         Some(coarse)
     };
-    const PERSISTENCE: Persistence = Persistence { steps: 10.0, most: 40.0 };
-    const STABLE: f64 = 6.1;
+    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor = GlobalErrorFactor { steps: 10.0, most: 40.0 };
+    const STABILITY_BOUND: f64 = 6.1;
     // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
     const CONTROL: Control = Control {
         order: 8.0,
@@ -137,7 +137,7 @@ impl Pair<12> for DormandPrince8 {
         predicts: true,
         range: (1.0 / 3.0, 6.0),
     };
-    const MORE: &'static [More<12>] = &[
+    const DENSE_STAGES: &'static [More<12>] = &[
         More {
             node: 0.1,
             stages: [

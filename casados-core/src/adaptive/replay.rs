@@ -20,7 +20,7 @@ use crate::tableau::Method;
 use alloc::boxed::Box;
 
 /// A step that was taken.
-pub struct Taken<'a, M: Dae, T: Real> {
+pub struct AcceptedStep<'a, M: Dae, T: Real> {
     /// Its start.
     pub at: At<'a, M, T>,
     /// Its length.
@@ -35,14 +35,14 @@ pub struct Taken<'a, M: Dae, T: Real> {
 }
 
 /// Takes steps of given size.
-pub trait Replay<M: Dae, T: Real> {
+pub trait StepDifferentiator<M: Dae, T: Real> {
     /// The solution.
     ///
     /// # Errors
     /// Those of Newton's method.
     fn solve(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error>;
     /// The same with derivatives.
@@ -51,7 +51,7 @@ pub trait Replay<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn forward(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
     /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for
@@ -71,7 +71,7 @@ pub trait Replay<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn hessian(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
@@ -81,7 +81,7 @@ pub trait Replay<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn adjoint(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>;
@@ -96,17 +96,17 @@ pub trait Replay<M: Dae, T: Real> {
 type Step<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
 
 /// That of the method `B` with `S` stages, from its first call on.
-pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Step<M, B, T, S>>>);
+pub struct OneMethod<M: Dae, B, T: Real, const S: usize>(Option<Box<Step<M, B, T, S>>>);
 
-impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
+impl<M: Dae, B, T: Real, const S: usize> Default for OneMethod<M, B, T, S> {
     fn default() -> Self {
         Self(None)
     }
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
+impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
     /// At the start of a step.
-    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Step<M, B, T, S>, Error> {
+    fn go(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Step<M, B, T, S>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
             none => {
@@ -124,10 +124,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
     }
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B, T, S> {
+impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for OneMethod<M, B, T, S> {
     fn solve(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
@@ -135,7 +135,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
 
     fn forward(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         self.go(step)?.forward_refined(step.at.x, step.at.u, step.h, along)
@@ -143,7 +143,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
 
     fn hessian(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -152,7 +152,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
 
     fn adjoint(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
@@ -170,7 +170,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
 
 /// A family of three.
 #[derive(Default)]
-pub struct Three<A, B, C>(A, B, C);
+pub struct ThreeMethods<A, B, C>(A, B, C);
 
 /// What the method of a level does.
 macro_rules! of_level {
@@ -183,10 +183,12 @@ macro_rules! of_level {
     };
 }
 
-impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<M, T> for Three<A, B, C> {
+impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, C: StepDifferentiator<M, T>>
+    StepDifferentiator<M, T> for ThreeMethods<A, B, C>
+{
     fn solve(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         of_level!(self, step.level, solve(step, along))
@@ -194,7 +196,7 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
 
     fn forward(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
         of_level!(self, step.level, forward(step, along))
@@ -202,7 +204,7 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
 
     fn hessian(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
@@ -211,7 +213,7 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
 
     fn adjoint(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {

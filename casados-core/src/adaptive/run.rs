@@ -2,17 +2,17 @@
 
 mod checked;
 mod cross;
+mod step_state;
 mod steps;
 mod tolerances;
-mod walk;
 
 use super::consistent::Consistent;
-use super::control::LENIENT;
-use super::levels::{Levels, interpolate};
+use super::control::ORDER_REDUCTION_RATIO;
 use super::options::AdaptiveOptions;
+use super::orders::{Orders, interpolate};
 use super::point::At;
 use super::sealed::Family;
-use super::stages::{FAST, Failure, Stages, Start};
+use super::stages::{FAST, Failure, Stages, StepContext};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::{Tolerances, Variational};
@@ -23,7 +23,7 @@ use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
-use walk::{Need, Walk};
+use step_state::{Need, StepState};
 
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
@@ -31,7 +31,7 @@ const SINGULAR: usize = 5;
 /// Memory of a run.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub struct Base<M: Dae, T: Plain> {
+pub struct Workspace<M: Dae, T: Plain> {
     /// The variables at the time that was reached.
     pub point: ArrayV<M, T>,
     /// Those where the Jacobian is to be evaluated.
@@ -46,13 +46,13 @@ pub struct Base<M: Dae, T: Plain> {
     pub rtol: ArrayK<M, T>,
     pub atol: ArrayK<M, T>,
     /// as the method needs them,
-    tight: ArrayK<M, (T, T)>,
+    estimator: ArrayK<M, (T, T)>,
     /// the reciprocals of the errors that they tolerate,
     pub(super) scale: ArrayK<M, T>,
     /// and how many times as large those of the tolerances are that were asked for.
-    asked: ArrayK<M, T>,
+    user_ratio: ArrayK<M, T>,
     /// The largest of these.
-    finer: f64,
+    tolerance_ratio: f64,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
@@ -65,6 +65,21 @@ pub struct Base<M: Dae, T: Plain> {
     newton_tolerance: f64,
     /// Estimated errors that are smaller are of rounding.
     noise: f64,
+}
+
+impl<M: Dae, T: Real> Workspace<M, T> {
+    /// The step that is tried, from where the run is.
+    fn step(&self, state: &StepState<T>) -> StepContext<'_, M, T> {
+        let Self { point, scale, user_ratio, tolerance_ratio, .. } = self;
+        StepContext {
+            point,
+            scale,
+            user_ratio,
+            tolerance_ratio: *tolerance_ratio,
+            known: state.accepted.is_some(),
+            h: state.h,
+        }
+    }
 }
 
 /// An interval.
@@ -90,7 +105,7 @@ impl<T: Real> Span<T> {
 /// What a run works with.
 pub struct Run<'a, M: Dae, T: Real> {
     pub options: &'a AdaptiveOptions,
-    pub base: &'a mut Base<M, T>,
+    pub base: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     /// Whether steps are to be remembered.
@@ -123,7 +138,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// No consistent start, and whatever ends a run early.
     pub fn integrate<B: Family>(
         &mut self,
-        levels: &mut Levels<M, T>,
+        levels: &mut Orders<M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
         after: After<'_, M, T>,
@@ -132,39 +147,44 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.begin_sensitivities(x0, span.start)?;
         let stages = levels.get::<B>(0)?.count();
         self.tighten::<B>(stages);
-        let mut walk = Walk::new(span, self.options.max_step);
-        let first = self.first_step(span, walk.longest)?;
+        let mut state = StepState::new(span, self.options.max_step);
+        let first = self.first_step(span, state.longest)?;
         if span.end == span.start {
             self.finish();
             return Ok(());
         }
-        walk.begin(first);
+        state.begin(first);
         loop {
-            self.choose_stages::<B>(levels, &mut walk)?;
-            let stages = levels.get::<B>(walk.order.level)?;
-            if !self.factor::<B>(stages, &mut walk)? {
+            self.choose_stages::<B>(levels, &mut state)?;
+            let stages = levels.get::<B>(state.order.level)?;
+            if !self.factor::<B>(stages, &mut state)? {
                 continue;
             }
-            if walk.tried >= self.options.max_steps {
-                return Err(Error::TooManySteps { t: walk.t.to_f64(), steps: walk.tried, stiff: false });
+            if state.tried >= self.options.max_steps {
+                return Err(Error::TooManySteps { t: state.t.to_f64(), steps: state.tried, stiff: false });
             }
-            self.check_step(walk.t, walk.h, walk.refusal)?;
-            walk.tried += 1;
-            match self.attempt(stages, &mut walk) {
+            self.check_step(state.t, state.h, state.refusal)?;
+            state.tried += 1;
+            let attempt = self.attempt(stages, &mut state);
+            if self.blames_pivots(stages, &mut state, &attempt) {
+                continue;
+            }
+            match attempt {
                 Err(failure) => {
                     match failure {
                         Failure::Rough(_) => self.statistics.rejected += 1,
                         _ => self.statistics.failed += 1,
                     }
-                    walk.fail(failure);
-                    self.cross(&mut walk, span)?;
+                    state.fail(failure);
+                    self.cross(&mut state, span)?;
+                    self.check_convergence(levels.get::<B>(state.order.level)?, &state, span)?;
                 }
                 Ok(error) => {
-                    let factor = walk.factor(error, stages.count());
+                    let factor = state.factor(error, stages.count());
                     if error >= 1.0 {
                         self.statistics.rejected += 1;
-                        walk.refuse(error, factor);
-                    } else if self.accept(stages, &mut walk, factor, &mut *after)? {
+                        state.refuse(error, factor);
+                    } else if self.accept(stages, &mut state, factor, &mut *after)? {
                         return Ok(());
                     }
                 }

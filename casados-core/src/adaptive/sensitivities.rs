@@ -15,8 +15,8 @@ use blocks::in_step;
 
 use super::consistent::Consistent;
 use super::point::At;
-use super::replay::{Replay, Taken};
-use super::run::{Base, Span};
+use super::replay::{AcceptedStep, StepDifferentiator};
+use super::run::{Span, Workspace};
 use super::sealed::Engine;
 use super::tape::Tape;
 use crate::error::Error;
@@ -50,7 +50,7 @@ pub struct Memory<M: Dae, T: Plain> {
 
 /// What derivatives are taken of.
 pub struct Frozen<'a, M: Dae, T: Real> {
-    pub base: &'a mut Base<M, T>,
+    pub base: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     pub span: Span<T>,
@@ -70,12 +70,12 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
             &mut B::Replays,
-            &Taken<'_, M, T>,
+            &AcceptedStep<'_, M, T>,
             usize,
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
         let mut x = *x0;
-        let Base { u, parameters, result, start, .. } = &mut *self.base;
+        let Workspace { u, parameters, result, start, .. } = &mut *self.base;
         *start = self.given;
         let at = At { x: x0, u, p: parameters, t: self.span.start };
         if M::Shape::NZ > 0 {
@@ -94,7 +94,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 }
             }
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level, near: self.chosen };
+            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: self.chosen };
             let (end, z) = each(replays, &taken, step).map_err(|error| in_step(error, step))?;
             self.tape.write(x.as_slice(), replays.stages(entry.level)?)?;
             (x, result.z) = (end, z);
@@ -110,7 +110,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
 
     /// Consistent `(ẋ, z)` at the end, from the last stage and the `z` that is there.
     fn end(&mut self) -> Result<ArrayK<M, T>, Error> {
-        let (nx, Base { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.base);
+        let (nx, Workspace { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.base);
         let mut guess = ArrayK::<M, T>::zeroed();
         let (states, algebraic) = guess.as_mut().split_at_mut(nx);
         let (_, y) = self.tape.numbers(self.tape.entries().len().saturating_sub(1), nx);
@@ -177,12 +177,12 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         states(v, result);
         if const { !B::ENDS_ON_STAGE && M::Shape::NZ > 0 } {
             let y = self.end()?;
-            let (x, Base { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
+            let (x, Workspace { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
             let at = At { x: &x, u, p: parameters, t: self.span.end };
             algebraic(self.consistent.forward(&at, &y)?, v, result);
         }
         if const { M::Shape::NZ > 0 } {
-            let Base { u, parameters, start, .. } = &mut *self.base;
+            let Workspace { u, parameters, start, .. } = &mut *self.base;
             let at = At { x: x0, u, p: parameters, t: self.span.start };
             let forward = self.consistent.forward(&at, start)?;
             (result.dz0_dx0, result.dz0_du, result.dz0_dp) = (forward.dz_dx0, forward.dz_du, forward.dz_dp);
@@ -210,13 +210,13 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         let Memory { lambda: now, gradient, adjoint, .. } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
-        let Base { u, parameters, result, .. } = &mut *self.base;
+        let Workspace { u, parameters, result, .. } = &mut *self.base;
         for (step, entry) in self.tape.entries().iter().enumerate().rev() {
             let (states, y) = self.tape.numbers(step, nx);
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level, near: true };
+            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             let local = B::replays(state).adjoint(&taken, now, dynamic(&mut backwards));
             let local = local.map_err(|error| in_step(error, step))?;
@@ -255,13 +255,13 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         for row in sum.as_mut() {
             row.as_mut().fill(T::ZERO);
         }
-        let Base { u, parameters, .. } = &mut *self.base;
+        let Workspace { u, parameters, .. } = &mut *self.base;
         for (step, entry) in self.tape.entries().iter().enumerate().rev() {
             let (states, y) = self.tape.numbers(step, nx);
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level, near: true };
+            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             let second = B::replays(state).hessian(&taken, now, dynamic(&mut backwards));
             let second = second.map_err(|error| in_step(error, step))?;

@@ -1,6 +1,6 @@
 //! What a run asks of a step with any number of stages.
 
-use super::branches::{Branches, Look};
+use super::branches::{Branches, DefectCheck};
 use super::defect_filter::DefectFilter;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Real, Scalar};
@@ -25,15 +25,15 @@ pub(super) const FAST: f64 = 1e-3;
 const NOISE: f64 = 0.01;
 
 /// Where a step begins and what it is measured by.
-pub struct Start<'a, M: Dae, T: Real> {
+pub struct StepContext<'a, M: Dae, T: Real> {
     /// The variables at its start: a solution of the equations.
     pub point: &'a ArrayV<M, T>,
     /// Reciprocals of the tolerated errors of `(x, z)`, as the estimate of lower order needs them,
     pub scale: &'a ArrayK<M, T>,
     /// and how many times as large those of the tolerances are that were asked for.
-    pub asked: &'a ArrayK<M, T>,
+    pub user_ratio: &'a ArrayK<M, T>,
     /// The largest of these factors.
-    pub finer: f64,
+    pub tolerance_ratio: f64,
     /// Whether `ẋ` and `z` there are those of a stage of the step before.
     pub known: bool,
     /// Its length.
@@ -52,6 +52,17 @@ pub enum Failure {
     Stale,
     /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
     Rough(f64),
+}
+
+/// What keeps an iteration from converging.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Culprit {
+    /// The unknown with the largest increment.
+    pub unknown: usize,
+    /// The equation with the largest residual relative to its terms,
+    pub equation: usize,
+    /// and this residual.
+    pub residual: f64,
 }
 
 /// Where the stages are, beside borders between branches of the model.
@@ -207,15 +218,21 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// The unknown for which there is no pivot.
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize>;
+    /// What kept the last iteration from converging, with the terms of each equation at the start
+    /// of the step.
+    fn culprit(&self, start: &StepContext<'_, M, T>, jacobian: &M::Jacobian<T>) -> Culprit;
     /// From now on, whether every matrix is to be pivoted as a whole.
     fn set_pivoted(&mut self, pivoted: bool);
+    /// Whether planned factors solve the systems that they are of; pivoted ones are as good as can
+    /// be.
+    fn factors_hold(&self, start: &StepContext<'_, M, T>) -> bool;
     /// Starts from the same `ẋ` and `z` at all stages, those of the start of the step.
     fn begin(&mut self, point: &ArrayV<M, T>);
     /// Starts from the polynomial of the last accepted step, whose size is given relative to this
     /// one.
     fn continue_from_last(&mut self, ratio: f64);
     /// The variables in the middle of the step from its start values.
-    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>);
+    fn predict(&self, start: &StepContext<'_, M, T>, middle: &mut ArrayV<M, T>);
     /// Takes over the last accepted step of another method.
     fn adopt(&mut self, other: &dyn Stages<M, T>);
     /// Solves the stages.
@@ -224,7 +241,7 @@ pub trait Stages<M: Dae, T: Real> {
     /// [`Failure`]
     fn solve(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         tolerance: f64,
         convergence: &mut Convergence,
         residuals: &mut usize,
@@ -234,7 +251,12 @@ pub trait Stages<M: Dae, T: Real> {
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
-    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
+    fn error(
+        &mut self,
+        start: &StepContext<'_, M, T>,
+        again: bool,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure>;
     /// The estimated error where the defect of a step is not that of a smooth solution, relative to
     /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
     /// error is as foreseen.
@@ -243,17 +265,17 @@ pub trait Stages<M: Dae, T: Real> {
     /// [`Failure::NotFinite`]
     fn roughness(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         growth: f64,
-        look: Look,
+        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
     /// How its defect is to be looked at where the model is not that of its start inside of the
     /// step.
-    fn change(&mut self, start: &Start<'_, M, T>) -> Option<Look>;
+    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck>;
     /// The variables where the estimate compares the derivative of the polynomial with the
     /// solution; whether that is the end of the step, and not its start.
-    fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
+    fn estimates(&self, start: &StepContext<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
     /// From a residual there to the estimated error of `(x, z)`, in its place.
     fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>);
     /// What a step of length `h` makes of the residual that was filtered last: see

@@ -3,7 +3,7 @@
 use super::control::power;
 use super::norm::norm;
 use super::point::{At, place_inputs, variable};
-use super::run::{Base, Run, Span};
+use super::run::{Run, Span, Workspace};
 use crate::error::Error;
 use crate::model::{ArrayK, Dae, VectorX};
 use crate::scalar::Real;
@@ -13,7 +13,7 @@ use bytemuck::Zeroable;
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Everything at the start of the interval.
     pub(super) fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
-        let Base { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
+        let Workspace { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
         if !*ready {
             M::jacobian_constants::<T>(jacobian);
             *ready = true;
@@ -37,7 +37,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
     pub(super) fn settle(&mut self, t: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        let Base { point, u, parameters, .. } = &mut *self.base;
+        let Workspace { point, u, parameters, .. } = &mut *self.base;
         let mut x = VectorX::<M, T>::zeroed();
         let mut y = ArrayK::<M, T>::zeroed();
         for (index, y) in y.as_mut().iter_mut().enumerate() {
@@ -59,7 +59,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// The variables at the start, from `(ẋ, z)` there.
     pub fn place(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
         let nx = M::Shape::NX;
-        let Base { point, u, parameters, result, .. } = &mut *self.base;
+        let Workspace { point, u, parameters, result, .. } = &mut *self.base;
         let numbers = point.as_mut();
         for (index, value) in start.as_ref().iter().enumerate() {
             numbers[variable::<M>(index)] = *value;
@@ -75,7 +75,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// The solution at the end.
     pub fn finish(&mut self) {
         let nx = M::Shape::NX;
-        let Base { point, result, .. } = &mut *self.base;
+        let Workspace { point, result, .. } = &mut *self.base;
         let states = &point.as_ref()[nx..];
         result.x.as_mut_slice().copy_from_slice(&states[..nx]);
         result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
@@ -87,7 +87,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             return Ok(step.min(longest));
         }
         let nx = M::Shape::NX;
-        let Base { point, rtol, atol, scale, parameters, u, start, .. } = &mut *self.base;
+        let Workspace { point, rtol, atol, scale, parameters, u, start, .. } = &mut *self.base;
         let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
         let states = &point.as_ref()[nx..2 * nx];
         for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tolerances).zip(states) {

@@ -20,9 +20,9 @@ use super::defect_filter::RelativeErrors;
 use super::norm::mean;
 use super::pairs::Pair;
 use super::point::At;
-use super::replay::{Replay, Taken};
+use super::replay::{AcceptedStep, StepDifferentiator};
 use super::sealed::Engine;
-use super::stages::{Failure, FilteredDefect, MOST, Stages, Start};
+use super::stages::{Failure, FilteredDefect, MOST, Stages, StepContext};
 use crate::error::Error;
 use crate::linalg::axpy;
 use crate::memory::allocate;
@@ -40,7 +40,7 @@ use core::marker::PhantomData;
 pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
     /// # Errors
     /// Those of Newton's method; a singular matrix.
-    fn forward(&mut self, step: &Taken<'_, M, T>) -> Result<&Forward<M, T>, Error>;
+    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
     /// # Errors
     /// [`Error::NoResult`]
     fn slopes(
@@ -57,7 +57,7 @@ struct Replays<M: Dae, B: Engine<M, T>, T: Real> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Differentiate<M, T> for Replays<M, B, T> {
-    fn forward(&mut self, step: &Taken<'_, M, T>) -> Result<&Forward<M, T>, Error> {
+    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error> {
         B::replays(&mut self.state).forward(step, None)
     }
 
@@ -91,7 +91,7 @@ struct Memory<M: Dae, T: Plain> {
 /// Tolerances of `(x, z)`.
 pub struct Tolerances<'a, M: Dae, T: Real> {
     /// As the estimate of lower order needs them,
-    pub tight: &'a ArrayK<M, (T, T)>,
+    pub estimator: &'a ArrayK<M, (T, T)>,
     /// and as they were asked for.
     pub rtol: &'a ArrayK<M, T>,
     pub atol: &'a ArrayK<M, T>,
@@ -161,7 +161,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
     }
 
     /// The derivatives at the end of a step.
-    fn take(&mut self, step: &Taken<'_, M, T>) -> Result<(), Error> {
+    fn take(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<(), Error> {
         let (nx, Memory { before, after, .. }) = (M::Shape::NX, &mut *self.memory);
         let forward = self.replays.forward(step)?;
         let x = [forward.dx_dx0.as_slice(), forward.dx_du.as_slice(), forward.dx_dp.as_slice()];
@@ -218,7 +218,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         stages: &mut dyn Stages<M, T>,
         at: At<'_, M, T>,
         level: usize,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         tolerances: &Tolerances<'_, M, T>,
         again: bool,
     ) -> Result<f64, Failure> {
@@ -226,7 +226,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         self.unknowns.clear();
         stages.unknowns(&mut self.unknowns);
         let unknowns = core::mem::take(&mut self.unknowns);
-        let taken = self.take(&Taken { at, h: start.h, y: &unknowns, level, near: true });
+        let taken = self.take(&AcceptedStep { at, h: start.h, y: &unknowns, level, near: true });
         self.unknowns = unknowns;
         taken.map_err(diverges)?;
         let at_end = stages.estimates(start, &mut self.memory.point);
@@ -248,8 +248,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 let states = [before.as_ref(), after.as_ref()]
                     .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref()));
                 let magnitude = magnitudes[direction];
-                let tight = tolerances.tight.as_ref().iter().copied();
-                let first = measure(&error.as_ref()[..counted], states, tight, magnitude);
+                let estimator = tolerances.estimator.as_ref().iter().copied();
+                let first = measure(&error.as_ref()[..counted], states, estimator, magnitude);
                 let asked = tolerances.rtol.as_ref().iter().zip(tolerances.atol.as_ref());
                 let scales = scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
                 let [filtered, divided]: FilteredDefect<M, T> = stages.filtered_defect(start.h);
@@ -257,7 +257,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 for ((error, divided), scale) in filtered.as_ref().iter().zip(divided.as_ref()).zip(scales) {
                     errors.add((*error / scale).to_f64(), (*divided / scale).to_f64());
                 }
-                relative = stages.defect_filter().larger(first, start.finer, &errors);
+                relative = stages.defect_filter().larger(first, start.tolerance_ratio, &errors);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }
@@ -277,7 +277,7 @@ impl<M: Ode, T: Real> Variational<M, T> {
     /// differentiated.
     pub fn explicit<B: Pair<S>, const S: usize>(
         &mut self,
-        step: &Taken<'_, M, T>,
+        step: &AcceptedStep<'_, M, T>,
         end: &[T],
         inputs: &[T],
         tolerances: impl Iterator<Item = (T, T)> + Clone,
@@ -285,7 +285,7 @@ impl<M: Ode, T: Real> Variational<M, T> {
         let (nx, (weights, last)) = (M::Shape::NX, B::DIFFERENCE);
         self.take(step)?;
         self.slopes(0, &weights, 0)?;
-        if let Some(coarse) = B::COARSE {
+        if let Some(coarse) = B::THIRD_ORDER {
             self.slopes(0, &coarse, 1)?;
         }
         let Memory { before, after, slopes: [fine, coarse], jacobian, f, point, magnitudes, .. } =
@@ -316,7 +316,7 @@ impl<M: Ode, T: Real> Variational<M, T> {
                 relative * step.h.abs().to_f64()
             };
             let fine = size(&error);
-            let coarse = B::COARSE.and_then(|_| coarse.as_ref().get(direction)).map(size);
+            let coarse = B::THIRD_ORDER.and_then(|_| coarse.as_ref().get(direction)).map(size);
             let combined = B::combined(fine, coarse);
             if !combined.is_finite() {
                 return Ok(f64::NAN);

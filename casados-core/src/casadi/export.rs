@@ -29,7 +29,7 @@ macro_rules! __casadi_export {
                 #[allow(unused_mut)]
                 let mut settings = $crate::casadi::Settings::new($interval);
                 $(settings.$field = $value;)*
-                Functions::new(settings)
+                Ok(Functions::new(settings))
             });
             $crate::__casadi_functions!(LIBRARY, $name);
         };
@@ -93,7 +93,7 @@ macro_rules! __casadi_export_problem {
         const _: () = {
             static LIBRARY: $crate::casadi::Library<$crate::casadi::Problems> =
                 $crate::casadi::Library::new(|| {
-                    $crate::casadi::Problems::new(|| Ok(::std::boxed::Box::new($make()?)))
+                    Ok($crate::casadi::Problems::new(|| Ok(::std::boxed::Box::new($make()?))))
                 });
             $crate::__casadi_function!(LIBRARY, 0, "", $name, "");
             $crate::__casadi_function!(LIBRARY, 1, "", $name, "_f");

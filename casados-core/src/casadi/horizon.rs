@@ -134,9 +134,17 @@ impl<B: Horizon> Horizons<B> {
     const NW: usize = <<B::Model as Dae>::Shape as Shape>::NW;
 
     /// The functions of this number of intervals with these settings.
-    #[must_use]
-    pub fn new(settings: Settings<Options>, count: usize) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], in words
+    pub fn new(settings: Settings<Options>, count: usize) -> Result<Self, Failure> {
         let (nx, nu, nw) = (Self::NX, Self::NU, Self::NW);
+        // Patterns of four functions have about so many indices, not asked for one by one.
+        let bytes =
+            (nx + nw).saturating_mul(nx + nw).saturating_mul(4 * size_of::<usize>()).saturating_mul(count);
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            return Err(Error::OutOfMemory { bytes }.into());
+        }
         let variables =
             dependence::variables(Dimensions::of::<B::Model>(), B::Model::STRUCTURE.jacobian, None);
         let (mut value, mut hessian) = (Relation::zero(nx, nw), Relation::zero(nw, nw));
@@ -150,7 +158,7 @@ impl<B: Horizon> Horizons<B> {
         let (signatures, outputs) = shape.functions().into_iter().unzip();
         let cache = Mutex::new(Cache::new(settings.cache, true));
         let integrations = AtomicU64::new(0);
-        Self { settings, count, signatures, outputs, cache, integrations, batch: PhantomData }
+        Ok(Self { settings, count, signatures, outputs, cache, integrations, batch: PhantomData })
     }
 
     fn compute(&self, worker: &mut Worker<B>, wanted: Wanted) -> Result<(), Failure> {

@@ -42,6 +42,7 @@ pub struct Settings<O> {
     /// problem has intervals are needed, or none is found again.
     pub cache: usize,
     /// `(x₀, u, p)` at which an adaptive integrator chooses the steps that all calls then take.
+    /// None by default.
     pub steps_at: &'static [f64],
 }
 

@@ -57,7 +57,7 @@ impl Failure {
 /// A client that is made when it is needed first, and forgotten when nobody refers to it any more.
 #[doc(hidden)]
 pub struct Library<C: Client> {
-    make: fn() -> C,
+    make: fn() -> Result<C, Failure>,
     state: Mutex<State<C>>,
 }
 
@@ -79,7 +79,7 @@ enum Memory<W> {
 
 impl<C: Client> Library<C> {
     /// A library whose client is made by `make`.
-    pub const fn new(make: fn() -> C) -> Self {
+    pub const fn new(make: fn() -> Result<C, Failure>) -> Self {
         Self { make, state: Mutex::new(State { references: 0, client: None, memories: Vec::new() }) }
     }
 
@@ -93,7 +93,7 @@ impl<C: Client> Library<C> {
         if let Some(client) = &self.state().client {
             return Some(Arc::clone(client));
         }
-        let made = Arc::new(guarded(self.make).map_err(|failure| say(&failure.0)).ok()?);
+        let made = Arc::new(guarded(self.make).flatten().map_err(|failure| say(&failure.0)).ok()?);
         Some(Arc::clone(self.state().client.get_or_insert(made)))
     }
 

@@ -54,6 +54,16 @@ pub trait Constrained: Dae {
 
 /// A model of `#[dae(index_reduction(projection))]`: the macro wrote the equations of the
 /// projection onto its invariants, for [`Projected`].
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::{Projectable, Projected};
+///
+/// /// An integrator of a mechanism whose ends are projected.
+/// fn projected<M: Projectable>() -> Result<Projected<Irk<M, Gauss<2>>>, Error> {
+///     Ok(Projected::new(Irk::<M, Gauss<2>>::new(Options::default())?))
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "the equations of the projection of `{Self}` are not known",
     note = "`#[dae(index_reduction(projection))]` writes them"

@@ -1,6 +1,6 @@
 //! What errors say.
 
-use super::{Argument, Error, Place, Quantity, Refusal, Started};
+use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
 /// How other start values are given.
@@ -115,6 +115,11 @@ impl fmt::Display for Error {
                     None => Ok(()),
                 }
             }
+            Error::SingularAlgebraic { unknown, at } => write!(
+                f,
+                "Newton's method did not converge: between the start values and where it ended, at {at}, ∂f/∂z becomes \
+                 singular along `{unknown}`: the algebraic equations may have lost their solution"
+            ),
             Error::InconsistentStart { t, equation, residual, unknown, value, singular } => {
                 write!(f, "there are no consistent derivatives and algebraic states at t = {t}: ")?;
                 match singular {
@@ -136,8 +141,13 @@ impl fmt::Display for Error {
             Error::NonFiniteFunction { function, output, value, at } => {
                 write!(f, "output {output} of the function {function} is {value} at {at}")
             }
-            Error::StepSizeUnderflow { t, h, reason } => {
-                let reason = match reason {
+            Error::StepSizeUnderflow { t, h, reason, unsettled } => {
+                write!(f, "the step size falls to {h:e} at t = {t}: ")?;
+                let reason_text = match reason {
+                    Refusal::SingularAlgebraic { unknown } => {
+                        write!(f, "∂f/∂z becomes singular there along `{unknown}`")?;
+                        ", where the algebraic equations lose their solution"
+                    }
                     Refusal::Error => {
                         "the estimated error stays above the tolerance; the solution may blow up here, or `atol` is \
                          too large for some states"
@@ -147,7 +157,26 @@ impl fmt::Display for Error {
                     Refusal::NotFinite => "the model is not finite",
                     Refusal::Resolution => "the time does not resolve it",
                 };
-                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
+                f.write_str(reason_text)?;
+                let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
+                    return Ok(());
+                };
+                write!(
+                    f,
+                    "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
+                     is {value:e} at this time, does not settle"
+                )?;
+                f.write_str(match (reason, algebraic) {
+                    (Refusal::SingularAlgebraic { .. }, _) => "",
+                    (_, true) => {
+                        ": the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
+                         declare an event"
+                    }
+                    (_, false) => {
+                        ": the solution may end there, or the model jump: then declare an event, or write the condition as \
+                         `if` or `max`"
+                    }
+                })
             }
             Error::TooManySteps { t, steps, stiff } => {
                 write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
@@ -164,6 +193,12 @@ impl fmt::Display for Error {
                 "the times are not in order: element {index} is {t}, and not between the one before it, {before}, and the \
                  end, {end}"
             ),
+            Error::AccumulatingEvents { t, function, event, events } => write!(
+                f,
+                "events accumulate at t = {t}: event {event}, of the function {function}, happens sooner and sooner after \
+                 itself, {events} events so far; end the integration before, by a terminal event, or go on with a model \
+                 of what is at rest"
+            ),
             Error::TooManyEvents { t, events } => {
                 write!(f, "t = {t} was reached after {events} events, and more are not allowed")
             }
@@ -173,9 +208,14 @@ impl fmt::Display for Error {
                     "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
                 )
             }
+            Error::GuardOfAlgebraicStates { function } => write!(
+                f,
+                "the function {function} of an event looks at algebraic states: over it there are first derivatives, and no \
+                 second ones; write it in terms of x, u and p"
+            ),
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which events have no second derivatives: add the time as a state"
+                "{function} depends on the time, by which derivatives over events are not known: add the time as a state"
             ),
             Error::Intervals { controls, ends } => {
                 write!(

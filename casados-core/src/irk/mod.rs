@@ -55,6 +55,7 @@ pub(crate) use self::{
     forward::{gradient::multiply, memory::StepOf},
     hessian::pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
+    newton::fold::eliminate,
     newton::iteration::StageEquations,
     stages::initial_guess::InitialGuess,
     workspace::{Linearization, Step, Work},

@@ -113,7 +113,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         let mut undetermined = None;
         if M::STRUCTURE.elimination.has_plan() {
             let equations = StageEquations { coefficients, kept: None, n, x };
-            let solved = self.newton(equations, options, y, statistics);
+            let mut solved = self.newton(equations, options, y, statistics);
+            if solved.stale {
+                self.start(coefficients, guess, n, before, y);
+                solved = self.newton(equations, options, y, statistics);
+            }
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
@@ -129,6 +133,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
             );
         }
+        #[cfg(feature = "alloc")]
+        let from = *y;
         match self.newton_dense(coefficients, &options.newton, n, x, y, statistics) {
             // Of the whole matrix, pivoted, it is asked again.
             Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
@@ -142,8 +148,14 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 self.start(coefficients, guess, n, None, y);
                 Ok(false)
             }
-            Err(error) if n == 0 => Err(self.explain_start(error, guess)),
-            Err(error) => Err(error),
+            Err(error) => {
+                if n == 0 {
+                    return Err(self.explain_start(error, guess));
+                }
+                #[cfg(feature = "alloc")]
+                let error = self.explain_fold(error, coefficients, (n, x), &from, y);
+                Err(error)
+            }
         }
     }
 

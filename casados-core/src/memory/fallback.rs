@@ -4,6 +4,17 @@ use super::{Absent, Inside, Stored, sealed};
 
 /// It pivots the whole matrix. With three stages or more it has memory for the shared Jacobian of
 /// the stages too, which Newton's method takes where iterations are not fixed.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use casados::{memory::Pivoting, mode};
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// // It is the default.
+/// type Written = Irk<Cart, Gauss<4>, f64, Inline<mode::Forward, 1, Pivoting>>;
+/// type Short = Irk<Cart, Gauss<4>, f64, Inline<mode::Forward>>;
+/// assert_eq!(Written::SIZE, Short::SIZE);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pivoting;
 

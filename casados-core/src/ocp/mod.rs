@@ -95,9 +95,11 @@ pub use dynamics::return_map::ReturnMap;
 #[cfg(feature = "alloc")]
 pub use dynamics::shooting::Shooting;
 pub use dynamics::single::{IntegralCost, WithIntegral};
+pub use feedback::contraction::{Contraction, ContractionTest, Convergence};
+pub use feedback::phases::{Fallback, Feedback, Prepared};
 #[cfg(feature = "alloc")]
 pub use feedback::real_time::HeapRealTime;
-pub use feedback::real_time::{Feedback, Prepared, RealTime};
+pub use feedback::real_time::RealTime;
 pub use formulation::error::{ConstraintName, OcpError, Part, Text};
 pub use formulation::functions::constraint::{Constraint, Constraints};
 pub use formulation::functions::convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
@@ -122,11 +124,15 @@ pub use formulation::problem::{ExactFormulation, Formulation, Problem};
 pub use nlp::ipm::HeapIpm;
 pub use nlp::ipm::{Barrier, Ipm, IpmOptions};
 #[cfg(feature = "alloc")]
+pub use nlp::multi_start::{MultiStart, StartOutcome};
+#[cfg(feature = "alloc")]
 pub use nlp::sqp::HeapSqp;
 pub use nlp::sqp::{Globalisation, Sqp, SqpOptions};
 pub use solution::log::{Iteration, Log, Times};
 pub use solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
-pub use solution::sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
+pub use solution::sensitivities::{
+    Covariance, Sensitivities, SolutionAdjoint, SolutionFactors, Unidentifiable, ValueHessian,
+};
 #[cfg(feature = "alloc")]
 pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};

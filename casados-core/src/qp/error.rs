@@ -4,6 +4,20 @@ use super::statistics::Residuals;
 use core::fmt;
 
 /// A part of a QP or of its solution.
+///
+/// ```
+/// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpField, QpSolver, QpStart, StageDims};
+///
+/// let mut dims = [StageDims::new(1, 1, 0); 2];
+/// dims[1].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// qp.stages_mut().next().unwrap().a_mut().set(0, 0, f64::NAN);
+/// qp.fix_initial_state(&[0.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// let error = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut()).unwrap_err();
+/// assert!(matches!(error, QpError::InvalidValue { field: QpField::A, stage: 0, .. }));
+/// # Ok::<(), QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QpField {

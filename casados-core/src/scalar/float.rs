@@ -2,6 +2,14 @@
 
 /// In scope in every model function: a model that calls `x.sin()` compiles for firmware as it
 /// stands. With the standard library `f64` has these methods itself, and the trait has none.
+///
+/// ```
+/// #[allow(unused_imports)] // with `std` they are methods of `f64`
+/// use casados::scalar::Float as _;
+///
+/// fn chord(angle: f64) -> f64 { 2.0 * (0.5 * angle).sin() }
+/// assert!((chord(core::f64::consts::PI) - 2.0).abs() < 1e-15);
+/// ```
 #[cfg(feature = "std")]
 pub trait Float {}
 #[cfg(feature = "std")]

@@ -24,6 +24,15 @@ pub use radau::RadauIIA;
 use core::fmt;
 
 /// A Runge-Kutta method with `S` stages whose tableau is known at compile time.
+///
+/// ```
+/// use casados::{Gauss, Method, RadauIIA};
+///
+/// /// The order of a method.
+/// fn order<B: Method<S>, const S: usize>() -> usize { B::TABLEAU.order() }
+///
+/// assert_eq!((order::<Gauss<3>, 3>(), order::<RadauIIA<3>, 3>()), (6, 5));
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no tableau with {S} stages",
     label = "no such method",

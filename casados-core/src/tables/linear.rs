@@ -24,8 +24,8 @@ impl<const N: usize> Linear<N> {
     /// A table of values at increasing points.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
@@ -90,8 +90,8 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
     /// A table of values on a grid of increasing points.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check(&x);

@@ -44,8 +44,8 @@ impl<const N: usize> Spline<N> {
     /// The natural spline through values at increasing points: `f″ = 0` at both ends.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
@@ -155,8 +155,8 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// each variable.
     ///
     /// # Panics
-    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an error of the
-    /// compiler.
+    /// Where points do not increase, or a number or slope is not finite; in a `const` that is an
+    /// error of the compiler.
     #[must_use]
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check(&x);

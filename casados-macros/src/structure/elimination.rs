@@ -6,6 +6,10 @@
 //! every eigenvalue `μ` of A. So pivots are judged on such complex matrices, at many points of the
 //! model and many `hμ` at once: a pivot is taken only if it is acceptable at all of them. Among the
 //! acceptable ones the Markowitz cost decides.
+//!
+//! One of the points is at rest: all states are zero. Models are started there, and entries that
+//! vanish there (the sine of an angle) are no pivots. Of some models the matrix itself is singular
+//! there: then this point has no say in the columns that vanish.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
@@ -60,6 +64,10 @@ impl Complex {
 /// its column (rows scaled to a largest entry of one).
 const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
 
+/// Where all entries of a column are smaller than this at rest, rows scaled to a largest entry of
+/// one, the matrix is singular there.
+const VANISHING: f64 = 1e-10;
+
 /// The matrix during elimination.
 struct Active {
     /// By row, by column: values at the samples, and whether the block is trivial.
@@ -72,10 +80,12 @@ struct Active {
     scales: Vec<Vec<f64>>,
     /// How many pivots, one after the other, each row has had to wait for.
     depths: Vec<u32>,
+    /// Samples from this one on are at rest.
+    at_rest: usize,
 }
 
 impl Active {
-    fn new(size: usize, entries: &[Entry]) -> Self {
+    fn new(size: usize, entries: &[Entry], at_rest: usize) -> Self {
         let samples = entries.first().map_or(0, |e| e.values.len());
         let mut active = Self {
             rows: vec![BTreeMap::new(); size],
@@ -84,6 +94,7 @@ impl Active {
             done_columns: vec![false; size],
             scales: vec![vec![0.0; samples]; size],
             depths: vec![0; size],
+            at_rest: samples.saturating_sub(at_rest),
         };
         for entry in entries {
             active.rows[entry.row as usize].insert(entry.column, (entry.values.clone(), entry.trivial));
@@ -108,6 +119,9 @@ impl Active {
                 .iter()
                 .map(|&r| self.rows[r as usize][&column].0[k].abs() * self.scales[r as usize][k])
                 .fold(0.0, f64::max);
+            if k >= self.at_rest && !(largest > VANISHING && largest.is_finite()) {
+                continue;
+            }
             // A column that vanishes, or an entry that is tiny in its own row, is no pivot either.
             let ratio = if largest > 0.0 { own / largest } else { 0.0 };
             worst = worst.min(ratio.min(own * 1e3));
@@ -187,9 +201,10 @@ impl Active {
 /// pivots that it looks for.
 const UPDATES: usize = 100_000;
 
-/// The plan for a matrix of `size` equations and unknowns; an empty one where it would be too long.
-pub fn plan(size: usize, entries: &[Entry]) -> Plan {
-    let mut active = Active::new(size, entries);
+/// The plan for a matrix of `size` equations and unknowns, whose last samples are those `at_rest`;
+/// an empty one where it would be too long.
+pub fn plan(size: usize, entries: &[Entry], at_rest: usize) -> Plan {
+    let mut active = Active::new(size, entries, at_rest);
     let mut steps = Vec::with_capacity(size);
     let mut updates = 0;
     for _ in 0..size {
@@ -304,7 +319,7 @@ mod tests {
                 }
             }
         }
-        let plan = plan(n as usize, &entries);
+        let plan = plan(n as usize, &entries, 0);
         assert!(reconstruct(n as usize, &entries, &plan) < 1e-13);
         // The full row and column go last, so that there is hardly any fill.
         assert!(plan.blocks.len() <= entries.len() + 2, "{} of {}", plan.blocks.len(), entries.len());
@@ -319,8 +334,29 @@ mod tests {
             entry(1, 0, &[1.0, 1.0, 1.0]),
             entry(1, 1, &[0.5, 0.0, 0.5]),
         ];
-        let plan = plan(2, &entries);
+        let plan = plan(2, &entries, 0);
         assert!(matches!(plan.pivots[0], (0, 1) | (1, 0)), "{:?}", plan.pivots);
+    }
+
+    /// `[[sin x, cos x], [−1, 1]]`-like: of the samples the last is at rest.
+    #[test]
+    fn a_pivot_that_vanishes_at_rest_is_not_taken() {
+        let entries = [
+            entry(0, 0, &[0.8, 0.5, 0.0]),
+            entry(0, 1, &[0.6, 0.9, 1.0]),
+            entry(1, 0, &[1.0, 1.0, 1.0]),
+            entry(1, 1, &[0.6, 0.9, 1.0]),
+        ];
+        assert_eq!(plan(2, &entries, 0).pivots[0], (0, 0));
+        assert_ne!(plan(2, &entries, 1).pivots[0], (0, 0));
+        // A matrix that is singular there has the plan that it has without.
+        let singular = [
+            entry(0, 0, &[0.8, 0.5, 0.0]),
+            entry(0, 1, &[0.6, 0.9, 0.0]),
+            entry(1, 0, &[1.0, 1.0, 0.0]),
+            entry(1, 1, &[0.6, 0.9, 0.0]),
+        ];
+        assert_eq!(plan(2, &singular, 1), plan(2, &singular, 0));
     }
 
     #[test]
@@ -335,12 +371,12 @@ mod tests {
                 entry(2, 2, &[1.0, 2.0]),
             ]
         };
-        assert_eq!(plan(3, &make(1.0)), plan(3, &make(1e-150)));
-        assert_eq!(plan(3, &make(1.0)), plan(3, &make(1e150)));
+        assert_eq!(plan(3, &make(1.0), 0), plan(3, &make(1e-150), 0));
+        assert_eq!(plan(3, &make(1.0), 0), plan(3, &make(1e150), 0));
     }
 
     #[test]
     fn nothing_to_eliminate() {
-        assert_eq!(plan(0, &[]), Plan { ..Plan::default() });
+        assert_eq!(plan(0, &[], 0), Plan { ..Plan::default() });
     }
 }

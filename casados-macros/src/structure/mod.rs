@@ -228,8 +228,10 @@ fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &
     let nx = model.variables.x.len();
     let (kinematic, positions) = newton_matrix(model, jacobian, blocks, trivial);
     let samplings = samplings(model);
-    let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
-    let plan = elimination::plan(model.residual.len(), &entries);
+    let states = 2 * nx + model.variables.z.len();
+    let (entries, at_rest) =
+        samples::sample(&model.graph, (jacobian, &positions), &samplings, states, model.opaque.len());
+    let plan = elimination::plan(model.residual.len(), &entries, at_rest);
     let updated: HashSet<u32> = plan.updates.iter().copied().collect();
     let original = |block: u32| {
         let (row, column) = plan.blocks[block as usize];

@@ -65,14 +65,16 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
     found
 }
 
-/// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`.
+/// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`;
+/// how many of these are at rest, the last ones: the first `states` of the variables are zero
+/// there, or at their nominal values, or as near to zero as their range allows.
 pub fn sample(
     graph: &Graph,
-    jacobian: &[(u32, u32, Node)],
-    positions: &[Position],
+    (jacobian, positions): (&[(u32, u32, Node)], &[Position]),
     samplings: &[Sampling],
+    states: usize,
     opaque: usize,
-) -> Vec<Entry> {
+) -> (Vec<Entry>, usize) {
     let nodes: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
     let mut random = Random::default();
     let points = Points { graph, nodes: &nodes, samplings, constants: constants(&mut random, opaque) };
@@ -85,35 +87,46 @@ pub fn sample(
             trivial: is_identity(graph, jacobian, position),
         })
         .collect();
+    let is_finite = |values: &[f64]| {
+        let mut used = positions.iter().flat_map(|position| &position.terms);
+        used.all(|term| values[term.entry as usize].is_finite())
+    };
     let mut found = 0;
     for draw in 0..DRAWS {
         if found == POINTS {
             break;
         }
         let values = points.at(&mut random, draw);
-        let mut used = positions.iter().flat_map(|position| &position.terms);
-        if !used.all(|term| values[term.entry as usize].is_finite()) {
-            continue;
-        }
-        found += 1;
-        for _ in 0..2 {
-            // Eigenvalues of A lie in the right half-plane; the step size may be anything.
-            let size = 10f64.powf(random.between(-4.0, 0.0));
-            let angle = random.between(-1.4, 1.4);
-            let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
-            for (entry, position) in entries.iter_mut().zip(positions) {
-                let mut value = Complex::default();
-                for term in &position.terms {
-                    let c = term.by.map_or(1.0, |by| -values[by as usize]);
-                    let mut product = Complex { re: c * values[term.entry as usize], im: 0.0 };
-                    (0..term.order).for_each(|_| product = product.times(hmu));
-                    value = Complex { re: value.re + product.re, im: value.im + product.im };
-                }
-                entry.values.push(value);
-            }
+        if is_finite(&values) {
+            found += 1;
+            add(&mut entries, positions, &values, &mut random);
         }
     }
-    entries
+    let values = points.at_rest(&mut random, states);
+    let at_rest = if is_finite(&values) { add(&mut entries, positions, &values, &mut random) } else { 0 };
+    (entries, at_rest)
+}
+
+/// Appends the values of the non-zeros at a point with some `hμ`; with how many.
+fn add(entries: &mut [Entry], positions: &[Position], values: &[f64], random: &mut Random) -> usize {
+    const SIZES: usize = 2;
+    for _ in 0..SIZES {
+        // Eigenvalues of A lie in the right half-plane; the step size may be anything.
+        let size = 10f64.powf(random.between(-4.0, 0.0));
+        let angle = random.between(-1.4, 1.4);
+        let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
+        for (entry, position) in entries.iter_mut().zip(positions) {
+            let mut value = Complex::default();
+            for term in &position.terms {
+                let c = term.by.map_or(1.0, |by| -values[by as usize]);
+                let mut product = Complex { re: c * values[term.entry as usize], im: 0.0 };
+                (0..term.order).for_each(|_| product = product.times(hmu));
+                value = Complex { re: value.re + product.re, im: value.im + product.im };
+            }
+            entry.values.push(value);
+        }
+    }
+    SIZES
 }
 
 /// Values for constants from outside.
@@ -134,7 +147,28 @@ impl Points<'_> {
     fn at(&self, random: &mut Random, draw: usize) -> Vec<f64> {
         let point: Vec<f64> =
             self.samplings.iter().map(|sampling| coordinate(random, draw, *sampling)).collect();
-        self.graph.evaluate(self.nodes, Point { variables: &point, opaque: &self.constants, seeds: &[] })
+        self.evaluate(&point)
+    }
+
+    /// The values where the first variables are at rest, and the others anywhere positive.
+    fn at_rest(&self, random: &mut Random, states: usize) -> Vec<f64> {
+        let rest = |sampling: &Sampling| match (sampling.nominal, sampling.range) {
+            (Some(nominal), _) => nominal,
+            (None, Some((low, high))) => 0f64.max(low).min(high),
+            (None, None) => 0.0,
+        };
+        let point: Vec<f64> = (self.samplings.iter().enumerate())
+            .map(
+                |(index, sampling)| {
+                    if index < states { rest(sampling) } else { coordinate(random, 1, *sampling) }
+                },
+            )
+            .collect();
+        self.evaluate(&point)
+    }
+
+    fn evaluate(&self, point: &[f64]) -> Vec<f64> {
+        self.graph.evaluate(self.nodes, Point { variables: point, opaque: &self.constants, seeds: &[] })
     }
 }
 

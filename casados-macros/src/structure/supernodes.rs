@@ -58,7 +58,7 @@ mod tests {
                 entries.push(Entry { row, column, values: vec![Complex { re, im: 0.0 }], trivial: false });
             }
         }
-        plan(size as usize, &entries)
+        plan(size as usize, &entries, 0)
     }
 
     #[test]

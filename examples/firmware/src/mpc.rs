@@ -114,8 +114,7 @@ fn start<T: Real>(
     let (problem, rest) = numbers.split_at_mut_checked(problem).unwrap_or_default();
     let (plan, solver) = rest.split_at_mut_checked(plan).unwrap_or_default();
 
-    let integrator = Dynamics::<T>::inline(crate::options(3))
-        .map_err(|error| OcpError::Integration { interval: 0, error })?;
+    let integrator = Dynamics::<T>::inline(crate::options(3))?;
     let mut ocp = Problem::new(integrator)
         .stage_cost(LeastSquaresCost::<Deviation, T>::diagonal(&[1.0, 10.0, 0.1, 0.1, 0.01].map(number)))
         .terminal_cost(LeastSquaresCost::<End, T>::diagonal(&[20.0, 100.0, 5.0, 5.0].map(number)))
@@ -148,9 +147,7 @@ fn drive<T: Real>(controller: &mut Controller<T>) -> Result<(), OcpError> {
         note(&mut iterations, result.statistics.iterations as u32);
         let force = result.u.first().copied().unwrap_or(T::ZERO);
         let integrator = &mut controller.ocp_mut().problem().dynamics;
-        let step = integrator
-            .solve(&Vector4::from(x), &Vector1::new(force), number(SAMPLE))
-            .map_err(|error| OcpError::Integration { interval: 0, error })?;
+        let step = integrator.solve(&Vector4::from(x), &Vector1::new(force), number(SAMPLE))?;
         x = step.x.into();
         controller.shift();
         if sample % 10 == 9 {

@@ -79,9 +79,7 @@ pub struct Statistics {
 
 impl Loop {
     pub fn new() -> Result<Self, OcpError> {
-        let integrator = || {
-            Dynamics::new(Options::default()).map_err(|error| OcpError::Integration { interval: 0, error })
-        };
+        let integrator = || Dynamics::new(Options::default());
         let mut ocp = Problem::new(integrator()?)
             .stage_cost(LeastSquaresCost::<Deviation>::diagonal(&[1.0; 6]))
             .terminal_cost(LeastSquaresCost::<End>::diagonal(&[1.0; 5]))
@@ -115,20 +113,14 @@ impl Loop {
     }
 
     pub fn advance(&mut self, seconds: f64, pushes: [f64; 3]) -> Result<(), OcpError> {
-        let failed = |error| OcpError::Integration { interval: 0, error };
-        self.plant.set_parameters(&Vector3::from(pushes)).map_err(failed)?;
+        self.plant.set_parameters(&Vector3::from(pushes))?;
         let mut left = seconds;
         while left > 0.0 {
             if SAMPLE - self.since < 1e-9 {
                 self.sample()?;
             }
             let h = left.min(SAMPLE - self.since);
-            self.x = self
-                .plant
-                .solve(&Vector4::from(self.x), &Vector1::new(self.force), h)
-                .map_err(failed)?
-                .x
-                .into();
+            self.x = self.plant.solve(&Vector4::from(self.x), &Vector1::new(self.force), h)?.x.into();
             self.since += h;
             left -= h;
         }

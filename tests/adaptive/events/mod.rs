@@ -1,8 +1,10 @@
 //! Events against closed forms: times, states, and their derivatives, which are complex steps
 //! through the formulas.
 
+mod algebraic;
 mod integrals;
 mod second;
+mod simultaneous;
 
 use casados::adaptive::HybridHessian;
 use casados::prelude::*;
@@ -129,21 +131,39 @@ fn a_bouncing_ball() {
     bounces!(DormandPrince8);
 }
 
-/// Bounces come sooner and sooner: without end before `t = 3.3`.
+/// Bounces come sooner and sooner, without end before `t₁ + 2 v₁ r/(g (1 − r))`, where the ball
+/// lies on the ground.
 #[test]
-fn events_without_end_are_an_error() {
+fn accumulating_events_are_an_error() {
     let event = Event::jump::<Height, Bounce>(Crossing::Falling);
     let adaptive = Adaptive::<Ball, Radau>::new(options(1e-8)).unwrap();
     let mut hybrid = Hybrid::new(adaptive, &[event]).unwrap();
-    hybrid.set_most_events(12);
     hybrid.integrator().set_parameters(&vector![9.81, 0.7]).unwrap();
     let (x0, u) = (vector![1.3, 0.4], vector![]);
-    let error = hybrid.solve(&x0, &u, 5.0).unwrap_err();
-    let Error::TooManyEvents { t, events: 12 } = error else { panic!("{error}") };
-    let (times, _) = bouncing([1.3, 0.4, 9.81, 0.7].map(|w| Complex::new(w, 0.0)), 13, 5.0);
-    assert_close([t], [times[12].re], 1e-9);
-    assert_eq!(hybrid.dense(0.1).unwrap_err(), Error::NoResult);
-    assert_eq!(hybrid.solve(&x0, &u, 0.8).unwrap().occurrences.len(), 1);
+    let speed = (0.4f64 * 0.4 + 2.0 * 9.81 * 1.3).sqrt();
+    let end = (0.4 + speed) / 9.81 + 2.0 * speed * 0.7 / (9.81 * (1.0 - 0.7));
+    // Whether they are counted or not.
+    for most in [12, 1000] {
+        hybrid.set_most_events(most);
+        let error = hybrid.solve(&x0, &u, 5.0).unwrap_err();
+        let Error::AccumulatingEvents { t, function: "Height", event: 0, .. } = error else {
+            panic!("{error}")
+        };
+        assert_close([t], [end], 1e-9);
+        assert!(error.to_string().starts_with("events accumulate at t = "), "{error}");
+        assert_eq!(hybrid.dense(0.1).unwrap_err(), Error::NoResult);
+        assert_eq!(hybrid.solve(&x0, &u, 0.8).unwrap().occurrences.len(), 1);
+    }
+    // Those that do not accumulate are counted.
+    let event = Event::jump::<Height, Bounce>(Crossing::Falling);
+    let adaptive = Adaptive::<Ball, Radau>::new(options(1e-8)).unwrap();
+    let mut hybrid = Hybrid::new(adaptive, &[event]).unwrap();
+    hybrid.integrator().set_parameters(&vector![9.81, 1.0]).unwrap();
+    hybrid.set_most_events(6);
+    let error = hybrid.solve(&x0, &u, 50.0).unwrap_err();
+    let Error::TooManyEvents { t, events: 6 } = error else { panic!("{error}") };
+    let (times, _) = bouncing([1.3, 0.4, 9.81, 1.0].map(|w| Complex::new(w, 0.0)), 7, 5.0);
+    assert_close([t], [times[6].re], 1e-9);
 }
 
 /// `ẋ = −p x + u`, `z = x²`

@@ -3,18 +3,22 @@
 //! ```text
 //! cargo run --manifest-path benches/Cargo.toml -p public-problems --bin public_problems -- \
 //!     [--held-out] [--set collection] [--only part] [--solver Sqp] [--repetitions 3] [--refine 2] \
-//!     [--log] [--ipopt] [--json file]
+//!     [--limit 20] [--log] [--ipopt] [--json file]
 //! ```
 //!
-//! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python that
-//! `CASADOS_PYTHON` names, and the library that `cargo build` makes beside this program.
+//! Cells are `iterations / iterations of QPs / ms of CPU`. `--ipopt` needs CasADi in the Python of
+//! `CASADOS_PYTHON`, and the library that `cargo build` makes beside this program.
+//! `--grids` writes `grids.json` instead: IPOPT's objectives on the grids of problems and on those
+//! with twice as many intervals.
 
 use public_problems::ipopt::Ipopt;
 use public_problems::run::{Made, Solver, Task};
 use public_problems::table::{self, Sums};
 use public_problems::{Entry, Failure, families, sets};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::io::Write;
+use std::time::Duration;
 
 /// What is asked for.
 struct Arguments {
@@ -25,6 +29,8 @@ struct Arguments {
     refinement: usize,
     log: bool,
     ipopt: bool,
+    grids: bool,
+    limit: Duration,
     json: Option<String>,
 }
 
@@ -39,6 +45,8 @@ impl Arguments {
             refinement: 1,
             log: false,
             ipopt: false,
+            grids: false,
+            limit: Duration::from_secs(20),
             json: None,
         };
         while let Some(argument) = given.next() {
@@ -53,8 +61,10 @@ impl Arguments {
                 }
                 "--repetitions" => arguments.repetitions = value()?.parse()?,
                 "--refine" => arguments.refinement = value()?.parse()?,
+                "--limit" => arguments.limit = Duration::from_secs_f64(value()?.parse()?),
                 "--log" => arguments.log = true,
                 "--ipopt" => arguments.ipopt = true,
+                "--grids" => arguments.grids = true,
                 "--json" => arguments.json = Some(value()?),
                 _ => return Err(format!("{argument} is not known").into()),
             }
@@ -73,14 +83,13 @@ fn median(mut runs: Vec<Made>) -> Option<Made> {
 /// All solvers on a problem, by turns.
 fn solve(entry: &Entry, arguments: &Arguments) -> Vec<Made> {
     let mut runs = vec![Vec::new(); arguments.solvers.len() + usize::from(arguments.ipopt)];
-    let limit = Task::new(Solver::Ipm).limit;
-    let mut ipopt = arguments
-        .ipopt
-        .then(|| Ipopt::start(&entry.facts.name, arguments.refinement, limit.as_secs_f64()));
+    let limit = arguments.limit;
+    let mut ipopt =
+        arguments.ipopt.then(|| Ipopt::start(&entry.facts.name, arguments.refinement, limit.as_secs_f64()));
     for repetition in 0..arguments.repetitions.max(1) {
         for (solver, runs) in arguments.solvers.iter().zip(&mut runs) {
             let log = arguments.log && repetition == 0;
-            runs.push(entry.solve(&Task { log, ..Task::new(*solver) }));
+            runs.push(entry.solve(&Task { log, limit, ..Task::new(*solver) }));
         }
         if let (Some(ipopt), Some(runs)) = (&mut ipopt, runs.last_mut()) {
             let answer = ipopt.as_mut().map_err(|error| error.clone()).and_then(Ipopt::solve);
@@ -90,14 +99,37 @@ fn solve(entry: &Entry, arguments: &Arguments) -> Vec<Made> {
     runs.into_iter().filter_map(median).collect()
 }
 
+/// Writes what tolerances are derived from.
+fn write_grids(limit: Duration) -> Result<(), Failure> {
+    let mut grids = BTreeMap::new();
+    for entry in sets::public() {
+        let on = |refinement| {
+            let made = Ipopt::start(&entry.facts.name, refinement, limit.as_secs_f64())?.solve()?;
+            Ok::<_, String>(made.converged.then_some(made.objective))
+        };
+        if let (Some(coarse), Some(fine)) = (on(1)?, on(2)?) {
+            grids.insert(entry.facts.name, [coarse, fine]);
+        }
+    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/grids.json");
+    Ok(std::fs::write(path, serde_json::to_string_pretty(&grids)? + "\n")?)
+}
+
 fn main() -> Result<(), Failure> {
     let arguments = Arguments::read()?;
+    if arguments.grids {
+        return write_grids(arguments.limit);
+    }
     families::refine(arguments.refinement);
     let mut names: Vec<_> = arguments.solvers.iter().map(|solver| solver.name()).collect();
     names.extend(arguments.ipopt.then_some("IPOPT"));
     let mut sums = vec![Sums::default(); names.len()];
     let mut file = arguments.json.as_ref().map(std::fs::File::create).transpose()?;
-    println!("| problem | published | {} |\n| --- | --- |{}", names.join(" | "), " --- |".repeat(names.len()));
+    println!(
+        "| problem | published | {} |\n| --- | --- |{}",
+        names.join(" | "),
+        " --- |".repeat(names.len())
+    );
     for entry in sets::named(&arguments.set)? {
         if !entry.facts.name.contains(&arguments.only) {
             continue;

@@ -43,7 +43,7 @@ fn dubins_length(x: [f64; 4], _u: [f64; 1]) -> f64 {
     x[3]
 }
 
-/// The shortest path to a pose with the same heading and curvature up to one: left, straight, right.
+/// The shortest path to a pose with the same heading, curvature up to one: left, straight, right.
 fn dubins() -> made!() {
     let n = intervals(40);
     let mut ocp = Problem::new(rk4::<DubinsCar>(1)?)
@@ -199,7 +199,7 @@ pub fn all() -> Vec<Entry> {
     let facts = Facts::new;
     vec![
         Entry::new(
-            facts("brachistochrone", "dymos, examples/brachistochrone", 1.8016, 1e-3, &["free time"]),
+            facts("brachistochrone", "dymos, examples/brachistochrone", 1.8016, 5e-5, &["free time"]),
             brachistochrone,
         ),
         Entry::new(
@@ -207,22 +207,22 @@ pub fn all() -> Vec<Entry> {
                 "dubins",
                 "L. E. Dubins, Amer. J. Math. 79 (1957): the word LSR",
                 5.108397888544718,
-                1e-3,
+                0.0,
                 &["free time", "bang-bang", "singular arc"],
             ),
             dubins,
         ),
         Entry::new(
-            facts("minimal_surface", "closed form", 0.953624106702, 1e-3, &["smooth"]),
+            facts("minimal_surface", "closed form", 0.953624106702, 0.0, &["smooth"]),
             minimal_surface,
         ),
-        Entry::new(facts("zermelo_shear", bryson, 5.46, 1e-3, &["free time"]), zermelo_shear),
+        Entry::new(facts("zermelo_shear", bryson, 5.46, 5e-3, &["free time"]), zermelo_shear),
         Entry::new(
             facts(
                 "brockett",
                 "R. W. Brockett, Control theory and singular Riemannian geometry, 1982",
                 2.0 * PI,
-                1e-3,
+                0.0,
                 &["saddle at the guess", "not isolated"],
             ),
             brockett,
@@ -232,13 +232,13 @@ pub fn all() -> Vec<Entry> {
                 "dido",
                 "closed form",
                 -1.0 / (4.0 * PI),
-                1e-3,
+                0.0,
                 &["periodic", "path equality", "not isolated"],
             ),
             dido,
         ),
         Entry::new(
-            facts("obstacle", "PSOPT, obstacle", 4.571044, 1e-4, &["feasibility", "path constraint"]),
+            facts("obstacle", "PSOPT, obstacle", 4.571044, 5e-7, &["feasibility", "path constraint"]),
             obstacle,
         ),
     ]

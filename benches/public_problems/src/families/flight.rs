@@ -45,7 +45,6 @@ fn f8() -> made!() {
     Ok(ocp)
 }
 
-/// Aerodynamic forces of the missile over its mass, along and across, m/s².
 const MISSILE_MASS: f64 = 1005.0;
 const MISSILE_AREA: f64 = 0.3376;
 
@@ -314,7 +313,7 @@ pub fn all() -> Vec<Entry> {
                 "f8",
                 "PSOPT, f8; C. Y. Kaya, J. L. Noakes 1996",
                 3.780858,
-                1e-3,
+                5e-7,
                 &["free time", "bang-bang"],
             ),
             f8,
@@ -324,29 +323,29 @@ pub fn all() -> Vec<Entry> {
                 "missile",
                 "PSOPT, missile; S. Subchan, R. Żbikowski 2009",
                 40.91755,
-                1e-3,
+                5e-6,
                 &["free time", "units", "path constraint", "steep"],
             ),
             missile,
         ),
         Entry::new(
-            facts("shuttle_reentry", betts, -34.1412 * PI / 180.0, 1e-3, &["free time", "units"]),
+            facts("shuttle_reentry", betts, -34.1412 * PI / 180.0, 1e-6, &["free time", "units"]),
             shuttle_reentry,
         ),
         Entry::new(
-            facts("glider", "COPS 3.0", -1248.03, 1e-3, &["free time", "units", "singular arc"]),
+            facts("glider", "COPS 3.0", -1248.03, 5e-3, &["free time", "units", "singular arc"]),
             glider,
         ),
         Entry::new(
-            facts("goddard_in_feet", betts, -18550.872, 1e-3, &["free time", "units", "singular arc"]),
+            facts("goddard_in_feet", betts, -18550.872, 5e-4, &["free time", "units", "singular arc"]),
             goddard_in_feet,
         ),
         Entry::new(
-            facts("single_stage", "dymos, ssto_earth", 143.0, 1e-3, &["free time", "units"]),
+            facts("single_stage", "dymos, ssto_earth", 143.0, 1.0, &["free time", "units"]),
             single_stage,
         ),
         Entry::new(
-            facts("moon_lander", "PSOPT, moon", 1.4204, 1e-3, &["free time", "bang-bang"]),
+            facts("moon_lander", "PSOPT, moon", 1.4204, 5e-6, &["free time", "bang-bang"]),
             moon_lander,
         ),
         Entry::new(
@@ -354,7 +353,7 @@ pub fn all() -> Vec<Entry> {
                 "orbit_transfer",
                 "A. E. Bryson, Y.-C. Ho, Applied Optimal Control, 1975, p. 66",
                 -1.525,
-                1e-3,
+                5e-4,
                 &["terminal constraint", "time-dependent"],
             ),
             orbit_transfer,

@@ -8,8 +8,8 @@ mod processes;
 mod robots;
 mod textbook;
 
-use crate::Entry;
-use casados::ocp::{Formulation, HeapOcp, Horizon, OcpError};
+use crate::{Entry, Failure};
+use casados::ocp::{Formulation, HeapOcp, Horizon};
 use casados::{Erk, Error, Ode, Options, Rk4};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -57,7 +57,7 @@ fn line<P: Formulation<f64>>(
     from: &[f64],
     to: &[f64],
     u: &[f64],
-) -> Result<(), OcpError> {
+) -> Result<(), Failure> {
     let n = ocp.intervals();
     for k in 0..=n {
         let part = k as f64 / n as f64;
@@ -69,7 +69,7 @@ fn line<P: Formulation<f64>>(
 
 /// Gives the first states values at a stage: not more than are in the list, and not those that are
 /// not finite.
-fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[f64]) -> Result<(), OcpError> {
+fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[f64]) -> Result<(), Failure> {
     for (i, &value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
         ocp.bound(&format!("x[{i}]"), stage..=stage, value, value)?;
     }

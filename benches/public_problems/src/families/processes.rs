@@ -182,15 +182,15 @@ pub fn all() -> Vec<Entry> {
     let facts = Facts::new;
     vec![
         Entry::new(
-            facts("catalyst_mixing", "PSOPT, catmix; COPS 3.0", -0.0480532, 1e-4, &["singular arc"]),
+            facts("catalyst_mixing", "PSOPT, catmix; COPS 3.0", -0.0480532, 5e-8, &["singular arc"]),
             catalyst_mixing,
         ),
         Entry::new(
-            facts("tubular_reactor", "S. A. Dadebo, K. B. McAuley 1995", -0.573530, 1e-4, &["smooth"]),
+            facts("tubular_reactor", "S. A. Dadebo, K. B. McAuley 1995", -0.573530, 5e-7, &["smooth"]),
             tubular_reactor,
         ),
         Entry::new(
-            facts("cstr", "R. Luus, Iterative Dynamic Programming, 2000", 0.133094, 1e-4, &["two minima"]),
+            facts("cstr", "R. Luus, Iterative Dynamic Programming, 2000", 0.133094, 5e-7, &["two minima"]),
             cstr,
         ),
         Entry::new(
@@ -198,7 +198,7 @@ pub fn all() -> Vec<Entry> {
                 "penicillin",
                 "J. E. Cuthrell, L. T. Biegler 1989; PROPT",
                 -87.99,
-                1e-2,
+                5e-3,
                 &["free time", "singular arc", "state constraint", "stiff"],
             ),
             penicillin,
@@ -208,13 +208,13 @@ pub fn all() -> Vec<Entry> {
                 "lee_ramirez",
                 "J. Lee, W. F. Ramirez 1994; PROPT",
                 -6.1516,
-                1e-3,
+                5e-5,
                 &["singular arc", "flat"],
             ),
             lee_ramirez,
         ),
         Entry::new(
-            facts("park_ramirez", "E. Balsa-Canto et al. 2001; PROPT", -32.47, 1e-2, &["singular arc"]),
+            facts("park_ramirez", "E. Balsa-Canto et al. 2001; PROPT", -32.47, 5e-3, &["singular arc"]),
             park_ramirez,
         ),
     ]

@@ -12,7 +12,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// the estimate. The second, of the states, is that of [`DefectFilter`].
     pub(super) fn estimate(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         at_end: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
@@ -21,7 +21,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
         let first = norm(errors, start.scale.as_ref());
         let larger = self.second(first, start);
-        if at_end || !start.known || larger <= first.max(UNDOUBTED) {
+        if at_end || !start.known || larger <= first.max(SAFE_ESTIMATE) {
             return Ok(larger);
         }
         // Newton's method leaves a residual of algebraic equations at the start, which does not
@@ -38,25 +38,28 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     }
 
     /// The larger one of an estimate and the second one, of the defect that was filtered last.
-    fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
+    fn second(&self, first: f64, start: &StepContext<'_, M, T>) -> f64 {
         let [error, divided] = self.filtered_defect(start.h);
         let mut relative = RelativeErrors::default();
-        let asked = start.scale.as_ref().iter().zip(start.asked.as_ref());
-        for ((error, divided), (scale, asked)) in error.as_ref().iter().zip(divided.as_ref()).zip(asked) {
-            let asked = *scale * *asked;
-            relative.add((*error * asked).to_f64(), (*divided * asked).to_f64());
+        let user_ratio = start.scale.as_ref().iter().zip(start.user_ratio.as_ref());
+        for ((error, divided), (scale, user_ratio)) in
+            error.as_ref().iter().zip(divided.as_ref()).zip(user_ratio)
+        {
+            let user_ratio = *scale * *user_ratio;
+            relative.add((*error * user_ratio).to_f64(), (*divided * user_ratio).to_f64());
         }
-        self.scheme.defect_filter.larger(first, start.finer, &relative)
+        self.scheme.defect_filter.larger(first, start.tolerance_ratio, &relative)
     }
 
     /// The larger one of an estimate at the end of a step and the same at its start: of what ends
     /// between the start and the first stage, as a force that jumps there, neither the stages nor
     /// the end know. What the polynomial has for `ẋ` at the start tells at no cost where that is
     /// nothing new: no filter makes more of what is neither stiff nor turns, and where the estimate
-    /// is held against the tolerance that was asked for it counts `finer / LENIENT` times at most.
+    /// is held against the tolerance that was asked for it counts `tolerance_ratio /
+    /// ORDER_REDUCTION_RATIO` times at most.
     pub(super) fn larger_at_start(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         error: f64,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
@@ -72,7 +75,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         }
         let unfiltered = self.scheme.basis.values().scaled(start.h).get(0).0.to_f64().abs()
             * norm(&changes.as_ref()[..nx], start.scale.as_ref());
-        let undoubted = UNDOUBTED * (LENIENT / start.finer).min(1.0);
+        let undoubted = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
         if unfiltered <= 2.0 * error.max(undoubted) {
             return Ok(error);
         }

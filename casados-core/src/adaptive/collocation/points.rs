@@ -28,7 +28,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
 
     /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of
     /// the squares of the changes of `(ξ, z)` relative to what is tolerated.
-    pub(super) fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
+    pub(super) fn advance(&mut self, start: &StepContext<'_, M, T>, increment: bool) -> f64 {
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
         let (re, im) = self.scheme.right.split_at(PARTS / 2);

@@ -28,13 +28,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// is larger than foreseen.
     pub(super) fn roughness(
         &mut self,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         growth: f64,
-        look: Look,
+        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        let watched = look != Look::Unusual;
-        if S < 3 || !watched && !self.scheme.stiffly_accurate && growth <= 1.0 {
+        let after_rejection = check != DefectCheck::Suspicious;
+        if S < 3 || !after_rejection && !self.scheme.stiffly_accurate && growth <= 1.0 {
             return Ok(0.0);
         }
         let (scheme, radau) = (&self.scheme, self.scheme.stiffly_accurate);
@@ -45,10 +45,13 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let expected = scaled_sum::<M, T>(at_near / at_seen, &known, 0.0, &known);
         let difference = unlike::<M, T>(&first, &expected, start);
         let largest = size::<M, T>(&known, start).max(size::<M, T>(&first, start));
-        if !watched && difference <= SUSPECTED && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING {
+        if !after_rejection
+            && difference <= SUSPECTED
+            && difference * Scalar::sqrt(growth) <= SUSPECTED_GROWING
+        {
             return Ok(0.0);
         }
-        if !watched && !radau {
+        if !after_rejection && !radau {
             return Ok(largest);
         }
         let second = self.defect_at(far, start, residuals)?;
@@ -56,7 +59,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let (a, b) = ((1.0 - share) / at_seen * at_far, share / at_near * at_far);
         let difference = unlike::<M, T>(&second, &scaled_sum::<M, T>(a, &known, b, &first), start);
         let decades = Scalar::ln(growth) / core::f64::consts::LN_10;
-        let rough = look >= Look::Knot || difference * (1.0 + decades) > ROUGH;
+        let rough = check >= DefectCheck::SplineKnot || difference * (1.0 + decades) > ROUGH;
         Ok(if rough { largest.max(size::<M, T>(&second, start)) } else { 0.0 })
     }
 
@@ -64,7 +67,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     fn defect_at(
         &mut self,
         tau: f64,
-        start: &Start<'_, M, T>,
+        start: &StepContext<'_, M, T>,
         residuals: &mut usize,
     ) -> Result<ArrayK<M, T>, Failure> {
         self.memory.point = *start.point;
@@ -91,12 +94,12 @@ fn scaled_sum<M: Dae, T: Real>(a: f64, x: &ArrayK<M, T>, b: f64, y: &ArrayK<M, T
 }
 
 /// The size of a defect of the states.
-fn size<M: Dae, T: Real>(defect: &ArrayK<M, T>, start: &Start<'_, M, T>) -> f64 {
+fn size<M: Dae, T: Real>(defect: &ArrayK<M, T>, start: &StepContext<'_, M, T>) -> f64 {
     norm(&defect.as_ref()[..M::Shape::NX], start.scale.as_ref())
 }
 
 /// The difference of two defects as a part of both: from zero to one.
-fn unlike<M: Dae, T: Real>(a: &ArrayK<M, T>, b: &ArrayK<M, T>, start: &Start<'_, M, T>) -> f64 {
+fn unlike<M: Dae, T: Real>(a: &ArrayK<M, T>, b: &ArrayK<M, T>, start: &StepContext<'_, M, T>) -> f64 {
     let difference = scaled_sum::<M, T>(1.0, a, -1.0, b);
     // Written so that nothing over nothing is no difference.
     (size::<M, T>(&difference, start) / (size::<M, T>(a, start) + size::<M, T>(b, start))).max(0.0)

@@ -4,28 +4,33 @@ use super::Event;
 use crate::error::{Error, Place};
 use crate::finite::not_finite;
 use crate::model::{ArrayK, ArrayV, Dae, VectorX};
+use crate::result::Dense;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-/// The state and the time to where they lie among the variables.
-pub(super) fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
+/// The state, the algebraic states that are given, and the time to where they lie among the
+/// variables.
+pub(super) fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, z: &[T], t: T) {
     let nx = M::Shape::NX;
     let v = v.as_mut();
     v[nx..2 * nx].copy_from_slice(x.as_slice());
+    for (to, z) in v.iter_mut().skip(2 * nx).zip(z) {
+        *to = *z;
+    }
     if let Some(time) = v.last_mut() {
         *time = t;
     }
 }
 
-/// The function of an event at a state.
+/// The function of an event at a point of the polynomial of a step.
 pub(super) fn evaluate<M: Dae, T: Real>(
     event: &Event<M, T>,
     v: &mut ArrayV<M, T>,
-    x: &VectorX<M, T>,
+    at: &Dense<M, T>,
     t: T,
     k: usize,
 ) -> Result<f64, Error> {
-    place::<M, T>(v, x, t);
+    place::<M, T>(v, &at.x, at.z.as_slice(), t);
     let value = event.guard.first(v);
     finite(event.guard.name, &[value], k)?;
     Ok(value.to_f64())

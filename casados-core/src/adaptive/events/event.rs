@@ -53,8 +53,8 @@ impl Crossing {
     }
 }
 
-/// A zero crossing of a function `g(x, u, p, t)`, where an integration ends or the state jumps to
-/// `j(x, u, p, t)`.
+/// A zero crossing of a function `g(x, z, u, p, t)`, where an integration ends or the state jumps
+/// to `j(x, u, p, t)`.
 ///
 /// ```
 /// use casados::prelude::*;
@@ -65,11 +65,10 @@ impl Crossing {
 /// #[function]
 /// fn height(x: [f64; 2]) -> f64 { x[0] }
 ///
-/// // The integration ends on the ground.
-/// let ground = Event::terminal::<Height>(Crossing::Falling);
-/// let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[ground])?;
-/// let end = ball.solve(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 9.0)?;
-/// assert!((end.t - 1.0).abs() < 1e-12);
+/// // The integration ends on the ground. let ground =
+/// Event::terminal::<Height>(Crossing::Falling); let mut ball = Hybrid::new(Adaptive::<Ball,
+/// Radau>::new(AdaptiveOptions::default())?, &[ground])?; let end = ball.solve(&vector![5.0, 0.0],
+/// &SVector::<f64, 0>::zeros(), 9.0)?; assert!((end.t - 1.0).abs() < 1e-12);
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub struct Event<M: Dae, T: Real = f64> {
@@ -81,7 +80,7 @@ pub struct Event<M: Dae, T: Real = f64> {
 impl<M: Dae, T: Real> Event<M, T> {
     /// The integration ends where the only output of `G` crosses zero.
     ///
-    /// That `G` has one output and does not depend on `z` is checked when the program is compiled.
+    /// That `G` has one output is checked when the program is compiled.
     #[must_use]
     pub fn terminal<G: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(G::Outputs::NY == 1, "the function of an event has one output") };
@@ -91,12 +90,12 @@ impl<M: Dae, T: Real> Event<M, T> {
     /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state
     /// before.
     ///
-    /// That `G` has one output and `J` one for each state, and that neither depends on `z`, is
+    /// That `G` has one output and `J` one for each state, and that `J` does not depend on `z`, is
     /// checked when the program is compiled.
     #[must_use]
     pub fn jump<G: Function<Shape = M::Shape>, J: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(J::Outputs::NY == <M::Shape as Shape>::NX, "a jump has one output for each state") };
-        Self { jump: Some(Map::of::<J>()), ..Self::terminal::<G>(crossing) }
+        Self { jump: Some(Map::of_states::<J>()), ..Self::terminal::<G>(crossing) }
     }
 }
 
@@ -119,6 +118,8 @@ type Curvature<M, T> = fn(&ArrayV<M, T>, &[T], &mut dyn FnMut(usize, usize, T));
 /// A function with at most as many outputs as there are states.
 pub(super) struct Map<M: Dae, T: Real> {
     pub name: &'static str,
+    /// Whether it looks at algebraic states.
+    pub algebraic: bool,
     value: fn(&ArrayV<M, T>, &mut [T]),
     adjoint: Adjoint<M, T>,
     rate: fn(&ArrayV<M, T>, &mut [T]),
@@ -146,15 +147,21 @@ fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
 }
 
 impl<M: Dae, T: Real> Map<M, T> {
-    fn of<F: Function<Shape = M::Shape>>() -> Self {
+    /// Of a function that does not look at algebraic states.
+    fn of_states<F: Function<Shape = M::Shape>>() -> Self {
         const {
             assert!(
                 F::STRUCTURE.blocks[2] == F::STRUCTURE.blocks[3],
-                "events and jumps do not depend on algebraic states: write them in terms of x, u, p and t"
+                "jumps do not depend on algebraic states: write them in terms of x, u, p and t"
             );
         }
+        Self::of::<F>()
+    }
+
+    fn of<F: Function<Shape = M::Shape>>() -> Self {
         Self {
             name: F::STRUCTURE.name,
+            algebraic: F::STRUCTURE.blocks[2] != F::STRUCTURE.blocks[3],
             value: |v, y| outputs::<F, T>(y, |y| F::value::<T>(v, y)),
             adjoint: |v, mu, gradient| F::adjoint::<T>(v, &multipliers::<F, T>(mu), gradient),
             rate: |v, y| outputs::<F, T>(y, |y| F::time_derivative::<T>(v, y)),

@@ -3,7 +3,7 @@
 
 use super::super::run::Span;
 use super::super::sealed::Engine;
-use super::evaluate::{evaluate, finite, slope};
+use super::evaluate::finite;
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
@@ -18,9 +18,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// be the same, unless an event ends it before.
     ///
     /// Times of events still depend on everything, and the steps between two events are stretched
-    /// with the time between them. That events happen in this order, once each, and others do not,
-    /// is not looked at again. Derivatives at events are those of the solution, as without it: they
-    /// belong to this function up to the errors of its steps.
+    /// with the time between them. Events that happened at one time have to do so still. That
+    /// events happen in this order, once each, and others do not, is not looked at again.
+    /// Derivatives at events are those of the solution, as without it: they belong to this function
+    /// up to the errors of its steps.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following
@@ -123,10 +124,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             self.stretched(k, start, t)?;
             let x = self.integrator.base.result.x;
             let y = self.slope(&x, &u, t)?;
-            self.go(k);
-            let value = T::from_f64(evaluate(event, &mut self.v, &x, t, k)?);
-            let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
-            let change = -value / slope::<M, T>(&gradient, rate, &y);
+            let guard = self.guard(k, event, (&x, &u, t), &y)?;
+            if whole == T::ZERO {
+                // It happened at the time of the event before it, and does so still.
+                if guard.is_zero(t) {
+                    return Ok(t);
+                }
+                break;
+            }
+            let change = -(guard.value / guard.rate);
             let resolution = T::from_f64(T::EPSILON) * t.abs().max(whole.abs());
             if change.abs() <= resolution
                 || (iteration > 3 && change.abs() >= last && last <= T::from_f64(64.0) * resolution)
@@ -140,6 +146,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             }
         }
         let (t, h) = (start.to_f64(), length.to_f64());
-        Err(Error::StepSizeUnderflow { t, h, reason: Refusal::NotConverged })
+        Err(Error::StepSizeUnderflow { t, h, reason: Refusal::NotConverged, unsettled: None })
     }
 }

@@ -13,13 +13,16 @@
 //! derivatives are those of the steps that were taken. At events they are those of the solution: a
 //! step's derivative by its length is `ẋ`, but for the error of the step.
 
+mod accumulation;
 mod evaluate;
 mod event;
 mod forward;
 mod frozen;
+mod guard;
 mod jump;
 mod results;
 mod second;
+mod simultaneous;
 mod trace;
 
 pub use event::{Crossing, Event};
@@ -63,14 +66,24 @@ use bytemuck::Zeroable;
 /// #[function]
 /// fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 ///
-/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
-/// let end = ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?;
-/// // It hits the ground after a second, at 10 m/s.
-/// assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
+/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling); let mut ball =
+/// Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?; let end =
+/// ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?; // It hits the ground after
+/// a second, at 10 m/s. assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
 /// assert!((end.solution.nominal.x - vector![8.0 * 0.5 - 1.25, 8.0 - 5.0]).norm() < 1e-11);
 /// # Ok::<(), casados::Error>(())
 /// ```
+///
+/// **Events at one time.** Events happen where the solution brings their functions to zero. All
+/// functions that are zero at the same time, to rounding, happen there in the order of the list;
+/// each is looked at again after the jumps before it, and happens if it is still zero. An event
+/// that ends the integration ends it before those behind it in the list. What a jump takes from one
+/// side of zero to the other does not happen, and neither does what is zero at the start: a
+/// function that begins at zero is on the side to which it goes.
+///
+/// **Algebraic states.** Functions may look at `z`; jumps change `x` alone. Of such an event
+/// derivatives follow by the theorem of implicit functions, first ones, where the equations of the
+/// model do not depend on the time.
 ///
 /// All calls take the length `h` of the interval, as those of the integrator. Times of events are
 /// times as the model sees them, and so is that of [`dense`](Self::dense).
@@ -79,8 +92,10 @@ use bytemuck::Zeroable;
 ///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too;
-/// [`Error::TooManyEvents`]; [`Error::NonFiniteFunction`] of an event or a jump. Of calls with
-/// derivatives [`Error::Grazing`]: the time of the event has no derivative.
+/// [`Error::TooManyEvents`]; [`Error::AccumulatingEvents`] where they come sooner and sooner;
+/// [`Error::TooManySteps`] of all steps of a call; [`Error::NonFiniteFunction`] of an event or a
+/// jump. Of calls with derivatives [`Error::Grazing`]: the time of the event has no derivative; and
+/// [`Error::DependsOnTime`] of a function of `z`.
 pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     events: Box<[Event<M, T>]>,
@@ -97,8 +112,11 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     solution: Solution<M, T>,
     /// Where a function is evaluated.
     v: Box<ArrayV<M, T>>,
-    /// On which side of zero each function was.
+    /// On which side of zero each function was, and its value behind that.
     signs: Vec<f64>,
+    values: Vec<f64>,
+    /// The events that happen where the last segment ended, in the order of the list.
+    pending: Vec<usize>,
     /// What is known about the moments of the events of a call.
     moments: Moments<M, T>,
     /// Derivatives over the parts up to now, and memory for the next ones.
@@ -141,6 +159,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             solution,
             v: allocate()?,
             signs: Vec::new(),
+            values: Vec::new(),
+            pending: Vec::new(),
             moments: Vec::new(),
             sensitivities: None,
             second: None,

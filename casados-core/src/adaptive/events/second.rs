@@ -280,6 +280,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 return Err(Error::DependsOnTime { function: "the model" });
             }
         }
+        if event.guard.algebraic {
+            return Err(Error::GuardOfAlgebraicStates { function: event.guard.name });
+        }
         let functions = [Some(&event.guard), event.jump.as_ref()];
         for map in functions.into_iter().flatten() {
             let mut value = |t: T| {

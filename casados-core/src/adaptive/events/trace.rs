@@ -1,16 +1,17 @@
 //! From event to event: the steps up to each, shortened to its time, and what happens there.
 
 use super::super::point::{At, place_inputs};
-use super::super::replay::{Replay, Taken};
+use super::super::replay::{AcceptedStep, StepDifferentiator};
 use super::super::run::Span;
 use super::super::sealed::Engine;
 use super::super::segment::add;
 use super::super::statistics::AdaptiveStatistics;
-use super::evaluate::{evaluate, finite, place, slope};
-use super::{Event, Hybrid, Moment, Occurrence};
+use super::evaluate::{evaluate, finite, place};
+use super::guard::Guard;
+use super::{Event, Hybrid, Moment};
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
-use crate::memory::push;
+use crate::memory::{extend, push};
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -24,9 +25,6 @@ const PIECES: usize = 4;
 const BISECTIONS: usize = 20;
 /// By so many iterations of Newton's method at most.
 pub(super) const ITERATIONS: usize = 20;
-/// So many units of rounding of its terms are zero.
-const ROUNDING: f64 = 64.0;
-
 /// A function that moves so much slower at the event than over the step before only touches zero.
 const GRAZING: f64 = 1e-8;
 
@@ -74,30 +72,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 self.solution.t = t_end;
                 return Ok(());
             };
-            let Some(event) = self.events.get(index).copied() else { return Err(Error::NoResult) };
-            let t = self.shorten(k, &event, t)?;
-            let before = self.integrator.base.result.x;
-            let occurrences = &mut self.solution.occurrences;
-            if occurrences.len() >= self.most {
-                return Err(Error::TooManyEvents { t: t.to_f64(), events: occurrences.len() });
+            let t = self.locate(k, index, t, u)?;
+            match self.happen(t, u)? {
+                Some(after) => x = after,
+                None => return Ok(()),
             }
-            push(occurrences, Occurrence { event: index, t, before, after: before })?;
-            let Some(jump) = event.jump else {
-                // Where the state is, `z` is that of the equations there.
-                let y = self.slope(&before, u, t)?;
-                self.solution.nominal.x = before;
-                self.solution.nominal.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
-                (self.solution.t, self.solution.terminal) = (t, true);
-                return Ok(());
-            };
-            self.go(k);
-            x.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
-            finite(jump.name, x.as_slice(), k)?;
-            if let Some(occurrence) = self.solution.occurrences.get_mut(k) {
-                occurrence.after = x;
-            }
-            // The side of the solution on which the next steps begin.
-            self.integrator.base.given = self.slope(&x, u, t)?;
             self.integrator.start = t;
         }
     }
@@ -112,15 +91,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     ) -> Result<Found<T>, Error> {
         let start = self.integrator.start;
         self.find_signs(k, x, u, t_end)?;
-        let Self { integrator, segments, events, statistics, v, signs, .. } = self;
+        let Self { integrator, segments, events, statistics, v, signs, values, .. } = self;
         let Some(segment) = segments.get_mut(k) else { return Ok(None) };
         segment.span = Span { start, end: t_end };
         (segment.x, segment.u, segment.given) = (*x, *u, integrator.base.given);
         segment.chosen = true;
+        let allowed = integrator.options.max_steps;
+        let tried = statistics.steps + statistics.rejected + statistics.failed;
+        if tried >= allowed {
+            return Err(Error::TooManySteps { t: start.to_f64(), steps: tried, stiff: false });
+        }
         let (parameters, mut found, mut begin) = (integrator.base.parameters, None, start);
         place_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
         // Each part has a tape of its own, which in later calls is long enough.
         core::mem::swap(&mut integrator.tape, &mut segment.tape);
+        integrator.options.max_steps = allowed - tried;
         let run = integrator.run(x, u, t_end, true, |step, dense| {
             let length = step.end - begin;
             let mut low = begin;
@@ -128,18 +113,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 let part = T::from_f64(piece as f64 / PIECES as f64);
                 let high = if piece == PIECES { step.end } else { begin + part * length };
                 (step.evaluate)(high, dense)?;
-                for (index, (event, sign)) in events.iter().zip(signs.iter_mut()).enumerate() {
-                    let value = evaluate(event, v, &dense.x, high, k)?;
+                for (index, (event, sign)) in events.iter().zip(signs.iter()).enumerate() {
+                    let value = evaluate(event, v, dense, high, k)?;
+                    if let Some(to) = values.get_mut(index) {
+                        *to = value;
+                    }
                     if !event.crossing.matches(*sign, value) {
-                        // Zero is on the way from one side to the other.
-                        *sign = if value == 0.0 { *sign } else { value };
                         continue;
                     }
                     let (mut a, mut b) = (low, high);
                     for _ in 0..BISECTIONS {
                         let middle = a + T::from_f64(0.5) * (b - a);
                         (step.evaluate)(middle, dense)?;
-                        let value = evaluate(event, v, &dense.x, middle, k)?;
+                        let value = evaluate(event, v, dense, middle, k)?;
                         if event.crossing.matches(*sign, value) {
                             b = middle;
                         } else {
@@ -158,15 +144,24 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     step.stop = true;
                     return Ok(());
                 }
+                // Zero is on the way from one side to the other.
+                for (sign, value) in signs.iter_mut().zip(values.iter()).filter(|(_, value)| **value != 0.0) {
+                    *sign = *value;
+                }
                 low = high;
             }
             begin = step.end;
             Ok(())
         });
+        integrator.options.max_steps = allowed;
         core::mem::swap(&mut integrator.tape, &mut segment.tape);
         statistics.add(&integrator.statistics);
-        run?;
-        Ok(found)
+        match run {
+            Err(Error::TooManySteps { t, steps, stiff }) => {
+                Err(Error::TooManySteps { t, steps: steps + tried, stiff })
+            }
+            run => run.map(|_| found),
+        }
     }
 
     /// On which side of zero each function begins. Where it is zero to rounding, it is on the side
@@ -174,42 +169,26 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     fn find_signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
         let start = self.integrator.start;
         let forward = if t_end < start { -1.0 } else { 1.0 };
-        let parameters = self.integrator.base.parameters;
-        place_inputs::<M, T>(self.v.as_mut().as_mut(), u, &parameters);
-        let count = self.events.len();
+        // A segment after an event begins where a function is zero but for the rounding of the
+        // time.
+        let time = if k == 0 { T::ZERO } else { start };
+        let given = self.integrator.base.given;
+        // Where there is none the integration says so.
+        let y =
+            if self.events.is_empty() { given } else { self.slope_from(given, x, u, start).unwrap_or(given) };
         self.signs.clear();
-        let mut there = None;
-        for index in 0..count {
+        for index in 0..self.events.len() {
             let Some(event) = self.events.get(index).copied() else { break };
-            let value = evaluate(&event, &mut self.v, x, start, k)?;
-            let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
-            let mut size = (rate * start).to_f64().abs();
-            for (g, v) in gradient.as_ref().iter().zip(self.v.as_ref().as_ref()) {
-                size += (*g * *v).to_f64().abs();
-            }
-            let is_apart = |size: f64| value.abs() > ROUNDING * T::EPSILON * size;
-            // A segment after an event begins where a function is zero but for the rounding of the
-            // time, which counts by the slope.
-            if k == 0 && is_apart(size) {
-                push(&mut self.signs, value)?;
-                continue;
-            }
-            let y = match there {
-                Some(y) => y,
-                None => *there.insert(self.slope_from(self.integrator.base.given, x, u, start)?),
-            };
-            let total = slope::<M, T>(&gradient, rate, &y);
-            if is_apart(size + (total * start).to_f64().abs()) {
-                push(&mut self.signs, value)?;
-                continue;
-            }
-            push(&mut self.signs, forward * total.to_f64())?;
+            let guard = self.guard(k, &event, (x, u, start), &y)?;
+            let side = if guard.is_zero(time) { forward * guard.rate.to_f64() } else { guard.value.to_f64() };
+            push(&mut self.signs, side)?;
         }
-        Ok(())
+        self.values.clear();
+        extend(&mut self.values, &self.signs)
     }
 
     /// The last step of a segment is made to end where the event is: its time.
-    fn shorten(&mut self, k: usize, event: &Event<M, T>, t: T) -> Result<T, Error> {
+    pub(super) fn shorten(&mut self, k: usize, event: &Event<M, T>, t: T) -> Result<T, Error> {
         let Some(step) = self.segments.get(k).and_then(|segment| segment.tape.entries().len().checked_sub(1))
         else {
             return Ok(t);
@@ -224,9 +203,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let x = self.end_of(k, step, h)?;
             let time = entry.t + h;
             let y = self.slope(&x, &u, time)?;
-            let value = T::from_f64(evaluate(event, &mut self.v, &x, time, k)?);
-            let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
-            let change = -value / slope::<M, T>(&gradient, rate, &y);
+            let guard = self.guard(k, event, (&x, &u, time), &y)?;
+            let change = -(guard.value / guard.rate);
             let next = h + change;
             // Within the step, as far as the polynomial was right; a crossing without slope stays
             // where it was found.
@@ -263,7 +241,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = At { x: &x, u: &segment.u, p: &integrator.base.parameters, t: entry.t };
-        let taken = Taken { at, h, y, level: entry.level, near: false };
+        let taken = AcceptedStep { at, h, y, level: entry.level, near: false };
         Ok(B::replays(&mut integrator.state).solve(&taken, None)?.x)
     }
 
@@ -284,7 +262,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 
     /// The same from start values `y`.
-    fn slope_from(
+    pub(super) fn slope_from(
         &mut self,
         mut y: ArrayK<M, T>,
         x: &VectorX<M, T>,
@@ -304,7 +282,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             return;
         };
         place_inputs::<M, T>(self.v.as_mut().as_mut(), &segment.u, &parameters);
-        place::<M, T>(&mut self.v, &at.before, at.t);
+        place::<M, T>(&mut self.v, &at.before, &[], at.t);
     }
 
     /// What is known about the moment of the event that ends a segment, whose steps were just taken
@@ -322,10 +300,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (index, t, u, before) = (at.event, at.t, segment.u, at.before);
         let Some(event) = self.events.get(index).copied() else { return Ok(None) };
         let xdot = self.slope(&before, &u, t)?;
-        self.go(k);
-        let (guard, by_t) = event.guard.gradient(&self.v, &[T::ONE]);
-        let rate = slope::<M, T>(&guard, by_t, &xdot);
+        if event.guard.algebraic && self.depends_on_time(k, &before, &xdot, t).is_some() {
+            return Err(Error::DependsOnTime { function: "the model" });
+        }
+        let Guard { gradient: guard, rate, .. } = self.guard(k, &event, (&before, &u, t), &xdot)?;
         self.check_slope(k, &event, index, rate)?;
+        self.go(k);
         let mut moment = Moment { guard, rate, before: xdot, after: ArrayK::<M, T>::zeroed() };
         if let Some(jump) = event.jump {
             let mut after = VectorX::<M, T>::zeroed();
@@ -352,11 +332,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let Some(entry) = segment.tape.entries().get(step).copied() else { return Ok(()) };
         let mut x = VectorX::<M, T>::zeroed();
         x.as_mut_slice().copy_from_slice(segment.tape.numbers(step, M::Shape::NX).0);
-        let last = self.integrator.base.result.x;
-        let end = evaluate(event, &mut self.v, &last, entry.t + entry.h, k)?;
-        let start = evaluate(event, &mut self.v, &x, entry.t, k)?;
-        self.go(k);
-        let (change, expected) = ((end - start).abs(), (rate * entry.h).to_f64().abs());
+        let (last, u) = (self.integrator.base.result.x, segment.u);
+        let end = self.value_at(k, event, &last, &u, entry.t + entry.h)?;
+        let start = self.value_at(k, event, &x, &u, entry.t)?;
+        let (change, expected) = ((end - start).to_f64().abs(), (rate * entry.h).to_f64().abs());
         if rate == T::ZERO || expected < GRAZING * change {
             let t = (entry.t + entry.h).to_f64();
             return Err(Error::Grazing { event: index, t });

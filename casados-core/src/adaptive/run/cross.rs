@@ -2,14 +2,19 @@
 //! side, and Newton's method, which has one for all stages, converges in no step over the border,
 //! however short it is.
 
-use super::walk::Walk;
+use super::step_state::StepState;
 use super::*;
 use crate::adaptive::branches::Branches;
 use crate::adaptive::point::variable;
 
-/// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
-/// there is far below rounding.
+/// A step of so many roundoff errors of the interval, and of 1e-12 of it, is as short as any: what
+/// an Euler step misses there is far below rounding.
 const SHORTEST: f64 = 1e3;
+
+/// The length of a step that is as short as any.
+pub(super) fn shortest<T: Real>(span: Span<T>, t: T) -> T {
+    T::from_f64((SHORTEST * T::EPSILON).max(1e-12)) * (span.end - span.start).abs().max(t.abs())
+}
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Goes over a border that a step ends at whose iteration did not converge however short it
@@ -19,19 +24,18 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(super) fn cross(&mut self, walk: &mut Walk<T>, span: Span<T>) -> Result<(), Error> {
-        if const { M::BRANCHES == 0 } || !walk.is_unsolved() {
+    pub(super) fn cross(&mut self, state: &mut StepState<T>, span: Span<T>) -> Result<(), Error> {
+        if const { M::BRANCHES == 0 } || !state.is_unsolved() {
             return Ok(());
         }
-        let length = (span.end - span.start).abs().max(walk.t.abs());
-        let shortest = T::from_f64(SHORTEST * T::EPSILON) * length;
-        let left = (span.end - walk.t).abs();
-        if walk.h.abs() >= shortest || left <= T::from_f64(4.0) * shortest {
+        let shortest = shortest(span, state.t);
+        let left = (span.end - state.t).abs();
+        if state.h.abs() >= shortest || left <= T::from_f64(4.0) * shortest {
             return Ok(());
         }
         // The step that failed last was at most twice as long.
         let over = T::from_f64(4.0) * shortest;
-        let end = walk.t + if span.end < span.start { -over } else { over };
+        let end = state.t + if span.end < span.start { -over } else { over };
         let before = self.base.point;
         if self.settle_behind(end).is_err() {
             self.base.point = before;
@@ -42,15 +46,15 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             self.base.point = before;
             return Ok(());
         }
-        let first = self.first_step(Span { start: end, end: span.end }, walk.longest)?;
-        walk.restart(end, first);
+        let first = self.first_step(Span { start: end, end: span.end }, state.longest)?;
+        state.restart(end, first);
         Ok(())
     }
 
     /// The point that an explicit Euler step leads to, with consistent `(ẋ, z)`.
     fn settle_behind(&mut self, end: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        let Base { point, start, u, parameters, .. } = &mut *self.base;
+        let Workspace { point, start, u, parameters, .. } = &mut *self.base;
         let h = end - point.as_ref().last().copied().unwrap_or(end);
         let mut x = VectorX::<M, T>::zeroed();
         for (index, x) in x.as_mut_slice().iter_mut().enumerate() {

@@ -1,7 +1,7 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
-use crate::adaptive::branches::{Branches, Look};
+use crate::adaptive::branches::{Branches, DefectCheck};
 use crate::adaptive::stages::Convergence;
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
@@ -24,25 +24,25 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::OutOfMemory`]
     pub(super) fn choose_stages<B: Family>(
         &mut self,
-        levels: &mut Levels<M, T>,
-        walk: &mut Walk<T>,
+        levels: &mut Orders<M, T>,
+        state: &mut StepState<T>,
     ) -> Result<(), Error> {
-        let ratio = walk.accepted.map(|before| (walk.h / before).to_f64());
-        if walk.need >= Need::Factors {
-            let level = walk.order.level;
-            let next = walk.order.next(&walk.convergence, ratio.unwrap_or(1.0), B::LEVELS);
+        let ratio = state.accepted.map(|before| (state.h / before).to_f64());
+        if state.need >= Need::Factors {
+            let level = state.order.level;
+            let next = state.order.next(&state.convergence, ratio.unwrap_or(1.0), B::LEVELS);
             if next != level {
                 levels.change::<B>(level, next)?;
-                walk.order.change(next);
-                walk.controller.forget();
-                walk.trend.forget();
+                state.order.change(next);
+                state.controller.forget();
+                state.error_history.forget();
                 self.tighten::<B>(levels.get::<B>(next)?.count());
             }
         }
-        let stages = levels.get::<B>(walk.order.level)?;
+        let stages = levels.get::<B>(state.order.level)?;
         match ratio {
             // The polynomial of the last step may be that of another branch.
-            Some(ratio) if M::BRANCHES == 0 || !walk.is_unsolved() => {
+            Some(ratio) if M::BRANCHES == 0 || !state.is_unsolved() => {
                 stages.continue_from_last(ratio);
             }
             _ => stages.begin(&self.base.point),
@@ -58,36 +58,71 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     pub(super) fn factor<B: Family>(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        walk: &mut Walk<T>,
+        state: &mut StepState<T>,
     ) -> Result<bool, Error> {
-        if walk.need == Need::Jacobian {
-            self.linearise(stages, walk)?;
+        if state.need == Need::Jacobian {
+            self.linearise(stages, state)?;
         }
-        if walk.need < Need::Factors {
-            return Ok(!walk.keeps_matrix(B::LEVELS));
+        if state.need < Need::Factors {
+            return Ok(!state.keeps_matrix(B::LEVELS));
         }
-        stages.set_pivoted(walk.pivoted);
-        self.statistics.factorizations += 1;
-        match stages.factor(&self.base.jacobian, walk.h) {
+        let mut factored = self.factor_with(stages, state);
+        if state.verifies_pivots && !state.pivoted && !stages.factors_hold(&self.base.step(state)) {
+            state.pivoted = true;
+            factored = self.factor_with(stages, state);
+        }
+        match factored {
             Ok(planned) => {
-                walk.singular = 0;
+                state.singular = 0;
                 self.statistics.dense += usize::from(!planned);
                 Ok(true)
             }
             Err(unknown) => {
-                walk.singular += 1;
-                if walk.singular >= SINGULAR {
-                    let at = Place { step: walk.tried, stage: 0, iteration: 0 };
+                state.singular += 1;
+                if state.singular >= SINGULAR {
+                    let at = Place { step: state.tried, stage: 0, iteration: 0 };
                     return Err(Error::Singular { unknown: crate::irk::unknown_name::<M>(unknown), at });
                 }
                 self.statistics.failed += 1;
-                walk.refusal = Refusal::Singular;
-                walk.order.unexpected = true;
-                walk.again(0.5);
-                self.check_step(walk.t, walk.h, walk.refusal)?;
+                state.refusal = Refusal::Singular;
+                state.order.unexpected = true;
+                state.again(0.5);
+                self.check_step(state.t, state.h, state.refusal)?;
                 Ok(false)
             }
         }
+    }
+
+    /// Factors by the plan, or with pivots.
+    fn factor_with(&mut self, stages: &mut dyn Stages<M, T>, state: &StepState<T>) -> Result<bool, usize> {
+        stages.set_pivoted(state.pivoted);
+        self.statistics.factorizations += 1;
+        stages.factor(&self.base.jacobian, state.h)
+    }
+
+    /// Whether an attempt failed because the planned elimination lost its digits: its pivots are
+    /// judged before the program runs, and may vanish where it leads. Then the matrix is pivoted,
+    /// and the same step is tried again; the factors of later steps are tested before they are
+    /// used.
+    pub(super) fn blames_pivots(
+        &mut self,
+        stages: &dyn Stages<M, T>,
+        state: &mut StepState<T>,
+        attempt: &Result<f64, Failure>,
+    ) -> bool {
+        let may_be = match attempt {
+            Ok(error) => *error >= 1.0,
+            Err(failure) => matches!(failure, Failure::Slow(_) | Failure::Diverges | Failure::NotFinite),
+        };
+        if !may_be || state.pivoted || stages.factors_hold(&self.base.step(state)) {
+            return false;
+        }
+        self.statistics.failed += 1;
+        (state.pivoted, state.verifies_pivots) = (true, true);
+        state.need = Need::Factors;
+        // The rate of this iteration says nothing of the next one.
+        (state.convergence.rate, state.convergence.factor) = (FAST, Convergence::UNKNOWN);
+        true
     }
 
     /// The Jacobian in the middle of the step, as far as that is foreseen: nearer to all stages
@@ -95,21 +130,20 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// A value that is not finite.
-    fn linearise(&mut self, stages: &mut dyn Stages<M, T>, walk: &mut Walk<T>) -> Result<(), Error> {
-        walk.current = walk.is_careful();
-        walk.convergence.fresh = true;
-        if !walk.current {
-            let Base { point, scale, asked, finer, middle, .. } = &mut *self.base;
-            let start =
-                Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
-            stages.predict(&start, middle);
-            walk.current = self.evaluate_jacobian(true, walk.tried).is_err();
+    fn linearise(&mut self, stages: &mut dyn Stages<M, T>, state: &mut StepState<T>) -> Result<(), Error> {
+        state.current = state.is_careful();
+        state.convergence.fresh = true;
+        if !state.current {
+            let mut middle = self.base.middle;
+            stages.predict(&self.base.step(state), &mut middle);
+            self.base.middle = middle;
+            state.current = self.evaluate_jacobian(true, state.tried).is_err();
         }
-        if walk.current {
-            self.evaluate_jacobian(false, walk.tried)?;
+        if state.current {
+            self.evaluate_jacobian(false, state.tried)?;
         }
-        let point = if walk.current { &self.base.point } else { &self.base.middle };
-        walk.convergence.branches = Branches::of::<M, T>(point);
+        let point = if state.current { &self.base.point } else { &self.base.middle };
+        state.convergence.branches = Branches::of::<M, T>(point);
         Ok(())
     }
 
@@ -121,15 +155,15 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     pub(super) fn attempt(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        walk: &mut Walk<T>,
+        state: &mut StepState<T>,
     ) -> Result<f64, Failure> {
-        let Base { point, scale, asked, finer, u, parameters, tight, rtol, atol, .. } = &*self.base;
-        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+        let Workspace { point, u, parameters, estimator, rtol, atol, .. } = &*self.base;
+        let start = self.base.step(state);
         let residuals = &mut self.statistics.residuals;
-        let solved = stages.solve(&start, self.base.newton_tolerance, &mut walk.convergence, residuals);
-        self.statistics.iterations += walk.convergence.iterations;
+        let solved = stages.solve(&start, self.base.newton_tolerance, &mut state.convergence, residuals);
+        self.statistics.iterations += state.convergence.iterations;
         solved?;
-        let again = walk.is_careful();
+        let again = state.is_careful();
         let error = stages.error(&start, again, residuals)?;
         if !error.is_finite() {
             return Err(Failure::Diverges);
@@ -138,15 +172,15 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             Some(sensitivities) if error < 1.0 => {
                 let mut x = VectorX::<M, T>::zeroed();
                 x.as_mut_slice().copy_from_slice(&point.as_ref()[M::Shape::NX..2 * M::Shape::NX]);
-                let (at, level) = (At { x: &x, u, p: parameters, t: walk.t }, walk.order.level);
-                let tolerances = Tolerances { tight, rtol, atol };
+                let (at, level) = (At { x: &x, u, p: parameters, t: state.t }, state.order.level);
+                let tolerances = Tolerances { estimator, rtol, atol };
                 error.max(sensitivities.implicit(stages, at, level, &start, &tolerances, again)?)
             }
             _ => error,
         };
-        let weighted = error * walk.refusals.weight(start.finer);
+        let weighted = error * state.rejections.weight(start.tolerance_ratio);
         if weighted < 1.0 {
-            self.refuse_rough(stages, walk, error)?;
+            self.refuse_rough(stages, state, error)?;
         }
         Ok(weighted)
     }
@@ -159,38 +193,42 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     fn refuse_rough(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        walk: &mut Walk<T>,
+        state: &mut StepState<T>,
         error: f64,
     ) -> Result<(), Failure> {
-        let Base { point, scale, asked, finer, noise, .. } = &*self.base;
-        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
-        let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
-        let counted = *finer / ROUGH_OVER_ERROR;
+        let Workspace { tolerance_ratio, noise, .. } = &*self.base;
+        let start = self.base.step(state);
+        let (size, order) = (state.h.to_f64().abs(), stages.count() as f64 + 1.0);
+        let counted = *tolerance_ratio / ROUGH_OVER_ERROR;
         let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
-        let otherwise = if walk.refusals.is_watched() { Look::Watched } else { Look::Unusual };
-        let look = stages.change(&start).unwrap_or(otherwise);
-        let unusual = error * counted >= 1.0 && walk.roughness.may_be(error);
-        if is_above_rounding && (look != Look::Unusual || unusual) {
-            let growth = walk.trend.growth(size, error, order);
-            let seen = stages.roughness(&start, growth, look, &mut self.statistics.residuals)?;
-            let rough = match look {
-                Look::Branch => OVER_BRANCHES * *finer * seen.max(error),
-                Look::Knot => counted * seen.max(error),
-                Look::Watched | Look::Unusual => counted * seen,
+        let otherwise = if state.rejections.is_after_rejection() {
+            DefectCheck::AfterRejection
+        } else {
+            DefectCheck::Suspicious
+        };
+        let check = stages.change(&start).unwrap_or(otherwise);
+        let unusual = error * counted >= 1.0 && state.discontinuities.may_be(error);
+        if is_above_rounding && (check != DefectCheck::Suspicious || unusual) {
+            let growth = state.error_history.growth(size, error, order);
+            let seen = stages.roughness(&start, growth, check, &mut self.statistics.residuals)?;
+            let rough = match check {
+                DefectCheck::Switch => OVER_BRANCHES * *tolerance_ratio * seen.max(error),
+                DefectCheck::SplineKnot => counted * seen.max(error),
+                DefectCheck::AfterRejection | DefectCheck::Suspicious => counted * seen,
             };
             // A derivative that jumps leaves an error like the fourth power of the step size, or a
             // lower one. Where times are no finer than that, the step is as good as can be.
             let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
-            let shorter = walk.h * T::from_f64(SHORTEST * factor);
+            let shorter = state.h * T::from_f64(SHORTEST * factor);
             if rough >= 1.0
-                && self.check_step(walk.t, shorter, Refusal::Error).is_ok()
-                && (look >= Look::Knot || walk.roughness.refuses(size, seen, error))
+                && self.check_step(state.t, shorter, Refusal::Error).is_ok()
+                && (check >= DefectCheck::SplineKnot || state.discontinuities.refuses(size, seen, error))
             {
                 return Err(Failure::Rough(factor));
             }
         }
-        walk.trend.accepted(size, error, order, *noise);
-        walk.roughness.accepted();
+        state.error_history.accepted(size, error, order, *noise);
+        state.discontinuities.accepted();
         Ok(())
     }
 
@@ -201,24 +239,24 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     pub(super) fn accept(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        walk: &mut Walk<T>,
+        state: &mut StepState<T>,
         factor: f64,
         after: After<'_, M, T>,
     ) -> Result<bool, Error> {
-        let (t, h, nx) = (walk.t, walk.h, M::Shape::NX);
+        let (t, h, nx) = (state.t, state.h, M::Shape::NX);
         self.statistics.steps += 1;
-        (walk.troubles, walk.pivoted) = (0, false);
-        walk.refusals.accepted();
+        state.pivoted = false;
+        state.rejections.accepted();
         stages.accept();
         if let Some(sensitivities) = &mut self.sensitivities {
             sensitivities.accept();
         }
         if self.record {
             let x = &self.base.point.as_ref()[nx..2 * nx];
-            self.tape.push(t, h, walk.order.level, x, stages.accepted())?;
+            self.tape.push(t, h, state.order.level, x, stages.accepted())?;
         }
-        let end = walk.end();
-        let Base { point, dense, .. } = &mut *self.base;
+        let end = state.end();
+        let Workspace { point, dense, .. } = &mut *self.base;
         let x = &point.as_ref()[nx..2 * nx];
         let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
             interpolate(&*stages, x, stages.accepted(), time - t, h, dense)
@@ -235,16 +273,16 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if !on_stage {
             self.settle(end)?;
         }
-        if walk.starting {
+        if state.starting {
             // How fast a short step converged says nothing of one that is much longer.
-            walk.convergence.factor = Convergence::UNKNOWN;
+            state.convergence.factor = Convergence::UNKNOWN;
         }
-        if walk.last {
+        if state.last {
             self.finish();
             return Ok(true);
         }
         self.measure();
-        walk.advance(end, factor, walk.convergence.rate <= FAST);
+        state.advance(end, factor, state.convergence.rate <= FAST);
         Ok(false)
     }
 }

@@ -292,7 +292,11 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             let equations = StageEquations { coefficients, kept, n, x };
             let mut exact = false;
             if !matches!(from, InitialGuess::Solution(_)) {
-                let solved = work.newton(equations, options, y, statistics);
+                let mut solved = work.newton(equations, options, y, statistics);
+                if solved.stale {
+                    work.start(coefficients, from, n, before, y);
+                    solved = work.newton(equations, options, y, statistics);
+                }
                 good = E::and(good, solved.converged);
                 exact = solved.exact;
             }

@@ -5,6 +5,7 @@ use crate::casadi::ffi::{self, Side};
 use crate::casadi::function::{Call, Port, Signature};
 use crate::casadi::library::{Client, Failure, Library};
 use crate::casadi::sparsity::Sparsity;
+use crate::error::Error;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ptr::{null, null_mut};
@@ -77,7 +78,7 @@ fn call(library: &Library<Sum>, inputs: [Option<&[f64]>; 2], id: i32) -> Option<
 #[test]
 fn pointers_become_calls() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
-    static LIBRARY: Library<Sum> = Library::new(|| Sum::new(&WORKERS));
+    static LIBRARY: Library<Sum> = Library::new(|| Ok(Sum::new(&WORKERS)));
     ffi::refer(&LIBRARY);
     let id = ffi::check_out(&LIBRARY);
     let (a, b) = ([1.0, 2.0, 3.0], [10.0]);
@@ -117,7 +118,7 @@ fn pointers_become_calls() {
 #[test]
 fn threads_have_memory_of_their_own() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
-    static LIBRARY: Library<Sum> = Library::new(|| Sum::new(&WORKERS));
+    static LIBRARY: Library<Sum> = Library::new(|| Ok(Sum::new(&WORKERS)));
     let ids: Vec<i32> = (0..4).map(|_| ffi::check_out(&LIBRARY)).collect();
     assert_eq!(ids, [0, 1, 2, 3]);
     ffi::release(&LIBRARY, 2);
@@ -143,4 +144,12 @@ fn a_client_that_cannot_be_made() {
     assert_eq!(ffi::count(&LIBRARY, 0, Side::Input), 0);
     assert_eq!(call(&LIBRARY, [None, None], ffi::check_out(&LIBRARY)), None);
     assert_eq!(ffi::integrations(&LIBRARY), 0);
+}
+
+/// What cannot be made has no functions, and says why.
+#[test]
+fn functions_that_have_no_memory() {
+    static LIBRARY: Library<Sum> = Library::new(|| Err(Error::OutOfMemory { bytes: usize::MAX }.into()));
+    assert_eq!(ffi::count(&LIBRARY, 0, Side::Input), 0);
+    assert_eq!(call(&LIBRARY, [None, None], ffi::check_out(&LIBRARY)), None);
 }

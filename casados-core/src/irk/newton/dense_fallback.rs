@@ -1,7 +1,8 @@
 //! The careful way: Newton's method with the current Jacobian in every iteration, or that of the
-//! first one if it is to be [frozen](Jacobian::Frozen), the whole matrix pivoted, and every value
-//! looked at. It is taken where there is no plan of elimination, and where the fast way did not
-//! arrive: then it gives the solution, or says what is wrong.
+//! first one, as long as increments shrink by it, if it is to be [frozen](Jacobian::Frozen); the
+//! whole matrix pivoted, and every value looked at. It is taken where there is no plan of
+//! elimination, and where the fast way did not arrive: then it gives the solution, or says what is
+//! wrong.
 //!
 //! A fixed number of iterations is made without a test. Others have converged as soon as one of
 //! these holds, both of them invariant under scaling of equations and of variables:
@@ -45,7 +46,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ) -> Result<(), Error> {
         let (rounding, noise) = (T::from_f64(T::EPSILON * ROUNDING), T::from_f64(T::EPSILON * NOISE));
         let tolerance = T::from_f64(options.tolerance).max(rounding);
-        let frozen = options.jacobian == Jacobian::Frozen;
+        let mut frozen = options.jacobian == Jacobian::Frozen;
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
         let test = options.fixed_iterations.is_none();
         let mut last = Increment { size: T::ZERO, unknown: 0 };
@@ -86,17 +87,20 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             if current {
                 self.factor_dense(coefficients, step, iteration, statistics)?;
             }
-            for (equation, f) in self.f.as_ref().iter().enumerate() {
-                if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
-                    for (to, f) in to.iter_mut().zip(f) {
-                        *to = [*f];
-                    }
-                }
-            }
-            self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);
+            self.solve_dense(coefficients);
             let increment = self.update(y);
             iteration += 1;
             statistics.iterations += 1;
+            // The first Jacobian does as long as increments shrink to half; one that is no smaller
+            // than the last one is not made.
+            let noise = increment.size <= T::from_f64(T::STAGNATION);
+            if test && !current && !noise && increment.size + increment.size >= last.size {
+                frozen = false;
+                if increment.size >= last.size {
+                    self.take_back(y);
+                    continue;
+                }
+            }
             if !increment.size.is_finite() {
                 return Err(Error::Overflow { step, index: increment.unknown });
             }
@@ -215,6 +219,27 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
         }
         largest
+    }
+
+    /// The increment by the factors that are there.
+    pub(super) fn solve_dense(&mut self, coefficients: &Coefficients<T, S>) {
+        for (equation, f) in self.f.as_ref().iter().enumerate() {
+            if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+                for (to, f) in to.iter_mut().zip(f) {
+                    *to = [*f];
+                }
+            }
+        }
+        self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);
+    }
+
+    /// `y ← y + Δ`
+    fn take_back(&self, y: &mut ArrayK<M, [T; S]>) {
+        for (y, delta) in y.as_mut().iter_mut().zip(self.increment.as_ref()) {
+            for (y, [delta]) in y.iter_mut().zip(delta) {
+                *y = *y + *delta;
+            }
+        }
     }
 }
 

@@ -68,7 +68,8 @@ kernels! {
     }
 }
 
-/// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
+/// `y ← y − Δ`; the size of the increment, that of the one that is expected next, and by how much
+/// that of an unknown is larger than its last one.
 pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
     pub scales: &'a KinematicScales<'a, M, E, S>,
     pub x: &'a ArrayX<M, E>,
@@ -87,9 +88,9 @@ pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Number = E;
-    type Output = (E, E);
+    type Output = [E; 3];
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> (E, E) {
+    fn run<A: Arithmetic>(self) -> [E; 3] {
         let Self { scales, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
             self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
@@ -99,7 +100,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
                 subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
             let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
-            return (measure.run::<A>(), infinite);
+            return [measure.run::<A>(), infinite, zero];
         }
         // Four unknowns side by side, and the rest one by one.
         let (y, last_y) = part_mut::<M, _>(y.as_mut()).as_chunks_mut::<4>();
@@ -118,9 +119,9 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             subtract(core::array::from_mut(y), increment, active);
             others.take(increment, core::array::from_ref(weight), core::array::from_mut(size));
         }
-        let ([largest, excess, sum], [of_others, others_excess, others_sum]) = (some.total(), others.total());
-        let size = larger_strand([[largest, sum], [of_others, others_sum]]);
-        (size, E::select(E::le(excess.max(others_excess), zero), zero, infinite))
+        let ([largest, excess, growth, sum], other) = (some.total(), others.total());
+        let size = larger_strand([[largest, sum], [other[0], other[3]]]);
+        [size, E::select(E::le(excess.max(other[1]), zero), zero, infinite), growth.max(other[2])]
     }
 }
 
@@ -152,6 +153,8 @@ struct Increments<E, const N: usize> {
     /// By how much one, and the one that is expected next, is too large; not positive if that is
     /// below the tolerance.
     excess: [E; N],
+    /// By how much one is larger than the one before.
+    growth: [E; N],
     /// The sum of what is not a number is not a number, which a maximum may lose.
     sum: [E; N],
     tolerance: E,
@@ -162,7 +165,8 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
     #[inline(always)]
     fn none(tolerance: E, full: bool) -> Self {
         let zero = E::from_f64(0.0);
-        Self { largest: [zero; N], excess: [-tolerance; N], sum: [zero; N], tolerance, full }
+        let (zeros, excess) = ([zero; N], [-tolerance; N]);
+        Self { largest: zeros, excess, growth: zeros, sum: zeros, tolerance, full }
     }
 
     /// Takes `N` unknowns into account, whose last increments had these sizes.
@@ -201,20 +205,23 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
             let own = new[n] - self.tolerance;
             // The smaller one.
             self.excess[n] = (-(-own).max(-expected)).max(self.excess[n]);
+            self.growth[n] = (new[n] - old[n]).max(self.growth[n]);
             self.largest[n] = new[n].max(self.largest[n]);
         }
         *sizes = new;
     }
 
-    /// The largest increment, the largest excess, the sum.
+    /// The largest increment, the largest excess, the largest growth, the sum.
     #[inline(always)]
-    fn total(&self) -> [E; 3] {
-        let (mut largest, mut excess, mut sum) = (E::from_f64(0.0), -self.tolerance, E::from_f64(0.0));
+    fn total(&self) -> [E; 4] {
+        let zero = E::from_f64(0.0);
+        let [mut largest, mut excess, mut growth, mut sum] = [zero, -self.tolerance, zero, zero];
         for n in 0..N {
             largest = self.largest[n].max(largest);
             excess = self.excess[n].max(excess);
+            growth = self.growth[n].max(growth);
             sum = sum + self.sum[n];
         }
-        [largest, excess, sum]
+        [largest, excess, growth, sum]
     }
 }

@@ -20,7 +20,9 @@
 //! follows from that of `v` before each iteration and after the last, whatever start values are
 //! given for it.
 //!
-//! Which Jacobian the iteration takes follows the rule of `jacobian_policy`.
+//! Which Jacobian the iteration takes follows the rule of `jacobian_policy`. An increment by an
+//! older one that is larger than the last one, in any unknown, is [not made](super::rejection): it
+//! may lead to another root than Newton's method does.
 //!
 //! Linear equations take one iteration; then their residual is looked at, and refined if digits
 //! were lost; and whether they [determine](super::near_singular) a solution.
@@ -31,6 +33,7 @@ use super::convergence::{ConvergenceTest, IncrementKind, Status};
 use super::increment::{PlaceResidual, Update, largest, subtract_increment};
 use super::jacobian_policy::Policy;
 use super::norm::{KinematicScales, Measure};
+use super::rejection::grows_much;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{Eigenbasis, dispatch};
@@ -67,6 +70,9 @@ copy!(['a, M: Dae, E: Lanes, const S: usize, F: Fallback] StageEquations<'a, M, 
 pub(crate) struct Solved<E: Lanes> {
     /// Which lanes have converged.
     pub converged: E::Mask,
+    /// It does not contract with the factors of the step before that it began with: the start
+    /// values are to be set again.
+    pub stale: bool,
     /// Whether the factors that are there are those of the solution.
     pub exact: bool,
     /// An unknown of linear equations that they do not determine, in some lane that has not
@@ -127,6 +133,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let mut status = Status::default();
         let mut first = E::from_f64(0.0);
         let mut iteration = 0;
+        // Whether nothing is known of an increment before.
+        let mut anew = true;
         // Nothing will be written where states are kinematic.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         let mut missing = self.is_missing(policy.renew);
@@ -174,15 +182,23 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 self.place_residual();
                 kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
-            status = self.apply_increment(equations, y, &mut test, &policy, tolerances, iteration);
+            let growth;
+            (status, growth) =
+                self.apply_increment(equations, y, &mut test, &policy, tolerances, take(&mut anew));
             if !status.active {
                 return self.solved(&test, policy.shared);
             }
-            if iteration == newton.max_iterations {
+            let grows = !(exact || policy.renew || early) && grows_much(growth);
+            let rejected = grows && self.is_rejected(y, growth, policy.factored);
+            let stale = rejected && !policy.factored;
+            if stale || iteration == newton.max_iterations {
                 (self.validity.factors, self.validity.shared) = (false, false);
-                return Solved { converged: test.converged, exact: false, undetermined: None };
+                return Solved { converged: test.converged, stale, exact: false, undetermined: None };
             }
             policy.after(&status, iteration, early);
+            if rejected {
+                (policy.renew, anew) = (true, true);
+            }
         }
     }
 
@@ -263,7 +279,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let (determined, unknown) = self.is_determined(coefficients, n, x, y);
             (satisfied, undetermined) = (E::and(satisfied, determined), unknown);
         }
-        Some(Solved { converged: satisfied, exact: true, undetermined })
+        Some(Solved { converged: satisfied, stale: false, exact: true, undetermined })
     }
 
     /// `y ← y − Δ`, and what the convergence test says about the increment.
@@ -275,13 +291,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         test: &mut ConvergenceTest<E>,
         policy: &Policy<M, E, S>,
         Tolerances { tolerance, rounding }: Tolerances,
-        iteration: usize,
-    ) -> Status {
+        anew: bool,
+    ) -> (Status, E) {
         let h = self.inputs.time.step;
         let floor = E::from_f64(rounding / tolerance);
         let Self { linear, points, increment, weights, sizes, .. } = self;
         let scales = &KinematicScales::<M, E, S> { jacobian: &linear.jacobian, points, a: &coefficients.a };
-        let (size, next) = dispatch(Update::<M, E, S> {
+        let [size, next, growth] = dispatch(Update::<M, E, S> {
             scales,
             x,
             y,
@@ -293,17 +309,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             floor,
             tolerance: E::from_f64(tolerance),
             full: policy.full,
-            measure: iteration == 1,
+            measure: anew,
         });
-        let kind =
-            if iteration == 1 { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
+        let kind = if anew { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
         let status = test.take(kind, size, next);
-        if status.changed && status.moved && !M::STRUCTURE.linear_in_state && iteration > 1 {
+        if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
             let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
-            return test.take(IncrementKind::Again, again, again);
+            return (test.take(IncrementKind::Again, again, again), growth);
         }
-        status
+        (status, growth)
     }
 }
 
@@ -344,7 +359,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             subtract_increment(y.as_mut(), self.increment.as_ref());
         }
         let zero = E::from_f64(0.0);
-        Solved { converged: E::le(zero, zero), exact: false, undetermined: None }
+        Solved { converged: E::le(zero, zero), stale: false, exact: false, undetermined: None }
     }
 
     /// Whether stages may share a Jacobian: of one stage or two there is no eigenbasis. A single
@@ -391,6 +406,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.validity.rate = test.slowest_rate();
         let any = E::any(test.converged);
         (self.validity.factors, self.validity.shared) = (any && !shared, any && shared);
-        Solved { converged: test.converged, exact: false, undetermined: None }
+        Solved { converged: test.converged, stale: false, exact: false, undetermined: None }
     }
 }

@@ -127,7 +127,10 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
         let fresh = early || self.renew && iteration > 1;
         let slow = status.remaining > Self::expensive(self.shares()) && (!fresh || status.grows);
         let exact = M::STRUCTURE.linear_in_state;
-        self.renew = !exact && (self.full || self.adaptive && !self.near && slow);
+        // A frozen one is renewed where it hardly helps.
+        let frozen = !(self.full || self.adaptive);
+        let wanted = self.full || self.adaptive && !self.near && slow || frozen && status.stuck;
+        self.renew = !exact && wanted;
     }
 
     /// How many iterations new factors cost, with those that they take themselves.

@@ -51,7 +51,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
                 let own = (nx..M::Shape::NK).find(|index| unknown_name::<M>(*index) == unknown);
                 let own = own.or_else(|| Self::find_algebraic(equation, &mut |_| true));
-                Error::NotConverged { residual, equation, unknown, increment, at, started: own.map(started) }
+                let started = own.map(started);
+                Error::NotConverged { residual, equation, unknown, increment, at, started }
             }
             other => other,
         }

@@ -161,7 +161,7 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
 
 /// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its
 /// eigenvectors.
-fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
+pub(in crate::ocp) fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
     let small = T::from_f64(T::EPSILON);
     for _ in 0..SWEEPS {
         let mut off = T::ZERO;

@@ -6,6 +6,18 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, SecondOrder,
 use crate::scalar::Real;
 
 /// What the Hessian of the QP is: [`Exact`], [`GaussNewton`], [`Secant`].
+///
+/// ```
+/// use casados::ocp::{Curvature, Exact, GaussNewton, Map};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+///
+/// /// Whether second derivatives of the dynamics are in the Hessian.
+/// fn is_exact<C: Curvature<Map<Push, f64>, f64>>(_: C) -> bool { C::EXACT }
+/// assert!(is_exact(Exact::default()) && !is_exact(GaussNewton::default()));
+/// ```
 pub trait Curvature<D, T: Real>: Copy {
     /// Whether second derivatives of everything are in it.
     const EXACT: bool;

@@ -12,6 +12,19 @@ use crate::shape::Matrix;
 use crate::{erk, irk};
 
 /// Dynamics with adjoints.
+///
+/// ```
+/// use casados::ocp::{Adjoints, Formulation, HeapOcp, HeapSqp, OcpError, Outcome};
+///
+/// /// A solver that asks for adjoints while steps contract.
+/// fn solve<P>(ocp: &mut HeapOcp<P>) -> Result<Outcome, OcpError>
+/// where
+///     P: Formulation<f64>,
+///     P::Dynamics: Adjoints<f64>,
+/// {
+///     HeapSqp::new(ocp)?.gauss_newton().keep_jacobians().solve(ocp)
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no adjoints",
     note = "integrators of single intervals without integrals have them, and `Shooting` over a batch; one with `Inline` memory needs `mode::All`"

@@ -8,15 +8,24 @@
 //! feedback(x)  solve the QP with x_0 = x: its first control is applied, its solution is the next plan
 //! ```
 
+use crate::ocp::assembly::convexify::Convexification;
+#[cfg(feature = "alloc")]
+use crate::ocp::assembly::curvature::Exact;
 use crate::ocp::assembly::curvature::{Curvature, GaussNewton};
+use crate::ocp::feedback::contraction::{self, ContractionTest, Convergence, Monitor};
+use crate::ocp::feedback::phases::Prepared;
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::error::Part;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::functions::dynamics::SecondOrder;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::inertia::InertiaCorrection;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
-use crate::qp::{QpSolver, QpStart, QpStatistics, Solution, StageDims};
+use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, Residuals, Solution, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -73,6 +82,11 @@ use alloc::vec::Vec;
 /// Shared controls are found anew in each sample, and periodic states end where the state of the
 /// sample is.
 ///
+/// The Hessian is that of Gauss and Newton ([`HeapRealTime::new`]), or the exact one
+/// ([`HeapRealTime::exact`], [`RealTime::with_curvature`]). A QP with an exact Hessian that is not
+/// convex is regularised as by [`Sqp`](crate::ocp::Sqp), by as many QPs as that takes; with another
+/// [`Convexification`] than [`Convexification::Reduced`] each feedback solves one QP.
+///
 /// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and
 /// `locate` switched off. After any error the plan is as it was before the call.
 pub struct RealTime<P, S, C, T, D, M> {
@@ -80,7 +94,11 @@ pub struct RealTime<P, S, C, T, D, M> {
     pub curvature: C,
     /// The solver of QPs.
     pub qp_solver: S,
-    ocp: Ocp<P, T, D, M>,
+    /// When iterations count as divergent.
+    pub contraction_test: ContractionTest,
+    inertia: InertiaCorrection,
+    monitor: Option<Monitor<P, T, D, M>>,
+    pub(super) ocp: Ocp<P, T, D, M>,
     solution: Solution<T, D, M>,
     /// Whether the plan has the multipliers of a QP before.
     warm: bool,
@@ -112,62 +130,6 @@ pub struct RealTime<P, S, C, T, D, M> {
 pub type HeapRealTime<P, S = HeapInteriorPoint, C = GaussNewton, T = f64> =
     RealTime<P, S, C, T, Vec<StageDims>, Vec<T>>;
 
-/// A QP that waits for the state; see [`RealTime`].
-///
-/// ```
-/// # use casados::ocp::*;
-/// # use casados::prelude::*;
-/// # #[function]
-/// # fn push(x: f64, u: f64) -> f64 { x + u }
-/// # #[function]
-/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
-/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
-/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
-/// #     .on(Horizon::uniform(20, 0.1))?;
-/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
-/// let mut controller = HeapRealTime::new(ocp)?;
-/// // Integrations and derivatives are done here, before the state is known.
-/// let prepared = controller.prepare()?;
-/// // One QP is left.
-/// let feedback = prepared.feedback(&[0.8])?;
-/// assert!(feedback.statistics.iterations > 0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub struct Prepared<'a, P, S, T, D, M> {
-    qp_solver: &'a mut S,
-    ocp: &'a mut Ocp<P, T, D, M>,
-    solution: &'a mut Solution<T, D, M>,
-    warm: &'a mut bool,
-}
-
-/// What is to be done now.
-///
-/// ```
-/// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
-/// # use casados::prelude::*;
-/// # #[function]
-/// # fn push(x: f64, u: f64) -> f64 { x + u }
-/// # #[function]
-/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
-/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
-/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
-/// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
-/// let mut controller = HeapRealTime::new(ocp)?;
-/// let feedback = controller.prepare()?.feedback(&[0.8])?;
-/// // The law of the linear-quadratic regulator: nearly -0.618 x.
-/// assert!((feedback.u[0] + 0.618 * 0.8).abs() < 1e-3);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Feedback<'a, T> {
-    /// The control to be applied: the first of the plan.
-    pub u: &'a [T],
-    /// What the QP took.
-    pub statistics: QpStatistics,
-}
-
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewton, T> {
     /// A controller for a problem whose iterate is the first plan, with the library's own solver of
@@ -176,8 +138,69 @@ impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewt
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn new(ocp: HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let solution = HeapSolution::new(ocp.qp().dims())?;
-        Ok(Self::with(ocp, HeapInteriorPoint::new(), solution))
+        Self::on_heap(ocp, GaussNewton::default())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, Exact, T> {
+    /// As [`HeapRealTime::new`], with exact Hessians: for plans whose residuals are large, where
+    /// iterations of Gauss and Newton may diverge.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapRealTime, Horizon, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// /// A wheel: angle and rate, a torque.
+    /// #[ode]
+    /// fn wheel(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// #[function]
+    /// fn price(x: [f64; 2], u: f64) -> f64 { 1.0 - x[0].cos() + 0.1 * x[1] * x[1] + 0.1 * u * u }
+    ///
+    /// let mut ocp = Problem::new(Irk::<Wheel, Gauss<2>>::new(Options::default())?)
+    ///     .running_cost(GeneralCost::<Price>::new())
+    ///     .on(Horizon::uniform(20, 0.1))?;
+    /// ocp.fix_initial_state(&[1.0, 0.0])?.guess(&[1.0, 0.0], &[0.0])?;
+    /// let mut controller = HeapRealTime::exact(ocp)?.monitored()?;
+    /// for _ in 0..8 {
+    ///     controller.prepare()?.feedback(&[1.0, 0.0])?;
+    /// }
+    /// let feedback = controller.prepare()?.feedback(&[1.0, 0.0])?;
+    /// assert!(feedback.convergence.ok_or("monitored")?.residuals.largest() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn exact(ocp: HeapOcp<P, T>) -> Result<Self, OcpError> {
+        Self::on_heap(ocp, Exact::default())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<P: Formulation<T>, C, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, C, T> {
+    fn on_heap(ocp: HeapOcp<P, T>, curvature: C) -> Result<Self, OcpError> {
+        let dims = ocp.qp().dims();
+        let solution = HeapSolution::new(dims)?;
+        Ok(Self::with(ocp, HeapInteriorPoint::new(), curvature, solution))
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
+    /// The same with a monitor of its convergence:
+    /// [`Feedback::convergence`](crate::ocp::Feedback::convergence) has residuals, the size of the
+    /// step and whether iterations contract. It takes a simulation of the horizon in each sample,
+    /// between two feedbacks.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn monitored(self) -> Result<Self, OcpError> {
+        let dims = self.ocp.qp().dims();
+        let [_, ends] = contraction::memory::<P, T>(dims);
+        let monitor = Monitor::new(HeapSolution::new(dims)?, crate::qp::zeros(ends)?);
+        Ok(Self { monitor: Some(monitor), ..self })
     }
 }
 
@@ -201,15 +224,66 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real>
         dims: &'a [StageDims],
         memory: &'a mut [T],
     ) -> Result<Self, OcpError> {
-        Ok(Self::with(ocp, qp_solver, Solution::in_memory(dims, memory)?))
+        let solution = Solution::in_memory(dims, memory)?;
+        Ok(Self::with(ocp, qp_solver, GaussNewton::default(), solution))
     }
 }
 
-impl<P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
-    RealTime<P, S, GaussNewton, T, D, M>
+impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims], &'a mut [T]> {
+    /// How many numbers [`RealTime::monitored_in`] takes.
+    #[must_use]
+    pub const fn memory_of_monitor(dims: &[StageDims]) -> usize {
+        let [weights, ends] = contraction::memory::<P, T>(dims);
+        weights.saturating_add(ends)
+    }
+
+    /// As [`HeapRealTime::monitored`], in given memory of [`RealTime::memory_of_monitor`] numbers
+    /// for the dimensions of the problem.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::Qp`] if memory or dimensions do not fit.
+    pub fn monitored_in(self, dims: &'a [StageDims], memory: &'a mut [T]) -> Result<Self, OcpError> {
+        self.ocp.fits(dims)?;
+        let (expected, found) = (Self::memory_of_monitor(dims), memory.len());
+        if found < expected {
+            return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
+        }
+        let [weights, _] = contraction::memory::<P, T>(dims);
+        let (weights, ends) = memory.split_at_mut_checked(weights).unwrap_or_default();
+        let monitor = Monitor::new(Solution::in_memory(dims, weights)?, ends);
+        Ok(Self { monitor: Some(monitor), ..self })
+    }
+}
+
+impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
+    RealTime<P, S, C, T, D, M>
 {
-    fn with(ocp: Ocp<P, T, D, M>, qp_solver: S, solution: Solution<T, D, M>) -> Self {
-        Self { curvature: GaussNewton::default(), qp_solver, ocp, solution, warm: false }
+    fn with(ocp: Ocp<P, T, D, M>, qp_solver: S, curvature: C, solution: Solution<T, D, M>) -> Self {
+        Self {
+            curvature,
+            qp_solver,
+            contraction_test: ContractionTest::new::<T>(),
+            inertia: InertiaCorrection::default(),
+            monitor: None,
+            ocp,
+            solution,
+            warm: false,
+        }
+    }
+
+    /// The same with another Hessian.
+    #[must_use]
+    pub fn with_curvature<N>(self, curvature: N) -> RealTime<P, S, N, T, D, M> {
+        RealTime {
+            curvature,
+            qp_solver: self.qp_solver,
+            contraction_test: self.contraction_test,
+            inertia: self.inertia,
+            monitor: self.monitor,
+            ocp: self.ocp,
+            solution: self.solution,
+            warm: self.warm,
+        }
     }
 }
 
@@ -218,21 +292,68 @@ impl<P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: As
 where
     C: Curvature<P::Dynamics, T>,
 {
-    /// Linearises at the plan: everything that can be done before the state is known.
+    /// The preparation phase: linearises at the plan, everything that can be done before the state
+    /// is known.
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, T, D, M>, OcpError> {
-        self.ocp.join_controls();
-        self.ocp.join_states();
-        self.ocp.linearise(self.curvature)?;
-        let Self { qp_solver, ocp, solution, warm, .. } = self;
-        Ok(Prepared { qp_solver, ocp, solution, warm })
+    pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, C, T, D, M>, OcpError> {
+        self.linearise()?;
+        Ok(Prepared { controller: self })
+    }
+
+    pub(super) fn linearise(&mut self) -> Result<(), OcpError> {
+        self.judge();
+        let Self { curvature, monitor, ocp, .. } = self;
+        ocp.join_controls();
+        ocp.join_states();
+        ocp.linearise(*curvature)?;
+        if let Some(monitor) = monitor {
+            monitor.measure(ocp);
+        }
+        Ok(())
+    }
+
+    /// Solves the QP with this state at its start: its solution is the plan.
+    pub(super) fn iterate(&mut self, x0: &[T], over: &mut dyn FnMut() -> bool) -> Result<Step, OcpError> {
+        let Self { curvature, qp_solver, contraction_test, inertia, monitor, ocp, solution, warm } = self;
+        ocp.fix_initial_state(x0)?;
+        let start = if *warm { QpStart::Warm } else { QpStart::Cold };
+        let mut solve = |ocp: &Ocp<P, T, D, M>| {
+            solution.copy_from(&ocp.iterate);
+            qp_solver.solve_until(ocp.qp(), start, solution.view_mut(), over)
+        };
+        let mut regularisation = 0.0;
+        // Other Hessians are convex, but for those of general costs that are to stay as they are.
+        let result = if C::EXACT && curvature.convexification() == Convexification::Reduced {
+            let mut statistics = Err(QpError::Stalled { iterations: 0, residuals: Residuals::default() });
+            let solve = |ocp: &Ocp<P, T, D, M>| {
+                statistics = solve(ocp);
+                statistics.map(|_| ())
+            };
+            ocp.correct_inertia(inertia, &mut regularisation, solve).and(statistics)
+        } else {
+            solve(ocp)
+        };
+        let statistics = result.map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;
+        let convergence = monitor.as_mut().map(|monitor| monitor.observe(ocp, solution, contraction_test));
+        *warm = true;
+        core::mem::swap(&mut ocp.iterate, solution);
+        Ok(Step { statistics, regularisation, convergence })
     }
 
     /// The plan one interval earlier, for the next sample.
     pub fn shift(&mut self) {
+        self.judge();
         self.ocp.shift();
+    }
+
+    /// Judges the last iteration, before anything of its problem is changed.
+    fn judge(&mut self) {
+        let Self { contraction_test, monitor, ocp, solution, .. } = self;
+        if let Some(monitor) = monitor {
+            monitor.judge(ocp, solution, contraction_test);
+        }
     }
 
     /// The problem, with the plan as its iterate.
@@ -244,67 +365,22 @@ where
     /// The problem, with the plan as its iterate, to be changed: references, bounds, the plan
     /// itself.
     pub fn ocp_mut(&mut self) -> &mut Ocp<P, T, D, M> {
+        self.judge();
         &mut self.ocp
     }
 
-    /// The next QP starts cold.
+    /// The next QP starts cold, and nothing is known of the convergence.
     pub fn reset(&mut self) {
         self.warm = false;
+        if let Some(monitor) = &mut self.monitor {
+            monitor.reset();
+        }
     }
 }
 
-impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
-    Prepared<'a, P, S, T, D, M>
-{
-    /// Solves the QP with this state at its start.
-    ///
-    /// # Errors
-    /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::NonFiniteDerivative`],
-    /// [`OcpError::Qp`]
-    pub fn feedback(self, x0: &[T]) -> Result<Feedback<'a, T>, OcpError> {
-        self.feedback_until(x0, &mut || false)
-    }
-
-    /// As [`Prepared::feedback`], until the time is over; see [`QpSolver::solve_until`].
-    ///
-    /// # Errors
-    /// As [`Prepared::feedback`], and [`OcpError::Qp`] with
-    /// [`QpError::OutOfTime`](crate::qp::QpError::OutOfTime): then the first control of the plan,
-    /// which is as it was, is what is left to apply.
-    ///
-    /// # Example
-    /// ```
-    /// # use casados::ocp::*;
-    /// # use casados::prelude::*;
-    /// use casados::qp::QpError;
-    /// # #[function]
-    /// # fn push(x: f64, u: f64) -> f64 { x + u }
-    /// # #[function]
-    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
-    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
-    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
-    /// #     .on(Horizon::uniform(20, 0.1))?;
-    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
-    /// let mut controller = HeapRealTime::new(ocp)?;
-    /// let late = controller.prepare()?.feedback_until(&[0.8], &mut || true);
-    /// assert!(matches!(late, Err(OcpError::Qp(QpError::OutOfTime { .. }))));
-    /// assert_eq!(controller.ocp().stage(0)?.u, [0.0]);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn feedback_until(
-        self,
-        x0: &[T],
-        over: &mut dyn FnMut() -> bool,
-    ) -> Result<Feedback<'a, T>, OcpError> {
-        let Self { qp_solver, ocp, solution, warm } = self;
-        ocp.fix_initial_state(x0)?;
-        solution.copy_from(&ocp.iterate);
-        let start = if *warm { QpStart::Warm } else { QpStart::Cold };
-        let statistics = qp_solver
-            .solve_until(ocp.qp(), start, solution.view_mut(), over)
-            .map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;
-        *warm = true;
-        core::mem::swap(&mut ocp.iterate, solution);
-        Ok(Feedback { u: ocp.stage(0)?.u, statistics })
-    }
+/// What an iteration took.
+pub(super) struct Step {
+    pub statistics: QpStatistics,
+    pub regularisation: f64,
+    pub convergence: Option<Convergence>,
 }

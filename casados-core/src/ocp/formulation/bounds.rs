@@ -230,8 +230,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// The reference of the stage cost at every stage, as a function of the stage and of the time of
-    /// its node, which writes it over zeros.
+    /// The reference of the stage cost at every stage, as a function of the stage and of the time
+    /// of its node, which writes it over zeros.
     ///
     /// ```
     /// # use casados::ocp::*;

@@ -338,6 +338,28 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
+    /// The simulation of a guess ends in an interval
+    /// ([`Ocp::guess_by_simulation`](crate::ocp::Ocp::guess_by_simulation)).
+    Simulation {
+        /// Which.
+        interval: u32,
+        /// The largest state at its start.
+        state: &'static str,
+        /// Its value.
+        value: f64,
+        /// Why.
+        error: Error,
+    },
+    /// Stages of intervals are variables, as of `Collocation`: a simulation needs an integrator,
+    /// `Ocp::guess_by_simulation_with`.
+    NoIntegrator,
+    /// Data say nothing of a variable, or of a combination that it is part of: it has no variance.
+    NotIdentifiable {
+        /// The state or control.
+        name: &'static str,
+        /// The stage.
+        stage: usize,
+    },
     /// An integrator beside the problem, as that of a simulation, has no result.
     Integrator(Error),
     /// A batch beside the problem was given slices of different lengths.

@@ -6,7 +6,10 @@ mod degenerate;
 pub(in crate::ocp) mod elastic;
 pub(in crate::ocp) mod filter;
 pub(in crate::ocp) mod guess;
+pub(in crate::ocp) mod inertia;
 pub(in crate::ocp) mod ipm;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod multi_start;
 pub(in crate::ocp) mod simulation;
 pub(in crate::ocp) mod sqp;
 pub(in crate::ocp) mod watch;

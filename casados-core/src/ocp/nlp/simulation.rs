@@ -1,9 +1,18 @@
 //! States that follow from the controls of a point.
 
-use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{Places, Solution, StageDims, part, part_mut};
+use crate::integrator::Integrator;
+use crate::model::Dae;
+use crate::ocp::dynamics::begin::{Begin, at};
+use crate::ocp::formulation::check::Labels;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, vector};
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::{Places, Solution, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use bytemuck::Zeroable;
 
 /// A run begins again at a simulation that violates less than this part of what its iterate does.
 pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
@@ -65,5 +74,142 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         true
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Makes the states of the guess those that follow from its controls, and from the initial
+    /// state where that is fixed, from the first state of the guess elsewhere: a guess without
+    /// gaps. First state and controls are moved into their bounds before; states and parameters of
+    /// later stages need no guess. There are no multipliers afterwards.
+    ///
+    /// The integrator is that of the problem;
+    /// [`guess_by_simulation_with`](Ocp::guess_by_simulation_with) takes another one.
+    ///
+    /// # Errors
+    /// [`OcpError::Simulation`] where the simulation ends before the horizon: states up to that
+    /// stage are those of the simulation then. [`OcpError::NoIntegrator`] of `Collocation`. Those
+    /// of [`Ocp::check`].
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{GeneralCost, Horizon, OcpError, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// /// x(t) = x₀ / (1 − x₀ t)
+    /// #[ode]
+    /// fn growth(x: f64) -> f64 { x * x }
+    /// #[function]
+    /// fn size(x: f64) -> f64 { x }
+    ///
+    /// let mut ocp = Problem::new(Irk::<Growth, Gauss<3>>::new(Options::default())?)
+    ///     .terminal_cost(GeneralCost::<Size>::new())
+    ///     .on(Horizon::uniform(10, 0.1))?;
+    /// ocp.fix_initial_state(&[0.5])?.guess(&[0.0], &[])?.guess_by_simulation()?;
+    /// assert!((ocp.stage(10)?.x[0] - 1.0).abs() < 1e-6);
+    /// // From 1.5 there is no solution behind 0.67 s.
+    /// ocp.fix_initial_state(&[1.5])?;
+    /// let error = ocp.guess_by_simulation().err().ok_or("it has no end")?;
+    /// assert!(matches!(error, OcpError::Simulation { interval: 6, state: "x", .. }), "{error}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn guess_by_simulation(&mut self) -> Result<&mut Self, OcpError> {
+        if P::Dynamics::LIFTED {
+            return Err(OcpError::NoIntegrator);
+        }
+        self.roll_out(|ocp, k, end| {
+            let intervals = ocp.intervals();
+            let data = split::<P, T>(ocp.data.as_mut(), intervals);
+            let (v, _) = ocp.iterate.vectors();
+            let (ld, np) = (pad::<T>(P::Shape::NX + P::Shape::NU), P::Shape::NP);
+            // Of two intervals, since the last one of a horizon may end with a map.
+            let times = data.times.get(k..(k + 3).min(intervals + 1)).unwrap_or_default();
+            let (v, p) = (v.get(k * ld..).unwrap_or_default(), data.p.get(k * np..).unwrap_or_default());
+            let mut has_end = false;
+            let nodes = nodes::<P::Shape, T>(v, &[], &[], p, times);
+            let Problem { dynamics, .. } = ocp.problem.parts();
+            let result = dynamics.simulate(&nodes, &mut |interval, step| {
+                if interval == 0 {
+                    assign(end, step.x);
+                    has_end = true;
+                }
+            });
+            if has_end { Ok(()) } else { result }
+        })
+    }
+
+    /// As [`Ocp::guess_by_simulation`], by an integrator of the same model, such as an adaptive one
+    /// that takes as many steps as the guess needs.
+    ///
+    /// # Errors
+    /// As [`Ocp::guess_by_simulation`].
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::{GeneralCost, Horizon, Problem};
+    /// # use casados::prelude::*;
+    /// # #[ode]
+    /// # fn growth(x: f64) -> f64 { x * x }
+    /// # #[function]
+    /// # fn size(x: f64) -> f64 { x }
+    /// # let mut ocp = Problem::new(Irk::<Growth, Gauss<1>>::new(Options::default())?)
+    /// #     .terminal_cost(GeneralCost::<Size>::new())
+    /// #     .on(Horizon::uniform(10, 0.1))?;
+    /// # ocp.fix_initial_state(&[0.5])?.guess(&[0.0], &[])?;
+    /// let mut integrator = Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?;
+    /// ocp.guess_by_simulation_with(&mut integrator)?;
+    /// assert!((ocp.stage(10)?.x[0] - 1.0).abs() < 1e-4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn guess_by_simulation_with<I>(&mut self, integrator: &mut I) -> Result<&mut Self, OcpError>
+    where
+        I: Integrator<Model: Dae<Shape = P::Shape>, Number = T>,
+    {
+        self.roll_out(|ocp, k, end| {
+            let intervals = ocp.intervals();
+            let data = split::<P, T>(ocp.data.as_mut(), intervals);
+            let (v, _) = ocp.iterate.vectors();
+            let nodes = nodes::<P::Shape, T>(v, &[], &[], data.p, data.times);
+            let Some(interval) = nodes.iter().nth(k) else { return Ok(()) };
+            at(k, integrator.begin(&interval))?;
+            let result = integrator.solve(&vector(interval.x), &vector(interval.u), interval.h);
+            assign(end, at(k, result)?.x.as_slice());
+            Ok(())
+        })
+    }
+
+    /// The states of the iterate, one interval after the other, whose ends `integrate` writes.
+    fn roll_out(
+        &mut self,
+        mut integrate: impl FnMut(&mut Self, usize, &mut [T]) -> Result<(), OcpError>,
+    ) -> Result<&mut Self, OcpError> {
+        self.check()?;
+        self.clip();
+        self.join_controls();
+        self.iterate.multipliers_mut().fill(T::ZERO);
+        self.has_algebraic = false;
+        let mut memory = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        let end = part_mut(memory.as_mut(), 0, P::Shape::NX);
+        for interval in 0..self.intervals() {
+            integrate(self, interval, end).map_err(|error| self.end_of_simulation(interval, error))?;
+            Labels::states::<P, T>(Part::States, interval + 1).check_finite(end)?;
+            if let Some(next) = self.iterate.stage_mut(interval + 1) {
+                assign(next.x, end);
+            }
+        }
+        self.join_states();
+        Ok(self)
+    }
+
+    /// The error of an interval, with the largest state at its start.
+    fn end_of_simulation(&self, interval: usize, error: OcpError) -> OcpError {
+        let OcpError::Integration { error, .. } = error else { return error };
+        let x = self.iterate.stage(interval).map_or(&[][..], |stage| stage.x);
+        let names = <P::Dynamics as Dynamics<T>>::NAMES.x;
+        let largest = names.iter().zip(x).fold(("", T::ZERO), |largest, (&name, &value)| {
+            if largest.0.is_empty() || value.abs() > largest.1.abs() { (name, value) } else { largest }
+        });
+        let interval = u32::try_from(interval).unwrap_or(u32::MAX);
+        OcpError::Simulation { interval, state: largest.0, value: largest.1.to_f64(), error }
     }
 }

@@ -165,6 +165,22 @@ impl fmt::Display for OcpError {
                  controls and costs may help"
             ),
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Simulation { interval, state, value, error } => write!(
+                f,
+                "the simulation of the guess ends in interval {interval}, where `{state}` is {value:e}: {error}; \
+                 another first state or other controls may help, or an adaptive integrator \
+                 (`Ocp::guess_by_simulation_with`)"
+            ),
+            Self::NoIntegrator => f.write_str(
+                "collocation has no integrator for a simulation of the guess: give one to \
+                 `Ocp::guess_by_simulation_with`",
+            ),
+            Self::NotIdentifiable { name, stage } => write!(
+                f,
+                "`{name}` at stage {stage} is not identifiable and has no variance: see \
+                 `Covariance::unidentifiable` for what data cannot tell, and add an arrival cost, other \
+                 samples or a bound"
+            ),
             Self::Integrator(error) => error.fmt(f),
             #[cfg(feature = "alloc")]
             Self::Batch(error) => error.fmt(f),
@@ -213,7 +229,9 @@ debug_is_display!(OcpError);
 impl core::error::Error for OcpError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            Self::Integration { error, .. } | Self::Integrator(error) => Some(error),
+            Self::Integration { error, .. } | Self::Simulation { error, .. } | Self::Integrator(error) => {
+                Some(error)
+            }
             #[cfg(feature = "alloc")]
             Self::Batch(error) => Some(error),
             Self::Inconsistent(error) => Some(error),

@@ -19,6 +19,7 @@
 
 use super::iterate::{Iterate, at};
 use super::run::Limits;
+use super::scaling::Units;
 use super::sides::Sides;
 use super::terms::Terms;
 use crate::qp::element::set;
@@ -72,7 +73,7 @@ impl<T: Real> Iterate<'_, T> {
             // Nothing changes sides because of what is below the tolerance.
             let Terms { forces, values } = limits.of(self.terms);
             let half = T::from_f64(0.5);
-            changes = self.sides.change(Terms { forces: half * forces, values: half * values });
+            changes = self.sides.change(Terms { forces: half * forces, values: half * values }, self.measure);
             factor = changes > 0;
             if factor {
                 // Sets that come nearer do not change more and more.
@@ -84,8 +85,8 @@ impl<T: Real> Iterate<'_, T> {
             self.sides.settle();
             let objective = self.evaluate::<E>(solution.dynamics);
             let residuals = self.judged::<E>();
-            if objective.is_finite() && limits.hold(residuals, self.terms) {
-                (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
+            if objective.is_finite() && self.are_small(residuals, limits) {
+                (statistics.objective, statistics.residuals) = (objective.to_f64(), self.told(residuals));
                 return Ok(statistics);
             }
             if statistics.refinements >= REFINEMENTS {
@@ -100,7 +101,7 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
         let weight = T::ONE / self.sides.compliance;
-        self.sides.force(weight);
+        self.sides.force();
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;
         }
@@ -115,11 +116,11 @@ impl<T: Real> Iterate<'_, T> {
         }
         let sides = &mut self.sides;
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
-        for ((&row, free), residual) in equations {
+        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness) {
             *residual = *residual + at(self.step, row);
-            *free = *free - weight * *residual;
+            *free = *free - weight * stiffness * *residual;
         }
-        sides.follow(weight);
+        sides.follow();
         true
     }
 }
@@ -137,16 +138,17 @@ impl<T: Real> Sides<'_, T> {
     fn guess(&mut self) {
         let count = self.counts.sides();
         assign(part_mut(self.slack, 0, count), self.scratch);
-        for ((activity, &distance), &multiplier) in
-            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier)
+        for (((activity, &distance), &multiplier), &softness) in
+            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.softness)
         {
-            *activity = if multiplier > distance { ACTIVE } else { INACTIVE };
+            *activity = if multiplier * softness > distance { ACTIVE } else { INACTIVE };
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
             let force = self.penalty(j, distance);
             // Of a violation and the force that its multiplier lacks one is zero.
-            if distance < T::ZERO && -distance > force - multiplier {
+            let softness = at(self.softness, side);
+            if distance < T::ZERO && -distance > (force - multiplier) * softness {
                 set(self.activity, side as usize, VIOLATED);
                 set(self.multiplier, side as usize, force);
             }
@@ -161,9 +163,12 @@ impl<T: Real> Sides<'_, T> {
 
     /// Weights, and into `scratch` what the sides add to the gradient beyond what it knows of.
     #[inline(always)]
-    fn force(&mut self, weight: T) {
-        for (&activity, side_weight) in self.activity.iter().zip(&mut *self.weight) {
-            *side_weight = if activity == ACTIVE { weight } else { T::ZERO };
+    fn force(&mut self) {
+        let weight = T::ONE / self.compliance;
+        for ((&activity, side_weight), &softness) in
+            self.activity.iter().zip(&mut *self.weight).zip(&*self.softness)
+        {
+            *side_weight = if activity == ACTIVE { weight / softness } else { T::ZERO };
         }
         let forces = self.multiplier.iter().zip(&*self.target).zip(self.weight.iter().zip(&*self.slack));
         for (scratch, ((&force, &known), (&weight, &distance))) in self.scratch.iter_mut().zip(forces) {
@@ -178,12 +183,12 @@ impl<T: Real> Sides<'_, T> {
 
     /// Distances and multipliers after a step, whose changes of rows are in `scratch`.
     #[inline(always)]
-    fn follow(&mut self, weight: T) {
+    fn follow(&mut self) {
         for (distance, &change) in self.slack.iter_mut().zip(&*self.scratch).take(self.counts.sides()) {
             *distance = *distance + change;
         }
-        let sides = self.activity.iter().zip(&*self.slack);
-        for (multiplier, (&activity, &distance)) in self.multiplier.iter_mut().zip(sides) {
+        let sides = self.activity.iter().zip(&*self.slack).zip(&*self.weight);
+        for (multiplier, ((&activity, &distance), &weight)) in self.multiplier.iter_mut().zip(sides) {
             *multiplier = *multiplier - if activity == ACTIVE { weight * distance } else { T::ZERO };
         }
         for (j, &side) in self.soft.iter().enumerate() {
@@ -196,11 +201,13 @@ impl<T: Real> Sides<'_, T> {
 
     /// Sides become what their distances and multipliers say. Returns how many have changed.
     #[inline(always)]
-    fn change(&mut self, tolerance: Terms<T>) -> usize {
+    fn change(&mut self, tolerance: Terms<T>, units: Units<'_, T>) -> usize {
         let Terms { forces, values } = tolerance;
         let mut changes = 0;
-        let sides = self.activity.iter_mut().zip(&*self.slack);
-        for ((activity, &distance), multiplier) in sides.zip(&mut *self.multiplier) {
+        let sides = self.activity.iter_mut().zip(&*self.slack).zip(&*self.rows);
+        for (((activity, &distance), &row), multiplier) in sides.zip(&mut *self.multiplier) {
+            let unit = units.of(row as usize);
+            let (forces, values) = (forces * units.objective / unit, values * unit);
             if *activity == ACTIVE && *multiplier < -forces {
                 (*activity, *multiplier) = (INACTIVE, T::ZERO);
                 changes += 1;
@@ -212,6 +219,8 @@ impl<T: Real> Sides<'_, T> {
         for (j, &side) in self.soft.iter().enumerate() {
             let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
             let (linear, whole) = (at(self.linear, j as u32), self.penalty(j, distance));
+            let unit = self.rows.get(side as usize).map_or(T::ONE, |&row| units.of(row as usize));
+            let (forces, values) = (forces * units.objective / unit, values * unit);
             let Some(activity) = self.activity.get_mut(side as usize) else { break };
             // Without a linear penalty there is nothing between inactive and violated.
             let between = linear > T::ZERO;

@@ -17,6 +17,7 @@
 use super::coupling::Coupling;
 use super::kernels::{Columns, Part, Source, product, subtract};
 use super::riccati::{Equations, Riccati};
+use super::scaling::Units;
 use super::shared::Shared;
 use super::symmetric::Symmetric;
 use super::vector::{add_scaled, dot, shrink};
@@ -34,13 +35,13 @@ use core::marker::PhantomData;
 pub fn solve<T: Real, E: Packed<T>>(
     coupling: &mut Coupling<'_, T>,
     riccati: &mut Riccati<'_, T>,
-    equations: Equations<'_, T>,
+    (equations, units): (Equations<'_, T>, Units<'_, T>),
     factor: bool,
     step: &mut [T],
 ) -> Result<(), QpError> {
     let mut result = Ok(());
     let register = PhantomData::<E>;
-    E::vectorize(Solve { coupling, riccati, equations, factor, step, result: &mut result, register });
+    E::vectorize(Solve { coupling, riccati, equations, units, factor, step, result: &mut result, register });
     result
 }
 
@@ -49,6 +50,7 @@ struct Solve<'s, 'a, 'c, T, E> {
     coupling: &'s mut Coupling<'c, T>,
     riccati: &'s mut Riccati<'a, T>,
     equations: Equations<'s, T>,
+    units: Units<'s, T>,
     factor: bool,
     step: &'s mut [T],
     result: &'s mut Result<(), QpError>,
@@ -58,7 +60,7 @@ struct Solve<'s, 'a, 'c, T, E> {
 impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
-        let Self { coupling, riccati, equations, factor, step, result, .. } = self;
+        let Self { coupling, riccati, equations, units, factor, step, result, .. } = self;
         let mut apart = Shared::new(coupling.shared, coupling.columns, riccati.end.v);
         *result = riccati.backward::<E>(&equations, factor, step, &mut apart);
         if result.is_err() {
@@ -70,7 +72,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
             coupling.eliminate::<E>(qp, riccati, dynamics);
         }
         coupling.gather(qp, riccati);
-        *result = coupling.solve_border(riccati, factor);
+        *result = coupling.solve_border(riccati, units, factor);
         if result.is_ok() {
             coupling.spread::<E>(qp, riccati);
             riccati.forward::<E>(&equations, step);
@@ -184,7 +186,12 @@ impl<T: Real> Coupling<'_, T> {
     }
 
     /// The first state and the changes of the parameters.
-    fn solve_border(&mut self, riccati: &Riccati<'_, T>, factor: bool) -> Result<(), QpError> {
+    fn solve_border(
+        &mut self,
+        riccati: &Riccati<'_, T>,
+        units: Units<'_, T>,
+        factor: bool,
+    ) -> Result<(), QpError> {
         let (nx, n) = (self.free, self.free + self.count);
         if factor {
             self.write_border(riccati);
@@ -197,6 +204,10 @@ impl<T: Real> Coupling<'_, T> {
             set(self.right, nx + c, -(linear + gap));
         }
         let noise = T::from_f64(T::EPSILON);
+        let is_scaled = !units.rows.is_empty();
+        if is_scaled {
+            self.scale_border(units, factor);
+        }
         if factor {
             let inertia = Symmetric::factor(self.matrix, n, self.exchanged, noise);
             let negative = inertia.negative + riccati.negative;
@@ -205,8 +216,33 @@ impl<T: Real> Coupling<'_, T> {
             }
         }
         Symmetric::new(self.matrix, n, self.exchanged).solve(part_mut(self.right, 0, n));
+        if is_scaled {
+            self.scale_border(units, false);
+        }
         assign(self.step, self.right.get(nx..).unwrap_or_default());
         Ok(())
+    }
+
+    /// Scales right-hand side and matrix of the border: variables by their units, multipliers of
+    /// periodic states by those of forces. Which pivots vanish is a matter of their sizes.
+    fn scale_border(&mut self, units: Units<'_, T>, matrix: bool) {
+        let (nx, n) = (self.free, self.free + self.count);
+        let first = self.first.len();
+        for (right, unit) in
+            self.right.iter_mut().zip(border_units(units, nx, first, self.periodic, self.shared))
+        {
+            *right = *right * unit;
+        }
+        if matrix {
+            let columns = self.matrix.chunks_exact_mut(n.max(1));
+            for (column, unit) in columns.zip(border_units(units, nx, first, self.periodic, self.shared)) {
+                for (element, other) in
+                    column.iter_mut().zip(border_units(units, nx, first, self.periodic, self.shared))
+                {
+                    *element = *element * unit * other;
+                }
+            }
+        }
     }
 
     /// `[P₀  Γ₀ + E; · S]`, the lower triangle.
@@ -253,4 +289,17 @@ impl<T: Real> Coupling<'_, T> {
         }
         assign(part_mut(riccati.y, 0, self.free), self.right);
     }
+}
+
+/// The units of the first state, of multipliers of periodic states, and of shared controls.
+fn border_units<'a, T: Real>(
+    units: Units<'a, T>,
+    free: usize,
+    first: usize,
+    periodic: &'a [T],
+    shared: &'a [T],
+) -> impl Iterator<Item = T> + use<'a, T> {
+    let states = (0..free).map(move |i| units.of(i));
+    let conditions = marked(periodic).map(move |i| units.objective / units.of(i));
+    states.chain(conditions).chain(marked(shared).map(move |j| units.of(first + j)))
 }

@@ -4,9 +4,9 @@ use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
 use super::riccati::{Extent, First, Riccati};
+use super::scaling::Units;
 use super::sides::{Counts, Sides};
-use super::terms::Terms;
-use super::vector::larger;
+use super::terms::{Most, Terms};
 use crate::qp::element::get;
 use crate::qp::layout::{
     Places, StageDims, StageOffsets, assign, end, first_nx, pad, part, part_mut, take_mut,
@@ -30,6 +30,8 @@ pub struct Iterate<'a, T> {
     pub proximal: T,
     /// The units that `Δ` is measured in there, by rows; all one if there are none.
     pub units: &'a [T],
+    /// What everything else is compared with.
+    pub measure: Units<'a, T>,
     pub riccati: Riccati<'a, T>,
     pub sides: Sides<'a, T>,
     /// What couples stages.
@@ -50,8 +52,10 @@ pub struct Iterate<'a, T> {
     pub initial: &'a mut [T],
     /// `Σ s λ` over the number of pairs.
     pub mu: T,
-    /// The largest terms of the residuals when they were computed last.
+    /// The largest terms of the residuals when they were computed last, in units.
     pub terms: Terms<T>,
+    /// The same as they are.
+    pub own_terms: Terms<T>,
 }
 
 /// Where the multipliers `π` of the dynamics come from when a gradient is computed.
@@ -122,6 +126,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             objective: true,
             proximal: T::ZERO,
             units: &[],
+            measure: Units::NONE,
             riccati,
             sides,
             v: take_mut(numbers, end.row),
@@ -133,6 +138,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
             mu: T::ZERO,
             terms: Terms { forces: T::ZERO, values: T::ZERO },
+            own_terms: Terms { forces: T::ZERO, values: T::ZERO },
         }
     }
 
@@ -142,7 +148,8 @@ impl<'a, T: Real> Iterate<'a, T> {
         let Terms { forces, values } = self.terms;
         let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
         self.sides.compliance = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
-        self.proximal = if proximal { small * stiffness.max(T::from_f64(1e-4)) } else { T::ZERO };
+        let stiffness = self.measure.objective * stiffness.max(T::from_f64(1e-4));
+        self.proximal = if proximal { small * stiffness } else { T::ZERO };
     }
 
     /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` by
@@ -224,22 +231,24 @@ impl<'a, T: Real> Iterate<'a, T> {
     fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
         let after_step = matches!(costates, Costates::AfterStep);
         self.write_forces(after_step);
+        let units = self.measure;
         let mut objective = T::ZERO;
-        let mut largest = T::ZERO;
-        largest = larger::<T, E>(largest, self.gradient);
+        let mut largest = Most::NONE;
+        largest.add_forces::<E>(self.gradient, units.rows);
         for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
             let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let hessian = part(data, place.matrix(), place.hessian());
             let linear = part(data, place.gradient(), ld);
+            let here = units.from(place.row);
             let g = part_mut(self.stationarity, place.row, ld);
             let v = part(self.v, place.row, ld);
             g.fill(T::ZERO);
             if self.objective {
                 symmetric::<T, E>(g, hessian, ld, v, n);
-                largest = larger::<T, E>(largest, g);
-                largest = larger::<T, E>(largest, linear);
+                largest.add_forces::<E>(g, here);
+                largest.add_forces::<E>(linear, here);
                 for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
                     objective = objective + v * (T::from_f64(0.5) * *g + linear);
                     *g = *g + linear;
@@ -263,7 +272,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 for (g, &pi) in g.iter_mut().zip(pi) {
                     *g = *g - pi;
                 }
-                largest = larger::<T, E>(largest, pi);
+                largest.add_forces::<E>(pi, here);
             } else if place.stage > 0 {
                 // π is what elimination of the controls leaves, g what it takes.
                 let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
@@ -278,7 +287,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 for (g, &pi) in g.iter_mut().zip(&*pi) {
                     *g = *g - pi;
                 }
-                largest = larger::<T, E>(largest, pi);
+                largest.add_forces::<E>(pi, here);
             } else if self.first == First::Fixed {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
@@ -297,33 +306,36 @@ impl<'a, T: Real> Iterate<'a, T> {
                 }
             }
         }
-        self.terms.forces = largest;
+        self.own_terms.forces = largest.own;
+        self.terms.forces = units.choose(largest.own, largest.in_units / units.objective);
         objective + self.penalties()
     }
 
     #[inline(always)]
     fn values<E: Packed<T>>(&mut self) {
-        let mut largest = T::ZERO;
+        let units = self.measure;
+        let mut largest = Most::NONE;
         let mut rest = &mut *self.v;
         for place in Places::<T>::new(self.qp.dims) {
             let StageOffsets { n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             let (v, general) = take_mut(&mut rest, place.rows).split_at_mut_checked(ld).unwrap_or_default();
-            let general = part_mut(general, 0, ng);
+            let (general, here) = (part_mut(general, 0, ng), units.from(place.row));
             general.fill(T::ZERO);
             add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
-            largest = larger::<T, E>(largest, v);
-            largest = larger::<T, E>(largest, general);
+            largest.add_values::<E>(v, here);
+            largest.add_values::<E>(general, units.from(place.row + ld));
             let dynamics = part_mut(self.dynamics, place.dynamics, next);
             let offset = part(data, place.offset(), next);
-            largest = larger::<T, E>(largest, offset);
+            largest.add_values::<E>(offset, units.from(place.row + place.rows));
             for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
                 *dynamics = offset - coming;
             }
             add_transposed::<T, E>(dynamics, matrix, v, n, next);
         }
-        self.terms.values = largest;
+        self.own_terms.values = largest.own;
+        self.terms.values = units.choose(largest.own, largest.in_units);
         if let Some(coupling) = &mut self.coupling {
             coupling.evaluate(self.qp, self.v);
         }

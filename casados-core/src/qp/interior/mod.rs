@@ -14,6 +14,7 @@ mod pairs;
 mod residuals;
 mod riccati;
 mod run;
+mod scaling;
 mod shared;
 mod sides;
 mod stage_factor;
@@ -39,7 +40,7 @@ pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
 use super::error::{QpError, QpField};
-use super::layout::{StageDims, is_absurd};
+use super::layout::{StageDims, end, is_absurd, take_mut};
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, QpStart};
@@ -50,6 +51,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use run::{Attempt, Limits, Run, Runs};
+use scaling::Units;
 
 /// An interior point that exploits the structure of optimal control.
 ///
@@ -153,7 +155,7 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
             return (usize::MAX, usize::MAX);
         }
         let counts = Counts { lower: bounds, upper: 0, soft, equations };
-        (Iterate::<T>::memory(dims, &counts), counts.indices())
+        (Iterate::<T>::memory(dims, &counts) + end::<T>(dims).row, counts.indices())
     }
 }
 
@@ -204,16 +206,25 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let no_bound = T::from_f64(self.options.no_bound);
         let reading = Reading { fixed: is_first_fixed(qp), penalties: attempt.penalties, no_bound };
         let counts = count(qp, &reading);
-        let length = Iterate::<T>::memory_of(qp, &counts);
+        let extent = Extent::of::<T>(qp.dims);
+        let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
         let mut numbers = self.numbers.at_least(length, QpField::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
         let mut sides = Sides::new(counts, &mut numbers, &mut indices);
         sides.list(qp, &reading);
+        let given = attempt.penalties == Penalties::Given;
+        let rows = take_mut(&mut numbers, extent.end.row);
+        let found = if self.options.scaling { scaling::find(qp, &reading, rows) } else { None };
+        let units = match found {
+            Some(objective) => Units { rows, objective: if given { objective } else { T::ONE } },
+            None => Units::NONE,
+        };
+        sides.measure_in(units, !given);
         let first = if reading.fixed { First::Fixed } else { First::Free };
-        let mut iterate = Iterate::new(qp, &Extent::of::<T>(qp.dims), first, sides, &mut numbers);
-        iterate.objective = attempt.penalties == Penalties::Given;
-        let limits = Limits::new(&self.options, self.relaxed, attempt.penalties);
+        let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
+        (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
+        let limits = Limits::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
         T::compiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,

@@ -35,7 +35,8 @@ impl<T: Real> Iterate<'_, T> {
         match &mut self.coupling {
             None => self.riccati.solve::<E>(equations, factor, self.step)?,
             Some(coupling) => {
-                super::border::solve::<T, E>(coupling, &mut self.riccati, equations, factor, self.step)?;
+                let system = (equations, self.measure);
+                super::border::solve::<T, E>(coupling, &mut self.riccati, system, factor, self.step)?;
             }
         }
         self.gather_step();
@@ -118,23 +119,28 @@ impl<T: Real> Iterate<'_, T> {
         let sides = &mut self.sides;
         shrink(sides.residual, left);
         let count = sides.counts.sides();
-        add_scaled(part_mut(sides.residual, 0, count), -alpha * sides.compliance, sides.multiplier_step);
+        let factor = alpha * sides.compliance;
+        let steps = sides.multiplier_step.iter().zip(&*sides.softness);
+        for (residual, (&step, &softness)) in sides.residual.iter_mut().zip(steps).take(count) {
+            *residual = *residual - factor * softness * step;
+        }
         add_scaled(sides.slack, alpha, sides.slack_step);
         add_scaled(sides.multiplier, alpha, sides.multiplier_step);
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
-        for ((&row, free), residual) in equations {
+        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness) {
             let change = at(self.step, row);
-            *free = *free - alpha * weight * (change + *residual);
+            *free = *free - alpha * weight * stiffness * (change + *residual);
             *residual = *residual + alpha * change;
         }
-        let proximal = self.proximal;
+        let (proximal, units) = (self.proximal, self.units);
         if self.riccati.regularised > 0 || proximal > T::ZERO {
             // What was added to a pivot is a force that keeps its variable where it is.
             for place in Places::<T>::new(self.qp.dims) {
                 let added = self.riccati.added.get(place.v..).unwrap_or_default();
                 let step = part(self.step, place.row, place.n);
                 let residual = part_mut(self.stationarity, place.row, place.n);
-                for ((residual, &added), &step) in residual.iter_mut().zip(added).zip(step) {
+                for (i, ((residual, &added), &step)) in residual.iter_mut().zip(added).zip(step).enumerate() {
+                    let proximal = in_units(proximal, units, place.row + i);
                     *residual = *residual - alpha * (proximal + added) * step;
                 }
             }

@@ -51,6 +51,13 @@ pub struct InteriorPointOptions {
     /// cold start, with proximal terms, and with all bounds soft, to see which of them cannot be
     /// satisfied. Otherwise it is tried again with the iterations that are left. Default true.
     pub locate: bool,
+    /// Whether sizes of variables, constraints and the objective are found from the data, and
+    /// everything is compared with them: variables in pascal or kilometres are no worse than
+    /// others then. Where no size is above 32 or below its inverse there are no units. With them
+    /// all residuals in units are below a tenth of `tolerance`, and as they are below the larger
+    /// one of that and `1e6 ε` of their largest term, or of single precision 1e-5 of it. Default
+    /// true; [`HeapSqp`](crate::ocp::HeapSqp), which solves QPs in units of its own, asks for none.
+    pub scaling: bool,
     /// Lower bounds of minus this or less, and upper ones of this or more, mean that there is none.
     /// Default 1e15; of single precision 1e7, where seven digits leave no unit.
     pub no_bound: f64,
@@ -69,6 +76,7 @@ impl InteriorPointOptions {
             active_sets: 4,
             warm_distance: 1e-3,
             locate: true,
+            scaling: true,
             no_bound: if T::EPSILON < 1e-10 { 1e15 } else { 1e7 },
         }
     }

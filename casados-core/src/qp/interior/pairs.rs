@@ -8,10 +8,10 @@
 //! leaves the digits of the Hessian beside it.
 
 use super::iterate::at;
+use super::scaling::Units;
 use super::sides::Sides;
-use super::vector::{dot, largest_negative_ratio};
+use super::vector::{dot, largest_negative_ratio, largest_size};
 use crate::qp::element::set;
-use crate::qp::layout::part;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
 use crate::qp::statistics::{larger, positive};
@@ -55,16 +55,22 @@ impl<T: Real> Sides<'_, T> {
 
     /// Slacks at least this far from zero, with multipliers from a solution or such that all
     /// products are equal. `scratch` has the distances from the bounds.
-    pub fn begin(&mut self, start: QpStart, distance: T, solution: &SolutionView<'_, T>) {
-        let sides = self.counts.sides();
-        for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
-            *slack = value.max(distance);
+    pub fn begin(
+        &mut self,
+        start: QpStart,
+        distance: T,
+        units: Units<'_, T>,
+        solution: &SolutionView<'_, T>,
+    ) {
+        let (sides, product) = (self.counts.sides(), distance * distance * units.objective);
+        for ((slack, &value), &row) in self.slack.iter_mut().zip(&*self.scratch).zip(&*self.rows) {
+            *slack = value.max(distance * units.of(row as usize));
         }
         if start == QpStart::Warm {
             self.take_multipliers(solution);
         }
         for (multiplier, &slack) in self.multiplier.iter_mut().zip(&*self.slack).take(sides) {
-            *multiplier = multiplier.max(distance * distance / slack);
+            *multiplier = multiplier.max(product / slack);
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let side = side as usize;
@@ -78,11 +84,12 @@ impl<T: Real> Sides<'_, T> {
             };
             // The gradient with respect to the violation vanishes from the start: λ + ν = linear +
             // quadratic e.
-            let violation = (slack - value).max(distance);
+            let unit = self.rows.get(side).map_or(T::ONE, |&row| units.of(row as usize));
+            let violation = (slack - value).max(distance * unit);
             let force = linear + quadratic * violation;
             // Both products are as large as those of the others, or as equal as the force allows.
             let least = T::from_f64(0.01) * force;
-            let share = distance * distance / slack;
+            let share = product / slack;
             let least = if share < least { share } else { least };
             let most = force - least;
             let multiplier = if multiplier < most { multiplier.max(least) } else { most };
@@ -100,25 +107,42 @@ impl<T: Real> Sides<'_, T> {
         (T::ONE - alpha) * mu + alpha * alpha * products
     }
 
-    /// The largest violation of a side, before anything else is in `scratch`.
+    /// The largest violation of a side in units, before anything else is in `scratch`.
     #[inline(always)]
-    pub fn violation(&self) -> T {
-        part(self.scratch, 0, self.counts.sides())
-            .iter()
-            .fold(T::ZERO, |largest, &distance| (-distance).max(largest))
+    pub fn violation(&self, units: Units<'_, T>) -> T {
+        let distances = self.scratch.iter().zip(&*self.rows);
+        distances.fold(T::ZERO, |most, (&distance, &row)| (-distance / units.of(row as usize)).max(most))
+    }
+
+    /// The largest residual of a side or an equation in units.
+    #[inline(always)]
+    pub fn residual_size<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
+        if units.rows.is_empty() {
+            let of_sides = largest_size::<T, E>(self.residual);
+            return larger(of_sides, largest_size::<T, E>(self.equation_residual));
+        }
+        let sides = self.residual.iter().zip(&*self.rows);
+        let equations = self.equation_residual.iter().zip(&*self.equations);
+        sides
+            .chain(equations)
+            .fold(T::ZERO, |most, (residual, &row)| larger(most, residual.abs() / units.of(row as usize)))
     }
 
     /// `s Δλ + λ Δs = μ − s λ`
     #[inline(always)]
     pub fn aim(&mut self, mu: T) {
-        let (sides, soft) = (self.counts.sides(), T::ZERO);
         let own = self.compliance;
-        let pairs = self.slack.iter().zip(&*self.multiplier);
-        for (i, ((inverse, target), (&slack, &multiplier))) in
-            self.inverse.iter_mut().zip(&mut *self.target).zip(pairs).enumerate()
+        let mut pairs = self.slack.iter().zip(&*self.multiplier);
+        let mut targets = self.inverse.iter_mut().zip(&mut *self.target);
+        for ((&softness, (&slack, &multiplier)), (inverse, target)) in
+            self.softness.iter().zip(&mut pairs).zip(&mut targets)
         {
-            let compliance = if i < sides { own } else { soft };
-            *inverse = T::ONE / (slack + compliance * multiplier);
+            *inverse = T::ONE / (slack + own * softness * multiplier);
+            *target = (mu - slack * multiplier) * *inverse;
+        }
+        // Violations do not give way.
+        for ((&slack, &multiplier), (inverse, target)) in pairs.zip(targets) {
+            *inverse = T::ONE / slack;
             *target = (mu - slack * multiplier) * *inverse;
         }
     }
@@ -165,14 +189,14 @@ impl<T: Real> Sides<'_, T> {
         let (sides, compliance) = (self.counts.sides(), self.compliance);
         let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
         let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
-        let changes = self.scratch.iter().zip(&*self.residual).take(sides);
+        let changes = self.scratch.iter().zip(&*self.residual).zip(&*self.softness);
         for (
             ((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)),
-            (&change, &residual),
+            ((&change, &residual), &softness),
         ) in steps.zip(pairs).zip(changes)
         {
             let change = change + residual;
-            *slack_step = change * (slack * inverse) + compliance * target;
+            *slack_step = change * (slack * inverse) + compliance * softness * target;
             *multiplier_step = target - multiplier * inverse * change;
         }
         for (j, &side) in self.soft.iter().enumerate() {
@@ -180,7 +204,7 @@ impl<T: Real> Sides<'_, T> {
             let change = at(self.scratch, side) + at(self.residual, side);
             // The change of `s − e`, and their sum written such that it keeps its digits where the
             // slack is small and its weight large.
-            let change = change * soft.share + compliance * soft.target;
+            let change = change * soft.share + soft.own_compliance * soft.target;
             let violation = (soft.sum - soft.stiffness * change) * soft.inverse;
             let step = (soft.sum + soft.compliance * change) * soft.inverse;
             set(self.slack_step, side as usize, step);
@@ -198,16 +222,18 @@ impl<T: Real> Sides<'_, T> {
         let stiffness = multiplier / slack;
         let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
         let quadratic = *self.quadratic.get(j)?;
-        let own = *self.target.get(side)? * (T::ONE + self.compliance * stiffness);
+        let own_compliance = self.compliance * *self.softness.get(side)?;
+        let own = *self.target.get(side)? * (T::ONE + own_compliance * stiffness);
         let others = *self.target.get(violation)?;
         let inverse = T::ONE / (quadratic + stiffness + other);
         let sum = own + others;
         let weight = stiffness * (quadratic + other) * inverse;
-        let share = T::ONE / (T::ONE + self.compliance * weight);
+        let share = T::ONE / (T::ONE + own_compliance * weight);
         Some(Soft {
             weight: weight * share,
             target: (own - stiffness * sum * inverse) * share,
             compliance: quadratic + other,
+            own_compliance,
             share,
             own,
             others,
@@ -236,24 +262,36 @@ impl<T: Real> Sides<'_, T> {
         })
     }
 
-    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances
-    /// from them in `scratch`, whatever slacks and violations are.
-    pub fn judge(&mut self) -> (T, T) {
-        let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
+    /// Splits distances of soft sides in `scratch` into what is above zero and violations.
+    pub fn split_violations(&mut self) {
+        let sides = self.counts.sides();
         for (j, &side) in self.soft.iter().enumerate() {
-            let (violation, multiplier) = (positive(-at(self.scratch, side)), at(self.multiplier, side));
-            let lacks = at(self.linear, j as u32) + at(self.quadratic, j as u32) * violation - multiplier;
-            inequalities = larger(inequalities, -lacks);
-            products = larger(products, violation * positive(lacks));
             let distance = at(self.scratch, side);
+            set(self.scratch, sides + j, positive(-distance));
             set(self.scratch, side as usize, positive(distance));
         }
-        for (&distance, &multiplier) in self.scratch.iter().zip(&*self.multiplier).take(self.counts.sides()) {
-            inequalities = larger(inequalities, -distance);
-            products = larger(products, positive(distance) * multiplier);
+    }
+
+    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, in units, of
+    /// distances and violations in `scratch`, whatever slacks are.
+    pub fn judge(&self, units: Units<'_, T>) -> (T, T) {
+        let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
+        let force = units.objective;
+        let (distances, violations) = self.scratch.split_at_checked(self.counts.sides()).unwrap_or_default();
+        let soft = self.soft.iter().zip(violations).zip(self.linear.iter().zip(&*self.quadratic));
+        for ((&side, &violation), (&linear, &quadratic)) in soft {
+            let lacks = linear + quadratic * violation - at(self.multiplier, side);
+            let unit = self.rows.get(side as usize).map_or(T::ONE, |&row| units.of(row as usize));
+            inequalities = larger(inequalities, -lacks * unit / force);
+            products = larger(products, violation * positive(lacks) / force);
         }
-        for &residual in &*self.equation_residual {
-            inequalities = larger(inequalities, residual.abs());
+        let sides = distances.iter().zip(&*self.multiplier).zip(&*self.rows);
+        for ((&distance, &multiplier), &row) in sides {
+            inequalities = larger(inequalities, -distance / units.of(row as usize));
+            products = larger(products, positive(distance) * multiplier / force);
+        }
+        for (residual, &row) in self.equation_residual.iter().zip(&*self.equations) {
+            inequalities = larger(inequalities, residual.abs() / units.of(row as usize));
         }
         (inequalities, products)
     }
@@ -270,5 +308,6 @@ struct Soft<T> {
     sum: T,
     stiffness: T,
     compliance: T,
+    own_compliance: T,
     inverse: T,
 }

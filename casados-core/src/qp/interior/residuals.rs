@@ -1,7 +1,11 @@
 //! Residuals of an iterate, and what they are sums of.
 
 use super::iterate::Iterate;
-use super::vector::{largest_product, largest_size};
+use super::run::Limits;
+use super::scaling::Units;
+use super::vector::{largest_of, largest_product, largest_size};
+use crate::qp::layout::{Places, part};
+use crate::qp::marked;
 use crate::qp::statistics::{Residuals, larger};
 use crate::scalar::{Packed, Real};
 
@@ -27,7 +31,7 @@ impl<T: Real> From<Largest<T>> for Residuals {
 }
 
 impl<T: Real> Iterate<'_, T> {
-    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, after
+    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, in units, after
     /// [`evaluate`](Self::evaluate).
     #[inline(always)]
     pub fn judged<E: Packed<T>>(&mut self) -> Largest<T> {
@@ -46,36 +50,72 @@ impl<T: Real> Iterate<'_, T> {
     /// As [`judged`](Self::judged), without what rounding may be.
     #[inline(always)]
     pub fn at_point<E: Packed<T>>(&mut self) -> Largest<T> {
-        let (inequalities, complementarity) = self.sides.judge();
+        self.sides.split_violations();
+        self.measured::<E>(self.measure)
+    }
+
+    /// Whether residuals are small that were [`judged`](Self::judged): in units, and as they are
+    /// beside their terms.
+    #[inline(always)]
+    pub fn are_small(&self, judged: Largest<T>, limits: &Limits<T>) -> bool {
+        limits.hold(judged, self.terms)
+            && (self.measure.rows.is_empty()
+                || limits.hold_beside(self.measured::<T>(Units::NONE), self.own_terms))
+    }
+
+    /// Residuals that were [`judged`](Self::judged), in the units of the user.
+    pub fn told(&self, judged: Largest<T>) -> Residuals {
+        if self.measure.rows.is_empty() { judged.into() } else { self.measured::<T>(Units::NONE).into() }
+    }
+
+    #[inline(always)]
+    fn measured<E: Packed<T>>(&self, units: Units<'_, T>) -> Largest<T> {
+        let (inequalities, complementarity) = self.sides.judge(units);
         Largest {
-            stationarity: largest_size::<T, E>(self.stationarity),
-            dynamics: self.gaps::<E>(),
+            stationarity: self.gradient_size::<E>(units),
+            dynamics: self.gaps::<E>(units),
             inequalities,
             complementarity,
         }
     }
 
-    /// The largest residual of dynamics and of conditions between stages.
+    /// The largest element of the gradient of the Lagrangian.
     #[inline(always)]
-    fn gaps<E: Packed<T>>(&self) -> T {
-        let gaps = largest_size::<T, E>(self.dynamics);
-        let coupled = self.coupling.as_ref();
-        coupled.map_or(gaps, |coupling| larger(gaps, largest_size::<T, E>(coupling.residual)))
+    pub fn gradient_size<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
+        if units.rows.is_empty() {
+            return largest_size::<T, E>(self.stationarity) / units.objective;
+        }
+        largest_of(T::ZERO, self.stationarity, units.rows, |g, unit| g * unit) / units.objective
     }
 
-    /// The residuals as they are known.
+    /// The largest residual of dynamics and of conditions between stages.
+    #[inline(always)]
+    pub fn gaps<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
+        let over = |gap, unit| gap / unit;
+        let gaps = if units.rows.is_empty() {
+            largest_size::<T, E>(self.dynamics)
+        } else {
+            Places::<T>::new(self.qp.dims).fold(T::ZERO, |most, place| {
+                let gaps = part(self.dynamics, place.dynamics, place.next);
+                largest_of(most, gaps, units.from(place.row + place.rows), over)
+            })
+        };
+        let Some(coupling) = &self.coupling else { return gaps };
+        let conditions = coupling.residual.iter().zip(marked(coupling.periodic));
+        conditions.fold(gaps, |most, (gap, state)| larger(most, over(gap.abs(), units.of(state))))
+    }
+
+    /// The residuals as they are known, in units.
     #[inline(always)]
     pub fn residuals<E: Packed<T>>(&self) -> Largest<T> {
-        let sides = &self.sides;
-        let inequalities =
-            larger(largest_size::<T, E>(sides.residual), largest_size::<T, E>(sides.equation_residual));
         // Products may lose NaN, their sum does not.
-        let products = largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier);
+        let products = largest_product::<T, E>(T::ZERO, self.sides.slack, self.sides.multiplier);
+        let products = if self.mu.is_finite() { products } else { self.mu };
         Largest {
-            stationarity: largest_size::<T, E>(self.stationarity),
-            dynamics: self.gaps::<E>(),
-            inequalities,
-            complementarity: if self.mu.is_finite() { products } else { self.mu },
+            stationarity: self.gradient_size::<E>(self.measure),
+            dynamics: self.gaps::<E>(self.measure),
+            inequalities: self.sides.residual_size::<E>(self.measure),
+            complementarity: products / self.measure.objective,
         }
     }
 }

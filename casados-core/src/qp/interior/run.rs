@@ -87,6 +87,11 @@ const IDLE: usize = 50;
 /// After so many correctors may go in a circle.
 const CYCLE: usize = 8;
 
+/// Residuals as they are are to be below so many `ε` of their terms.
+const ROUNDING: f64 = 1e6;
+/// The part of the tolerance that residuals in units are to be below.
+const IN_UNITS: f64 = 0.1;
+
 /// What residuals are to be below.
 pub struct Limits<T> {
     absolute: Terms<T>,
@@ -95,12 +100,23 @@ pub struct Limits<T> {
 
 impl<T: Real> Limits<T> {
     /// At least a tolerance that is asked for.
-    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: Penalties) -> Self {
+    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: Penalties, scaled: bool) -> Self {
         let values = T::from_f64(options.tolerance).max(relaxed);
         // What multipliers are to prove depends on how well gradients vanish.
         let share = if penalties == Penalties::Hard { 0.01 } else { 1.0 };
+        // Units are estimates.
+        let values = if scaled { values * T::from_f64(IN_UNITS) } else { values };
         let absolute = Terms { forces: values * T::from_f64(share), values };
         Self { absolute, relative: T::from_f64(options.relative_tolerance) }
+    }
+
+    /// Whether residuals as they are are small beside their terms; those of complementarity are
+    /// products of forces and values.
+    pub fn hold_beside(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
+        let relative = self.relative.max(T::from_f64((ROUNDING * T::EPSILON).min(1e-5)));
+        let products = (relative * terms.forces * terms.values).max(self.absolute.forces);
+        let others = Largest { complementarity: T::ZERO, ..residuals };
+        residuals.complementarity <= products && Self { relative, ..*self }.hold(others, terms)
     }
 
     /// Of residuals with such terms.
@@ -153,7 +169,7 @@ impl<T: Real> Iterate<'_, T> {
         self.give_initial_state();
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu).sqrt();
-        let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
+        let gap = self.gaps::<E>(self.measure).max(self.sides.violation(self.measure));
         let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
             // The farther it is from being feasible, the less its slacks and multipliers mean.
@@ -162,7 +178,7 @@ impl<T: Real> Iterate<'_, T> {
             QpStart::Cold if attempt.proximal => gap.max(cold),
             _ => cold,
         };
-        self.sides.begin(start, distance, solution);
+        self.sides.begin(start, distance, self.measure, solution);
         // Only now are slacks what they are.
         self.evaluate_values::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
@@ -208,13 +224,16 @@ impl<T: Real> Iterate<'_, T> {
                 // are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.judged::<E>(), self.mu);
-                if objective.is_finite() && limits.hold(residuals, self.terms) {
-                    (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
+                if objective.is_finite() && self.are_small(residuals, limits) {
+                    (statistics.objective, statistics.residuals) = (objective.to_f64(), self.told(residuals));
                     return Ok(statistics);
                 }
                 let Terms { forces, values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
-                if small && apart {
+                if limits.hold(residuals, self.terms) {
+                    // In units they are, but not beside their terms.
+                    share = share * T::from_f64(0.01);
+                } else if small && apart {
                     // Between two pieces of a penalty multipliers are off by the root of their
                     // products.
                     share = share * T::from_f64(0.01);
@@ -228,14 +247,14 @@ impl<T: Real> Iterate<'_, T> {
             }
             // Products far below the tolerance gain nothing, and make weights that swallow the
             // digits of everything else.
-            let floor = share * limits.of(self.terms).forces;
+            let floor = share * limits.of(self.terms).forces * self.measure.objective;
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
                 break false;
             }
             // NaN makes no progress.
-            let left =
-                larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities)) + self.mu;
+            let left = larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities));
+            let left = left + self.mu / self.measure.objective;
             if left < T::from_f64(PROGRESS) * best {
                 (best, idle) = (left, 0);
             } else if idle > IDLE {
@@ -266,7 +285,7 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn correct<E: Packed<T>>(&mut self, refine: bool, floor: T, is_cycling: bool) -> Result<T, QpError> {
         let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
-        let distance = self.mu.max(least);
+        let distance = (self.mu / self.measure.objective).max(least);
         let keep = if distance < boundary { distance } else { boundary };
         let mut alpha = self.sides.longest::<E>(keep);
         let has_products = self.mu > T::ZERO;
@@ -299,8 +318,8 @@ impl<T: Real> Iterate<'_, T> {
     ) -> Result<QpStatistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
-        let residuals = judged.into();
-        if objective.is_finite() && limits.hold(judged, self.terms) {
+        let residuals = self.told(judged);
+        if objective.is_finite() && self.are_small(judged, limits) {
             (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
             return Ok(statistics);
         }

@@ -6,6 +6,7 @@
 //! `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds that are hard
 //! are an equation, with a multiplier without sign.
 
+use super::scaling::Units;
 use crate::qp::element::set;
 use crate::qp::layout::{Places, part, take_mut};
 use crate::qp::problem::QpView;
@@ -57,7 +58,7 @@ impl Counts {
     }
     /// How many numbers the arrays take.
     pub const fn numbers(&self) -> usize {
-        8 * self.pairs() + 2 * self.sides() + 4 * self.equations + 2 * self.soft
+        8 * self.pairs() + 3 * self.sides() + 4 * self.equations + 2 * self.soft
     }
     /// How many indices the lists take.
     pub const fn indices(&self) -> usize {
@@ -165,7 +166,7 @@ pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
 pub struct Sides<'a, T> {
     pub counts: Counts,
     /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the
-    /// regularisation of the dual.
+    /// regularisation of the dual, in units.
     pub compliance: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],
@@ -193,6 +194,8 @@ pub struct Sides<'a, T> {
     pub scratch: &'a mut [T],
     /// What a side adds to the Hessian.
     pub weight: &'a mut [T],
+    /// How much softer a side is than `δ`: the square of its unit over that of the objective.
+    pub softness: &'a mut [T],
     /// Bounds.
     pub bound: &'a mut [T],
     /// Linear penalties of soft sides.
@@ -229,6 +232,7 @@ impl<'a, T: Real> Sides<'a, T> {
             target: take_mut(numbers, pairs),
             scratch: take_mut(numbers, pairs),
             weight: take_mut(numbers, sides),
+            softness: take_mut(numbers, sides),
             bound: take_mut(numbers, sides),
             linear: take_mut(numbers, counts.soft),
             quadratic: take_mut(numbers, counts.soft),
@@ -265,9 +269,32 @@ impl<'a, T: Real> Sides<'a, T> {
                 if !matches!(kind, Kind::Absent) {
                     set(list.rows, *at, row);
                     set(list.bound, *at, bound);
+                    set(list.softness, *at, T::ONE);
                     *at += 1;
                 }
             }
         });
+    }
+
+    /// What sides and equations give way is measured in units, and so are penalties that are those
+    /// of no user.
+    pub fn measure_in(&mut self, units: Units<'_, T>, own_penalties: bool) {
+        if units.rows.is_empty() {
+            return;
+        }
+        for (softness, &row) in self.softness.iter_mut().zip(&*self.rows) {
+            let unit = units.of(row as usize);
+            *softness = unit * unit / units.objective;
+        }
+        for (stiffness, &row) in self.stiffness.iter_mut().zip(&*self.equations) {
+            let unit = units.of(row as usize);
+            *stiffness = units.objective / (unit * unit);
+        }
+        if own_penalties {
+            for (linear, &side) in self.linear.iter_mut().zip(&*self.soft) {
+                let row = self.rows.get(side as usize).map_or(usize::MAX, |&row| row as usize);
+                *linear = *linear / units.of(row);
+            }
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Sums and extremes over long vectors, in registers.
 
+use crate::qp::statistics;
 use crate::scalar::{Packed, Real};
 
 /// Whole registers of a slice, and the rest.
@@ -56,6 +57,12 @@ pub fn larger<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
     }
     let whole = largest.largest();
     rest.iter().fold(whole, |largest, a| a.abs().max(largest))
+}
+
+/// The largest of `|a|` in units, at least `least`; NaN if one of them is.
+#[inline(never)]
+pub fn largest_of<T: Real>(least: T, all: &[T], units: &[T], measure: fn(T, T) -> T) -> T {
+    all.iter().zip(units).fold(least, |most, (a, &unit)| statistics::larger(most, measure(a.abs(), unit)))
 }
 
 /// The largest `|a|`; NaN if one of them is, or if their squares overflow.

@@ -1,7 +1,7 @@
 //! What is said of a problem that has no solution, and why that is true.
 
 use super::iterate::Iterate;
-use super::vector::{dot, largest_size};
+use super::vector::dot;
 use crate::qp::layout::part;
 use crate::qp::statistics::larger;
 use crate::scalar::{Packed, Real};
@@ -24,7 +24,7 @@ impl<T: Real> Iterate<'_, T> {
         if let Some(coupling) = &self.coupling {
             lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
         }
-        let gradient = largest_size::<T, E>(self.stationarity);
+        let gradient = self.gradient_size::<E>(self.measure);
         let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
         let gradient = larger(gradient * T::from_f64(if T::EPSILON < FINE { 1e5 } else { 1e2 }), rounding);
         lagrangian > gradient * (T::ONE + self.terms.values)

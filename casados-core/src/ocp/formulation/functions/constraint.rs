@@ -13,6 +13,27 @@ use bytemuck::Zeroable;
 
 /// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is
 /// both.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # #[function]
+/// # fn sum(x: f64, u: f64) -> f64 { x + u }
+/// // Two constraints as a pair.
+/// let pair = (Constraint::<Sum>::new([-1.0], [1.0]), Constraint::<Both>::new([-2.0; 2], [2.0; 2]));
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+///     .path_constraints(pair)
+///     .on(Horizon::uniform(20, 0.1))?;
+/// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// assert_eq!(ocp.solution()?.constraint("Both[1]")?.len(), 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Constraints<S: Shape, T: Real> {
     /// How many rows.
     const ROWS: usize;

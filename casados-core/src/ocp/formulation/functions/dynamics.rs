@@ -199,6 +199,23 @@ pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &IntervalResult<'_, T>);
 /// [`Divided`](crate::Divided)); [`WithIntegral`](crate::ocp::WithIntegral) is one with an integral
 /// cost, [`Map`](crate::ocp::Map) a function that is `φ` itself, `Shooting` a batch that takes all
 /// intervals at once, and `ReturnMap` dynamics whose last interval ends with a map.
+///
+/// ```
+/// use casados::ocp::{Dynamics, Horizon, HeapOcp, Formulation, OcpError, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+///
+/// /// A problem without costs, of any dynamics.
+/// fn still<D: Dynamics<f64>>(dynamics: D) -> Result<HeapOcp<impl Formulation<f64>>, OcpError> {
+///     Problem::new(dynamics).on(Horizon::uniform(10, 0.1))
+/// }
+/// let one = still(Irk::<Cart, Gauss<2>>::new(Options::default())?)?;
+/// let other = still(Erk::<Cart, Rk4>::new(Options::default())?)?;
+/// assert_eq!(one.times(), other.times());
+/// # Ok::<(), OcpError>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
     note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `WithIntegral`, `ReturnMap` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
@@ -289,6 +306,27 @@ pub trait Dynamics<T: Real> {
 }
 
 /// Dynamics with second derivatives.
+///
+/// Users write it in bounds, or [`ExactFormulation`](crate::ocp::ExactFormulation) of a whole
+/// problem.
+///
+/// ```
+/// use casados::ocp::{HeapIpm, Horizon, OcpError, Problem, SecondOrder};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+///
+/// /// Whether a state is reached within a second, of any dynamics that an interior point takes.
+/// fn is_reached<D: SecondOrder<f64>>(dynamics: D, end: f64) -> Result<bool, OcpError> {
+///     let mut ocp = Problem::new(dynamics).on(Horizon::uniform(10, 0.1))?;
+///     ocp.fix_initial_state(&[0.0; 2])?.bound("x[0]", 10.., end, end)?.bound("u", .., -1.0, 1.0)?;
+///     Ok(HeapIpm::new(&ocp)?.solve(ocp.guess(&[0.0; 2], &[0.0])?)?.is_converged())
+/// }
+/// let erk = || Erk::<Cart, Rk4>::new(Options::default());
+/// assert!(is_reached(erk()?, 0.4)? && !is_reached(erk()?, 0.6)?);
+/// # Ok::<(), OcpError>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no second derivatives",
     note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them",

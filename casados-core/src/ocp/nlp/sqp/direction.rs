@@ -14,17 +14,8 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, StageDims};
 use crate::scalar::Real;
 
-/// The first regularisation that is tried, and the smallest one.
-const FIRST_REGULARISATION: f64 = 1e-6;
-const MIN_REGULARISATION: f64 = 1e-8;
-/// The largest one.
-const MAX_REGULARISATION: f64 = 1e10;
 /// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
 const MOST_AT_FIRST: f64 = 1e-2;
-/// What it grows by where it is not enough, and shrinks by from one iteration to the next.
-const REGULARISATION_FACTOR: f64 = 4.0;
-/// It grows so many times because a QP was not solved for a reason that is not known.
-const RETRIES_OF_UNSOLVED_QPS: usize = 1;
 /// Penalties grow by this, once, to see whether the objective is what holds violations back.
 const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
@@ -277,43 +268,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let reduced = self.curvature.convexification() == Convexification::Reduced;
-        let mut unknown = 0;
         if state.damping > row.regularisation {
             ocp.regularise(T::from_f64(state.damping - row.regularisation));
             row.regularisation = state.damping;
         }
-        loop {
-            let error = match self.solve_qp(ocp, state, start, row) {
-                Ok(()) => break,
-                Err(error) => error,
-            };
-            let is_curvature = match error {
-                QpError::NotConvex { .. } => true,
-                QpError::MaxIterations { .. } | QpError::Stalled { .. } => {
-                    unknown += 1;
-                    unknown <= RETRIES_OF_UNSOLVED_QPS
-                }
-                _ => false,
-            };
-            if !(reduced && is_curvature && row.regularisation < MAX_REGULARISATION) {
-                return Err(error);
-            }
-            let more = if row.regularisation > 0.0 {
-                REGULARISATION_FACTOR * row.regularisation
-            } else if state.regularisation > 0.0 {
-                (state.regularisation / REGULARISATION_FACTOR).max(MIN_REGULARISATION)
-            } else {
-                FIRST_REGULARISATION
-            };
-            ocp.regularise(T::from_f64(more - row.regularisation));
-            row.regularisation = more;
-            state.regularisation = more.min(MAX_REGULARISATION);
+        if self.curvature.convexification() != Convexification::Reduced {
+            return self.solve_qp(ocp, state, start, row);
         }
-        if row.regularisation == 0.0 {
-            state.regularisation /= REGULARISATION_FACTOR;
-        }
-        Ok(())
+        let (mut correction, mut delta) = (state.inertia, row.regularisation);
+        let solve = |ocp: &Ocp<P, T, D, M>| self.solve_qp(ocp, state, start, row);
+        let result = ocp.correct_inertia(&mut correction, &mut delta, solve);
+        (state.inertia, row.regularisation) = (correction, delta);
+        result
     }
 
     /// The QP from the iterate; from a cold start if a warm one may be to blame: that no point

@@ -13,7 +13,7 @@ use crate::shape::Shape;
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
     /// change of `penalties`.
-    pub(super) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
+    pub(in crate::ocp) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
         let intervals = self.intervals();
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let (from, _) = self.iterate.vectors();
@@ -73,7 +73,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// Those of functions and integrators.
-    pub(super) fn measure(
+    pub(in crate::ocp) fn measure(
         &mut self,
         at: &Solution<T, D, M>,
         weights: &Solution<T, D, M>,
@@ -125,7 +125,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// [`Ocp::measure`] at the iterate, from the QP that was written there.
-    pub(super) fn measure_here(&self, weights: &Solution<T, D, M>) -> Measure {
+    pub(in crate::ocp) fn measure_here(&self, weights: &Solution<T, D, M>) -> Measure {
         let mut sum = Measure { objective: self.objective.to_f64(), violation: 0.0 };
         let (v, _) = self.iterate.vectors();
         let mut begin = 0;

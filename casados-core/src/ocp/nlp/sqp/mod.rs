@@ -141,7 +141,10 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
     pub fn new<P: Formulation<T>>(
         ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
     ) -> Result<Self, OcpError> {
-        Self::with_solver(ocp, HeapInteriorPoint::new())
+        let mut solver = HeapInteriorPoint::new();
+        // QPs come in units.
+        solver.options.scaling = false;
+        Self::with_solver(ocp, solver)
     }
 }
 

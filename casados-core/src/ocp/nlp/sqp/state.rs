@@ -3,6 +3,7 @@
 use super::acceptance::Search;
 use super::options::{Globalisation, SqpOptions};
 use crate::ocp::assembly::units::Sizes;
+use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::scalar::Scalar;
@@ -21,8 +22,7 @@ pub(super) struct State<'c, T> {
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
-    /// The regularisation of the last QP that needed one, and less after those that did not.
-    pub regularisation: f64,
+    pub inertia: InertiaCorrection,
     /// The least regularisation, where steps without were too far from being one of descent.
     pub damping: f64,
     /// The regularisation of the last step that was short, and less after others.
@@ -84,7 +84,7 @@ impl<T> State<'_, T> {
             second_attempt: false,
             search: Search::new(),
             elastic: false,
-            regularisation: 0.0,
+            inertia: InertiaCorrection::default(),
             damping: 0.0,
             failed: 0.0,
             may_reject_short_steps: false,

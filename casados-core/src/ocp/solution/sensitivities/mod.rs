@@ -6,19 +6,25 @@
 //! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
 //! | `column`, `border` | solutions by its factors, and what couples stages |
 //! | `parameters` | what parameters change of the conditions |
+//! | `covariance` | the covariance of an estimate, and what data say nothing of |
+//! | `unknowns`, `gram` | its unknowns, and the reduced Hessian over these |
 
 mod active;
 mod answers;
 mod border;
 mod column;
+mod covariance;
 mod derivatives;
 mod factors;
+mod gram;
 mod parameters;
 mod recursion;
 mod solve;
+mod unknowns;
 
 use crate::qp::element::get;
 pub use answers::{SolutionAdjoint, ValueHessian};
+pub use covariance::{Covariance, Unidentifiable};
 pub use factors::SolutionFactors;
 
 use crate::ocp::assembly::curvature::Curvature;

@@ -1,6 +1,7 @@
 //! Why a name means nothing, or a trajectory is none of a problem.
 
 use crate::ocp::formulation::error::OcpError;
+use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
@@ -66,7 +67,7 @@ pub enum TrajectoryError {
         times: usize,
     },
     /// The problem refuses a value.
-    Problem(OcpError),
+    Problem(Box<OcpError>),
 }
 
 impl fmt::Display for TrajectoryError {
@@ -111,7 +112,7 @@ debug_is_display!(TrajectoryError);
 impl core::error::Error for TrajectoryError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            Self::Problem(error) => Some(error),
+            Self::Problem(error) => Some(&**error),
             _ => None,
         }
     }
@@ -119,6 +120,6 @@ impl core::error::Error for TrajectoryError {
 
 impl<E: Into<OcpError>> From<E> for TrajectoryError {
     fn from(error: E) -> Self {
-        Self::Problem(error.into())
+        Self::Problem(Box::new(error.into()))
     }
 }

@@ -11,17 +11,17 @@ use crate::shape::Matrix;
 use alloc::boxed::Box;
 
 /// The levels of a family that are in use.
-pub struct Levels<M: Dae, T: Real> {
+pub struct Orders<M: Dae, T: Real> {
     open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
 }
 
-impl<M: Dae, T: Real> Default for Levels<M, T> {
+impl<M: Dae, T: Real> Default for Orders<M, T> {
     fn default() -> Self {
         Self { open: [None, None, None] }
     }
 }
 
-impl<M: Dae, T: Real> Levels<M, T> {
+impl<M: Dae, T: Real> Orders<M, T> {
     pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
         let missing = Error::OutOfMemory { bytes: 0 };
         let place = self.open.get_mut(level).ok_or(missing)?;

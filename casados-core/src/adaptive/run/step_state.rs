@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{Predictive, Refusals, Roughness, Trend};
+use crate::adaptive::control::{DiscontinuityDetector, ErrorHistory, GustafssonController, RejectionHistory};
 use crate::adaptive::stages::Convergence;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -16,8 +16,6 @@ const SETTLED: usize = 5;
 const WORTHWHILE: f64 = 1.2;
 /// A run still looks for its step size while each step is longer than the last by this factor.
 const LONGER: f64 = 2.0;
-/// After so many iterations in a row that did not converge the planned elimination may be to blame.
-const TROUBLES: usize = 3;
 
 /// What has to be done before a step can be tried.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
@@ -65,7 +63,7 @@ impl Order {
 }
 
 /// A run on its way.
-pub(super) struct Walk<T> {
+pub(super) struct StepState<T> {
     span: Span<T>,
     direction: f64,
     /// The longest step.
@@ -77,6 +75,8 @@ pub(super) struct Walk<T> {
     pub last: bool,
     /// The length of the last accepted step.
     pub accepted: Option<T>,
+    /// The longest step that was accepted, or the first one.
+    pub longest_so_far: T,
     /// Whether the run still looks for its step size.
     pub starting: bool,
     pub need: Need,
@@ -88,23 +88,23 @@ pub(super) struct Walk<T> {
     same_matrix: bool,
     pub order: Order,
     pub convergence: Convergence,
-    pub controller: Predictive,
-    pub refusals: Refusals,
-    pub trend: Trend,
-    pub roughness: Roughness,
+    pub controller: GustafssonController,
+    pub rejections: RejectionHistory,
+    pub error_history: ErrorHistory,
+    pub discontinuities: DiscontinuityDetector,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
     pub tried: usize,
-    /// How many matrices in a row were singular,
+    /// How many matrices in a row were singular.
     pub singular: usize,
-    /// and how many iterations did not converge,
-    pub troubles: usize,
-    /// so that every matrix is pivoted as a whole.
+    /// Whether the matrices of this step are pivoted as a whole.
     pub pivoted: bool,
+    /// Whether the planned elimination has lost its digits before.
+    pub verifies_pivots: bool,
 }
 
-impl<T: Real> Walk<T> {
+impl<T: Real> StepState<T> {
     pub fn new(span: Span<T>, max_step: f64) -> Self {
         let length = span.end - span.start;
         Self {
@@ -115,6 +115,7 @@ impl<T: Real> Walk<T> {
             h: length,
             last: false,
             accepted: None,
+            longest_so_far: T::ZERO,
             starting: true,
             need: Need::Jacobian,
             current: false,
@@ -122,15 +123,15 @@ impl<T: Real> Walk<T> {
             same_matrix: false,
             order: Order::default(),
             convergence: Convergence::default(),
-            controller: Predictive::default(),
-            refusals: Refusals::default(),
-            trend: Trend::default(),
-            roughness: Roughness::default(),
+            controller: GustafssonController::default(),
+            rejections: RejectionHistory::default(),
+            error_history: ErrorHistory::default(),
+            discontinuities: DiscontinuityDetector::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
-            troubles: 0,
             pivoted: false,
+            verifies_pivots: false,
         }
     }
 
@@ -140,6 +141,7 @@ impl<T: Real> Walk<T> {
         if self.beyond(self.h * T::from_f64(1.0001)) >= 0.0 {
             (self.h, self.last) = (self.span.end - self.t, true);
         }
+        self.longest_so_far = self.h.abs();
     }
 
     /// How far a step leads beyond the end of the interval.
@@ -202,12 +204,10 @@ impl<T: Real> Walk<T> {
             }
             Failure::Rough(factor) => factor,
             Failure::Diverges | Failure::NotFinite => {
-                self.troubles += 1;
                 self.order.unexpected = true;
                 0.5
             }
         };
-        self.pivoted = self.troubles >= TROUBLES;
         self.again(factor);
     }
 
@@ -229,7 +229,7 @@ impl<T: Real> Walk<T> {
     /// The error is too large.
     pub fn refuse(&mut self, error: f64, factor: f64) {
         self.refusal = Refusal::Error;
-        self.refusals.refused(error);
+        self.rejections.refused(error);
         self.again(if self.accepted.is_none() { 0.1 } else { factor });
     }
 
@@ -239,6 +239,7 @@ impl<T: Real> Walk<T> {
         let size = self.h.to_f64().abs();
         self.starting = self.starting && factor > LONGER;
         self.accepted = Some(self.h);
+        self.longest_so_far = self.longest_so_far.max(self.h.abs());
         (self.t, self.current) = (end, false);
         self.convergence.fresh = false;
         let mut next = (size * factor).min(self.longest);

@@ -1,0 +1,52 @@
+//! Events that come sooner and sooner: the paradox of Zeno (J. Zhang, K. H. Johansson, J. Lygeros,
+//! S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001)).
+
+use super::super::sealed::Engine;
+use super::Hybrid;
+use crate::error::Error;
+use crate::model::Dae;
+use crate::scalar::Real;
+
+/// The ratio of the times between four events is the same, to this part.
+const SAME_RATIO: f64 = 0.2;
+/// What is left until they accumulate is no more than so many roundoff errors of the time.
+const NOTHING: f64 = 1e3;
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// # Errors
+    /// [`Error::AccumulatingEvents`] where the time does not resolve what is left.
+    pub(super) fn check_accumulation(&self, event: usize) -> Result<(), Error> {
+        let Some((t, end)) = self.accumulation(event) else { return Ok(()) };
+        if (end - t).abs() > NOTHING * T::EPSILON * end.abs().max(t.abs()) {
+            return Ok(());
+        }
+        Err(self.accumulating(event, end))
+    }
+
+    /// More events than are allowed, or those that accumulate.
+    pub(super) fn too_many(&self, t: T) -> Error {
+        let events = self.solution.occurrences.len();
+        let last = self.solution.occurrences.last().map_or(0, |at| at.event);
+        match self.accumulation(last) {
+            Some((_, end)) => self.accumulating(last, end),
+            None => Error::TooManyEvents { t: t.to_f64(), events },
+        }
+    }
+
+    fn accumulating(&self, event: usize, t: f64) -> Error {
+        let function = self.events.get(event).map_or("", |event| event.guard.name);
+        Error::AccumulatingEvents { t, function, event, events: self.solution.occurrences.len() }
+    }
+
+    /// The time of the last event of a kind, and where a geometric series through the last four
+    /// ends.
+    fn accumulation(&self, event: usize) -> Option<(f64, f64)> {
+        let of_kind = self.solution.occurrences.iter().rev().filter(|at| at.event == event);
+        let mut times = of_kind.map(|at| at.t.to_f64());
+        let [t, second, third, fourth] = [times.next()?, times.next()?, times.next()?, times.next()?];
+        let [last, before, first] = [t - second, second - third, third - fourth];
+        let [ratio, other] = [last / before, before / first];
+        let is_series = ratio > 0.0 && ratio < 1.0 && (ratio - other).abs() <= SAME_RATIO * ratio;
+        is_series.then(|| (t, t + last * ratio / (1.0 - ratio)))
+    }
+}

@@ -1,0 +1,303 @@
+//! Whether real-time iterations contract: the conditions of optimality at the plan, and what steps
+//! reduce the merit function by beside what their QPs predict.
+
+use crate::linalg::dot;
+use crate::ocp::assembly::linearise;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{Residuals, Solution, StageDims, add_symmetric, part, part_mut};
+use crate::scalar::Real;
+
+/// When real-time iterations count as divergent.
+///
+/// ```text
+/// ρ = Σ_j w_j ared_j / Σ_j w_j pred_j        w_j = (1 − 1/samples)^(k − j)
+/// ared = φ(v̄) − φ(v)        pred = φ(v̄) − q(v)        φ = f + Σ_i |λ_i| |c_i|⁻        q: the QP
+/// ```
+///
+/// `v̄` is the plan that was linearised, `v` the solution of its QP with the multipliers `λ`, both
+/// with the state and the parameters of this sample. `φ` is the exact merit function of `l₁` type,
+/// `f` with penalties of soft bounds, and `q` what the QP makes of it. Iterations that contract
+/// have a ratio near one. Those that go around a solution gain nothing, whatever QPs predict: near
+/// a solution they diverge where the spectral radius `κ` of `I − H⁻¹∇²L` on the null space of
+/// active constraints, the contraction rate, is above one. A disturbance, noise and a reference
+/// that moves lengthen steps, and do not change what a step gains.
+///
+/// Source: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2nd edition, (4.4) and section 18.5;
+/// contraction: M. Diehl, H. G. Bock, J. P. Schlöder, SIAM J. Control Optim. 43, 2005.
+///
+/// ```
+/// use casados::ocp::ContractionTest;
+///
+/// let test = ContractionTest::default();
+/// assert_eq!((test.samples, test.min_ratio, test.tolerance), (5, 0.1, 1e-6));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContractionTest {
+    /// Over how many iterations the ratio is a mean, and how many it takes at least. Default 5.
+    pub samples: usize,
+    /// Iterations with a smaller ratio are [`Contraction::Diverging`]. Default 0.1.
+    pub min_ratio: f64,
+    /// Predicted reductions that are smaller, relative to the merit function or to one, are not
+    /// judged. Iterations in one sample end where residuals are no larger. Default 1e-6, in single
+    /// precision 1e-3.
+    pub tolerance: f64,
+}
+
+impl Default for ContractionTest {
+    fn default() -> Self {
+        Self::new::<f64>()
+    }
+}
+
+impl ContractionTest {
+    pub(in crate::ocp) const fn new<T: Real>() -> Self {
+        let tolerance = if T::EPSILON < 1e-10 { 1e-6 } else { 1e-3 };
+        Self { samples: 5, min_ratio: 0.1, tolerance }
+    }
+}
+
+/// What is known of the contraction of real-time iterations; see [`ContractionTest`].
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?.monitored()?;
+/// let convergence = controller.prepare()?.feedback(&[1.0])?.convergence.ok_or("monitored")?;
+/// assert_eq!(convergence.contraction, Contraction::Unknown); // of one sample
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Contraction {
+    /// There were too few iterations that predict more than the tolerance.
+    Unknown,
+    /// Iterations gain what their QPs predict, or there is nothing left to be gained.
+    Contracting,
+    /// Iterations do not gain what their QPs predict. Exact Hessians
+    /// ([`HeapRealTime::exact`](crate::ocp::HeapRealTime::exact)) may contract, or a cost of what
+    /// moves.
+    Diverging,
+}
+
+/// How real-time iterations converge.
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?.monitored()?;
+/// controller.prepare()?.feedback(&[1.0])?;
+/// let convergence = controller.prepare()?.feedback(&[1.0])?.convergence.ok_or("monitored")?;
+/// // A linear-quadratic problem is solved in one iteration.
+/// assert!(convergence.residuals.largest() < 1e-6 && convergence.step_size < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Convergence {
+    /// The conditions of optimality at the plan that was linearised, with its own first state as
+    /// the initial state: what [`Sqp`](crate::ocp::Sqp) measures, too.
+    pub residuals: Residuals,
+    /// The largest change of a state or control from that plan to the next one.
+    pub step_size: f64,
+    /// `ρ` of [`ContractionTest`] over the iterations before this one; one while nothing is known.
+    pub reduction_ratio: f64,
+    /// What it says.
+    pub contraction: Contraction,
+}
+
+/// What the contraction test remembers. Its functions are pointers: a controller without a monitor
+/// has none of their code.
+pub(in crate::ocp) struct Monitor<P, T, D, M> {
+    /// Weights of the merit function, in the places of multipliers.
+    weights: Solution<T, D, M>,
+    /// Ends of intervals and constraints.
+    ends: M,
+    /// Whether the last iteration is still to be judged.
+    is_pending: bool,
+    /// The sums of actual and predicted reductions, and of how many.
+    sums: [f64; 2],
+    count: usize,
+    residuals: Residuals,
+    measure: fn(&mut Ocp<P, T, D, M>) -> Residuals,
+    size: StepSize<P, T, D, M>,
+    reductions: Reductions<P, T, D, M>,
+}
+
+/// The largest change from the plan to the solution of its QP.
+type StepSize<P, T, D, M> = fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64;
+
+/// The actual and the predicted reduction of the step from the plan to the solution of its QP, and
+/// the size of the merit function.
+type Reductions<P, T, D, M> =
+    fn(&mut Ocp<P, T, D, M>, &Solution<T, D, M>, &mut Solution<T, D, M>, &mut [T]) -> [f64; 3];
+
+/// How many numbers a monitor takes for a problem: weights, and ends of intervals.
+pub(in crate::ocp) const fn memory<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> [usize; 2] {
+    [Solution::<T, (), ()>::memory(dims), linearise::ends::<P, T>(dims)]
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Monitor<P, T, D, M> {
+    /// In memory of [`memory`] numbers.
+    pub fn new(weights: Solution<T, D, M>, ends: M) -> Self {
+        Self {
+            weights,
+            ends,
+            is_pending: false,
+            sums: [0.0; 2],
+            count: 0,
+            residuals: Residuals::default(),
+            measure: measure::<P, T, D, M>,
+            size: size::<P, T, D, M>,
+            reductions: reductions::<P, T, D, M>,
+        }
+    }
+
+    /// Measures the plan where it has been linearised.
+    pub fn measure(&mut self, ocp: &mut Ocp<P, T, D, M>) {
+        self.residuals = (self.measure)(ocp);
+    }
+
+    /// What is known where the QP of the plan, which is the iterate, has been solved.
+    pub fn observe(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        solution: &Solution<T, D, M>,
+        test: &ContractionTest,
+    ) -> Convergence {
+        self.is_pending = true;
+        let [actual, predicted] = self.sums;
+        let reduction_ratio = if predicted > 0.0 { actual / predicted } else { 1.0 };
+        let contraction = if self.count < test.samples {
+            Contraction::Unknown
+        } else if reduction_ratio < test.min_ratio {
+            Contraction::Diverging
+        } else {
+            Contraction::Contracting
+        };
+        let (residuals, step_size) = (self.residuals, (self.size)(ocp, solution));
+        Convergence { residuals, step_size, reduction_ratio, contraction }
+    }
+
+    /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of
+    /// `before`.
+    pub fn judge(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        before: &mut Solution<T, D, M>,
+        test: &ContractionTest,
+    ) {
+        if !core::mem::take(&mut self.is_pending) {
+            return;
+        }
+        core::mem::swap(&mut ocp.iterate, before);
+        let [actual, predicted, merit] =
+            (self.reductions)(ocp, before, &mut self.weights, self.ends.as_mut());
+        core::mem::swap(&mut ocp.iterate, before);
+        if predicted > test.tolerance * merit.abs().max(1.0) {
+            // A step that loses much is forgotten as fast as one that loses what it was to gain;
+            // one to a point without a value is as bad.
+            let actual = if actual > -predicted { actual } else { -predicted };
+            let memory = 1.0 - 1.0 / test.samples.max(1) as f64;
+            self.sums = [memory * self.sums[0] + actual, memory * self.sums[1] + predicted];
+            self.count = self.count.saturating_add(1);
+        } else if self.sums[1] <= predicted.abs() {
+            // Nothing is left to be gained.
+            self.sums = [0.0; 2];
+        }
+    }
+
+    /// Forgets all iterations.
+    pub fn reset(&mut self) {
+        (self.is_pending, self.sums, self.count) = (false, [0.0; 2], 0);
+    }
+}
+
+/// The conditions of optimality at the plan, whose first state is the initial state.
+fn measure<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<P, T, D, M>,
+) -> Residuals {
+    let Ocp { qp, iterate, .. } = &mut *ocp;
+    if let (Some(mut stage), Some(first)) = (qp.stage_mut(0), iterate.stages().next()) {
+        let bounds = stage.x_bounds_mut();
+        crate::qp::assign(bounds.lower, first.x);
+        crate::qp::assign(bounds.upper, first.x);
+    }
+    ocp.residuals().0
+}
+
+/// See [`StepSize`].
+fn size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &Ocp<P, T, D, M>,
+    solution: &Solution<T, D, M>,
+) -> f64 {
+    let pairs = ocp.iterate.vectors().0.iter().zip(solution.vectors().0);
+    pairs.fold(T::ZERO, |size, (&v, &w)| size.max((w - v).abs())).to_f64()
+}
+
+/// See [`Reductions`].
+fn reductions<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<P, T, D, M>,
+    solution: &Solution<T, D, M>,
+    weights: &mut Solution<T, D, M>,
+    ends: &mut [T],
+) -> [f64; 3] {
+    if P::Dynamics::LIFTED {
+        return [0.0; 3];
+    }
+    weights.copy_from(solution);
+    weights.multipliers_mut().iter_mut().for_each(|weight| *weight = weight.abs());
+    let here = ocp.measure_here(weights);
+    let slope = ocp.slope(solution, here.objective - ocp.objective.to_f64());
+    let predicted = here.violation - slope - 0.5 * energy(ocp, solution);
+    ocp.has_algebraic = false;
+    let merit = here.objective + here.violation;
+    let actual = match ocp.measure(solution, weights, ends) {
+        Ok(there) => merit - there.objective - there.violation,
+        Err(_) => f64::NEG_INFINITY,
+    };
+    [actual, predicted, merit]
+}
+
+/// `dᵀ H d` of the step from the iterate to a solution of its QP.
+fn energy<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<P, T, D, M>,
+    solution: &Solution<T, D, M>,
+) -> f64 {
+    let intervals = ocp.intervals();
+    let data = split::<P, T>(ocp.data.as_mut(), intervals);
+    let ((from, _), (to, _)) = (ocp.iterate.vectors(), solution.vectors());
+    let (mut energy, mut begin) = (T::ZERO, 0);
+    for stage in ocp.qp.view().stages() {
+        let view = stage.arrays();
+        let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
+        begin += view.ld;
+        let (step, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
+        let force = part_mut(rest, 0, view.ld);
+        for ((d, &w), &v) in step.iter_mut().zip(w).zip(v) {
+            *d = w - v;
+        }
+        force.fill(T::ZERO);
+        add_symmetric(force, view.hessian, view.ld, step, view.n);
+        energy = energy + dot(force, step);
+    }
+    energy.to_f64()
+}

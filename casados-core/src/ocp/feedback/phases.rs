@@ -1,0 +1,238 @@
+//! The two phases of a real-time iteration, and what the second one gives.
+
+use super::contraction::{Contraction, Convergence};
+use super::real_time::{RealTime, Step};
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{QpSolver, QpStatistics, StageDims};
+use crate::scalar::Real;
+
+/// A QP that waits for the state; see [`RealTime`].
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// // Integrations and derivatives are done here, before the state is known.
+/// let prepared = controller.prepare()?;
+/// // One QP is left.
+/// let feedback = prepared.feedback(&[0.8])?;
+/// assert!(feedback.statistics.iterations > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Prepared<'a, P, S, C, T, D, M> {
+    pub(super) controller: &'a mut RealTime<P, S, C, T, D, M>,
+}
+
+/// The control that is applied where there is no feedback; see [`Prepared::feedback_or`].
+///
+/// ```
+/// # use casados::ocp::*;
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let last = [0.3];
+/// // The measurement is broken: the control before is held.
+/// let prepared = controller.prepare()?;
+/// let (u, feedback) = prepared.feedback_or(&[f64::NAN], &mut || false, Fallback::Control(&last));
+/// assert!(u == [0.3] && feedback.is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fallback<'u, T> {
+    /// The first control of the plan: that of the sample before, shifted.
+    Plan,
+    /// This one: that of another controller, of the stop, or the one before, which is held.
+    Control(&'u [T]),
+}
+
+/// What is to be done now.
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let feedback = controller.prepare()?.feedback(&[0.8])?;
+/// // The law of the linear-quadratic regulator: nearly -0.618 x.
+/// assert!((feedback.u[0] + 0.618 * 0.8).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Feedback<'a, T> {
+    /// The control to be applied: the first of the plan.
+    pub u: &'a [T],
+    /// What the QP took, the last one where there were several.
+    pub statistics: QpStatistics,
+    /// Iterations of sequential quadratic programming in this sample.
+    pub iterations: usize,
+    /// What was added to the diagonal of the Hessian so that the QP is convex; see
+    /// [`Convexification::Reduced`](crate::ocp::Convexification::Reduced).
+    pub regularisation: f64,
+    /// Residuals, the step and whether iterations contract; none of a controller without a monitor
+    /// ([`HeapRealTime::monitored`](crate::ocp::HeapRealTime::monitored)).
+    pub convergence: Option<Convergence>,
+}
+
+impl<T> Feedback<'_, T> {
+    /// Whether iterations diverge: the control is that of a plan which does not come nearer to a
+    /// solution; see [`ContractionTest`](crate::ocp::ContractionTest).
+    #[must_use]
+    pub fn is_diverging(&self) -> bool {
+        self.convergence.is_some_and(|convergence| convergence.contraction == Contraction::Diverging)
+    }
+}
+
+impl<'a, P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
+    Prepared<'a, P, S, C, T, D, M>
+where
+    C: Curvature<P::Dynamics, T>,
+{
+    /// The feedback phase: solves the QP with this state at its start.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::NonFiniteDerivative`],
+    /// [`OcpError::Qp`]
+    pub fn feedback(self, x0: &[T]) -> Result<Feedback<'a, T>, OcpError> {
+        self.feedback_until(x0, &mut || false)
+    }
+
+    /// As [`Prepared::feedback`], until the time is over; see [`QpSolver::solve_until`].
+    ///
+    /// # Errors
+    /// As [`Prepared::feedback`], and [`OcpError::Qp`] with
+    /// [`QpError::OutOfTime`](crate::qp::QpError::OutOfTime): then the first control of the plan,
+    /// which is as it was, is what is left to apply.
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// use casados::qp::QpError;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let mut controller = HeapRealTime::new(ocp)?;
+    /// let late = controller.prepare()?.feedback_until(&[0.8], &mut || true);
+    /// assert!(matches!(late, Err(OcpError::Qp(QpError::OutOfTime { .. }))));
+    /// assert_eq!(controller.ocp().stage(0)?.u, [0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn feedback_until(
+        self,
+        x0: &[T],
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Feedback<'a, T>, OcpError> {
+        let step = self.controller.iterate(x0, over)?;
+        self.give(step, 1)
+    }
+
+    /// As [`Prepared::feedback_until`], with a control in any case: that of the feedback, or where
+    /// there is an error the fallback.
+    pub fn feedback_or(
+        self,
+        x0: &[T],
+        over: &mut dyn FnMut() -> bool,
+        fallback: Fallback<'a, T>,
+    ) -> (&'a [T], Result<Feedback<'a, T>, OcpError>) {
+        let result = self.controller.iterate(x0, over);
+        let controller = &*self.controller;
+        let plan = controller.ocp.iterate.stages().next().map_or(&[][..], |first| first.u);
+        match (result, fallback) {
+            (Ok(step), _) => (plan, Ok(step.feedback(plan, 1))),
+            (Err(error), Fallback::Plan) => (plan, Err(error)),
+            (Err(error), Fallback::Control(u)) => (u, Err(error)),
+        }
+    }
+
+    /// As [`Prepared::feedback_until`], with more iterations of sequential quadratic programming
+    /// for the same state: until residuals are within the tolerance of the
+    /// [`ContractionTest`](crate::ocp::ContractionTest), there were `max_iterations`, or the time
+    /// is over. The plan is that of the last iteration that was complete.
+    ///
+    /// # Errors
+    /// As [`Prepared::feedback_until`], of the first iteration.
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::*;
+    /// # use casados::prelude::*;
+    /// # #[ode]
+    /// # fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], x[0].sin() + u] }
+    /// # #[function]
+    /// # fn all(x: [f64; 2], u: f64) -> [f64; 3] { [x[0], x[1], u] }
+    /// # let mut ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
+    /// #     .stage_cost(LeastSquaresCost::<All>::diagonal(&[1.0; 3]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0, 0.0])?.guess(&[1.0, 0.0], &[0.0])?;
+    /// let mut controller = HeapRealTime::new(ocp)?;
+    /// // A clock is a closure: `|| Instant::now() > deadline`, or a counter of cycles.
+    /// let feedback = controller.prepare()?.feedback_iterated(&[1.0, 0.0], 50, &mut || false)?;
+    /// assert!(feedback.iterations > 1 && feedback.iterations < 50);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn feedback_iterated(
+        self,
+        x0: &[T],
+        max_iterations: usize,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Feedback<'a, T>, OcpError> {
+        let mut step = self.controller.iterate(x0, over)?;
+        let mut iterations = 1;
+        while iterations < max_iterations && !over() {
+            let controller = &mut *self.controller;
+            if controller.linearise().is_err() {
+                break;
+            }
+            controller.ocp.fix_initial_state(x0)?;
+            let (residuals, _) = controller.ocp.residuals();
+            if residuals.largest() <= controller.contraction_test.tolerance {
+                break;
+            }
+            let Ok(next) = controller.iterate(x0, over) else { break };
+            (step, iterations) = (next, iterations + 1);
+        }
+        self.give(step, iterations)
+    }
+
+    fn give(self, step: Step, iterations: usize) -> Result<Feedback<'a, T>, OcpError> {
+        let controller = self.controller;
+        Ok(step.feedback(controller.ocp.stage(0)?.u, iterations))
+    }
+}
+
+impl Step {
+    fn feedback<T>(self, u: &[T], iterations: usize) -> Feedback<'_, T> {
+        let Self { statistics, regularisation, convergence } = self;
+        Feedback { u, statistics, iterations, regularisation, convergence }
+    }
+}

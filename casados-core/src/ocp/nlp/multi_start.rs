@@ -1,0 +1,143 @@
+//! Solutions from several guesses.
+
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::solution::outcome::Outcome;
+use crate::qp::{HeapSolution, larger};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+use core::cmp::Ordering;
+
+/// The outcomes of all starts, the best one first; see
+/// [`Ocp::multi_start`](crate::ocp::Ocp::multi_start).
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct MultiStart<T> {
+    /// Solutions by their objectives, then points that are none by their residuals, then errors.
+    pub ranked: Vec<StartOutcome<T>>,
+}
+
+/// What came of one start.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct StartOutcome<T> {
+    /// Which start.
+    pub start: usize,
+    /// How its run ended.
+    pub outcome: Result<Outcome, OcpError>,
+    /// The point at its end, to be written to [`Ocp::iterate_mut`](crate::ocp::Ocp::iterate_mut).
+    pub solution: HeapSolution<T>,
+}
+
+impl<T> MultiStart<T> {
+    /// The best outcome, if it is a solution.
+    #[must_use]
+    pub fn best(&self) -> Option<&Outcome> {
+        let outcome = self.ranked.first()?.outcome.as_ref().ok()?;
+        outcome.is_solved().then_some(outcome)
+    }
+}
+
+impl<T> StartOutcome<T> {
+    /// What starts are ranked by: the kind, then a number of which less is better.
+    fn rank(&self) -> (u8, f64) {
+        match &self.outcome {
+            Ok(outcome) if outcome.is_solved() => (0, outcome.objective),
+            Ok(outcome) => (1, larger(outcome.residuals.largest(), 0.0)),
+            Err(_) => (2, 0.0),
+        }
+    }
+    fn compare(&self, other: &Self) -> Ordering {
+        let ((kind, value), (of_other, against)) = (self.rank(), other.rank());
+        kind.cmp(&of_other).then(value.total_cmp(&against)).then(self.start.cmp(&other.start))
+    }
+}
+
+impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
+    /// Solves the problem from each of `starts` guesses, and makes the best solution the iterate.
+    ///
+    /// `guess` writes the guess of a start; `solver` makes a solver, one for each thread: with the
+    /// feature `parallel` starts are shared among threads, with the same outcomes. Solutions are
+    /// local ones: that the best of many starts is the global one nobody proves.
+    ///
+    /// # Errors
+    /// Those of `solver`, and [`OcpError::OutOfMemory`]. Errors of a start are its outcome.
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn constant(x: f64) -> f64 { x }
+    /// /// Two minima: 0.23 at −0.97, and −0.23 at 1.03.
+    /// #[function]
+    /// fn valleys(x: f64) -> f64 { (x * x - 1.0) * (x * x - 1.0) - 0.23 * x }
+    ///
+    /// let mut ocp = Problem::new(Map::<Constant, f64>::new())
+    ///     .terminal_cost(GeneralCost::<Valleys>::new())
+    ///     .on(Horizon::uniform(1, 1.0))?;
+    /// ocp.free_initial_state();
+    /// let starts = [-1.5, -0.8, 1.2];
+    /// let found = ocp.multi_start(
+    ///     starts.len(),
+    ///     |ocp, start| ocp.guess(&[starts[start]], &[]).map(|_| ()),
+    ///     |ocp| {
+    ///         let mut sqp = HeapSqp::new(ocp)?;
+    ///         Ok(move |ocp: &mut HeapOcp<_>| sqp.solve(ocp))
+    ///     },
+    /// )?;
+    /// assert_eq!(found.ranked[0].start, 2);
+    /// assert!(found.best().is_some() && ocp.stage(0)?.x[0] > 1.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn multi_start<S>(
+        &mut self,
+        starts: usize,
+        guess: impl Fn(&mut Self, usize) -> Result<(), OcpError> + Sync,
+        solver: impl Fn(&Self) -> Result<S, OcpError> + Sync,
+    ) -> Result<MultiStart<T>, OcpError>
+    where
+        S: FnMut(&mut Self) -> Result<Outcome, OcpError>,
+    {
+        let model = &*self;
+        let share = |thread: usize, threads: usize| -> Result<Vec<StartOutcome<T>>, OcpError> {
+            let mut ocp = model.clone();
+            let mut solve = solver(&ocp)?;
+            let mut outcomes = Vec::new();
+            for start in (thread..starts).step_by(threads) {
+                let outcome = guess(&mut ocp, start).and_then(|()| solve(&mut ocp));
+                outcomes.push(StartOutcome { start, outcome, solution: ocp.iterate.clone() });
+            }
+            Ok(outcomes)
+        };
+        let mut ranked = on_threads(starts, share)?;
+        ranked.sort_by(StartOutcome::compare);
+        if let Some(best) = ranked.first() {
+            self.iterate.copy_from(&best.solution);
+        }
+        Ok(MultiStart { ranked })
+    }
+}
+
+/// All shares of the threads that there are.
+#[cfg(feature = "parallel")]
+fn on_threads<R: Send>(
+    starts: usize,
+    share: impl Fn(usize, usize) -> Result<Vec<R>, OcpError> + Sync,
+) -> Result<Vec<R>, OcpError> {
+    use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+    let threads = rayon::current_num_threads().min(starts).max(1);
+    let shares = (0..threads).into_par_iter().map(|thread| share(thread, threads));
+    Ok(shares.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+}
+
+/// The share of the only thread.
+#[cfg(not(feature = "parallel"))]
+fn on_threads<R>(
+    _starts: usize,
+    share: impl Fn(usize, usize) -> Result<Vec<R>, OcpError>,
+) -> Result<Vec<R>, OcpError> {
+    share(0, 1)
+}

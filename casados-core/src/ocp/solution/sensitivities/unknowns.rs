@@ -1,0 +1,85 @@
+//! What an estimate is found by, and how all variables follow from it: columns of a basis of the
+//! null space of dynamics.
+
+use crate::linalg::axpy;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::add;
+use crate::qp::{is_marked, marked, part, part_mut, zeros};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+
+/// What the estimate is found by: elements of the first state, shared controls, controls of every
+/// stage; and how all variables follow from these.
+pub(super) struct Unknowns<T> {
+    /// `NX`, `NU`, intervals.
+    pub dims: [usize; 3],
+    /// Name and stage of each.
+    pub names: Vec<(&'static str, usize)>,
+    /// Rows of `Z`, a row of `names.len()` elements for each variable of each stage.
+    pub rows: Vec<T>,
+}
+
+impl<T: Real> Unknowns<T> {
+    pub fn count(&self) -> usize {
+        self.names.len()
+    }
+    fn place(&self, stage: usize, index: usize) -> usize {
+        let [nx, nu, _] = self.dims;
+        (stage * (nx + nu) + index) * self.count()
+    }
+    pub fn row(&self, stage: usize, index: usize) -> &[T] {
+        part(&self.rows, self.place(stage, index), self.count())
+    }
+
+    /// Those of a problem that has been linearised.
+    pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
+        let (nx, nu, intervals) = (P::Shape::NX, P::Shape::NU, ocp.intervals());
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let qp = ocp.qp();
+        let mut names = Vec::new();
+        if ocp.initial == Initial::Free {
+            names.extend(known.x.iter().map(|&name| (name, 0)));
+        }
+        let is_shared = |j: usize| is_marked(qp.shared(), j);
+        names.extend(marked(qp.shared()).filter_map(|j| known.u.get(j)).map(|&name| (name, 0)));
+        for k in 0..intervals {
+            let own = known.u.iter().enumerate().filter(|&(j, _)| !is_shared(j));
+            names.extend(own.map(|(_, &name)| (name, k)));
+        }
+        let count = names.len();
+        let rows = zeros((intervals + 1) * (nx + nu) * count)?;
+        let mut all = Self { dims: [nx, nu, intervals], names, rows };
+        let first = if ocp.initial == Initial::Free { nx } else { 0 };
+        for i in 0..first {
+            let place = all.place(0, i) + i;
+            add(&mut all.rows, place, T::ONE);
+        }
+        let shared = marked(qp.shared()).count();
+        let mut own = first + shared;
+        for (k, stage) in qp.stages().enumerate().take(intervals) {
+            let mut joint = first;
+            for j in 0..nu {
+                let unknown = if is_shared(j) { &mut joint } else { &mut own };
+                let place = all.place(k, nx + j) + *unknown;
+                *unknown += 1;
+                add(&mut all.rows, place, T::ONE);
+            }
+            let view = stage.arrays();
+            let (before, behind) =
+                all.rows.split_at_mut_checked((k + 1) * (nx + nu) * count).unwrap_or_default();
+            let here = part(before, k * (nx + nu) * count, (nx + nu) * count);
+            for i in 0..nx {
+                let next = part_mut(behind, i * count, count);
+                let column = part(view.matrix, i * view.ld, nx + nu);
+                for (&factor, row) in column.iter().zip(here.chunks_exact(count.max(1))) {
+                    axpy(factor, row, next);
+                }
+            }
+        }
+        Ok(all)
+    }
+}

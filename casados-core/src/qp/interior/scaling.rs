@@ -1,0 +1,241 @@
+//! Units of a QP: sizes of variables, of general constraints and of the objective.
+//!
+//! ```text
+//! f     objective      mean of √gain, squared: h² / m of what a variable gains, m d² of what it costs
+//! u     variable       √(f / m), with the curvature m
+//! r     constraint     |c| u
+//! ```
+//!
+//! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where that is zero, and `d` the
+//! distance of the bounds from zero. Where no size is far from one all units are one.
+//!
+//! No number of the QP is scaled: units are what the algorithm compares with. Slacks begin at `u`
+//! and multipliers at `f / u`, a row gives way `√ε u² / f` to a unit of force, and residuals are
+//! measured in units. Then iterates of a QP in other units are those iterates in other units: the
+//! Riccati recursion is invariant, as the Cholesky factor is (N. J. Higham, "Accuracy and Stability
+//! of Numerical Algorithms", SIAM 2002, section 10.1).
+
+use super::sides::Reading;
+use crate::qp::element::set;
+use crate::qp::layout::{Places, StageOffsets, part, part_mut};
+use crate::qp::problem::QpView;
+use crate::qp::stage::Row;
+use crate::scalar::Real;
+
+/// Where all sizes are between the inverse of this and this, or on both sides, units are one.
+const NEAR: f64 = 32.0;
+/// No unit is larger, or smaller than its inverse.
+const FARTHEST: f64 = 1e12;
+/// A unit is no more than so many times the room between bounds.
+const ROOMS: f64 = 4.0;
+
+/// Units of rows, and of the objective.
+#[derive(Clone, Copy)]
+pub struct Units<'a, T> {
+    /// By rows; all one if there are none.
+    pub rows: &'a [T],
+    pub objective: T,
+}
+
+impl<'a, T: Real> Units<'a, T> {
+    /// All are one.
+    pub const NONE: Self = Units { rows: &[], objective: T::ONE };
+
+    /// That of a row.
+    #[inline(always)]
+    pub fn of(&self, row: usize) -> T {
+        self.rows.get(row).copied().unwrap_or(T::ONE)
+    }
+
+    /// The first where all are one, else the second.
+    #[inline(always)]
+    pub fn choose<V>(&self, own: V, in_units: V) -> V {
+        if self.rows.is_empty() { own } else { in_units }
+    }
+
+    /// Those from a row on; none if all are one.
+    #[inline(always)]
+    pub fn from(&self, row: usize) -> &'a [T] {
+        self.rows.get(row..).unwrap_or_default()
+    }
+}
+
+/// The least and the largest of the sizes that something may have.
+struct Sizes<T> {
+    least: T,
+    most: T,
+}
+
+impl<T: Real> Sizes<T> {
+    fn new() -> Self {
+        Self { least: T::from_f64(f64::INFINITY), most: T::ZERO }
+    }
+
+    /// Zero and what is not finite says nothing.
+    fn add(&mut self, size: T) {
+        if size > T::ZERO && size.is_finite() {
+            self.least = size.min(self.least);
+            self.most = size.max(self.most);
+        }
+    }
+
+    /// Whether one is none of them.
+    fn are_far_from_one(&self) -> bool {
+        let near = T::from_f64(NEAR);
+        self.most > T::ZERO && (self.least > near || self.most * near < T::ONE)
+    }
+}
+
+/// A unit that is not too far from one; one where nothing is known.
+fn unit<T: Real>(size: T) -> T {
+    let farthest = T::from_f64(FARTHEST);
+    if size > T::ZERO && size.is_finite() { size.min(farthest).max(T::ONE / farthest) } else { T::ONE }
+}
+
+/// A mean of sizes.
+struct Mean<T> {
+    sum: T,
+    count: usize,
+}
+
+impl<T: Real> Mean<T> {
+    const EMPTY: Self = Self { sum: T::ZERO, count: 0 };
+
+    fn add(&mut self, size: T) {
+        if size > T::ZERO && size.is_finite() {
+            self.sum = self.sum + size;
+            self.count += 1;
+        }
+    }
+
+    fn square(&self) -> T {
+        let mean = self.sum / T::from_whole(self.count.max(1));
+        mean * mean
+    }
+}
+
+/// The bounds of a row.
+struct Limits<T> {
+    lower: T,
+    upper: T,
+    /// Soft bounds may mean none.
+    hard: bool,
+    no_bound: T,
+}
+
+impl<T: Real> Limits<T> {
+    fn room(&self) -> T {
+        if self.hard && self.lower > -self.no_bound && self.upper < self.no_bound {
+            self.upper - self.lower
+        } else {
+            T::from_f64(f64::INFINITY)
+        }
+    }
+    /// Of zero.
+    fn distance(&self) -> T {
+        self.lower.max(-self.upper).max(T::ZERO)
+    }
+    fn sizes(&self) -> [T; 3] {
+        let size = |bound: T| if self.hard && bound.abs() < self.no_bound { bound.abs() } else { T::ZERO };
+        [self.room(), size(self.lower), size(self.upper)]
+    }
+}
+
+/// Finds the units of all rows, and that of the objective; nothing if all are near one.
+#[inline(never)]
+pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
+    let objective = unit_of_objective(qp, reading, rows)?;
+    let mut far = Sizes { least: objective, most: objective }.are_far_from_one();
+    let root = objective.sqrt();
+    for place in Places::<T>::new(qp.dims) {
+        let (variables, general) =
+            part_mut(rows, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
+        for (row, limits) in variables.iter_mut().zip(limits(qp, &place, reading)) {
+            let size = root / *row;
+            let mut sizes = Sizes::new();
+            sizes.add(size);
+            limits.sizes().into_iter().for_each(|size| sizes.add(size));
+            far |= sizes.are_far_from_one();
+            // Without a curvature there is only the room, where it is narrow.
+            let (size, room) = (if size.is_finite() { size } else { T::ONE }, limits.room());
+            let room = T::from_f64(ROOMS) * room;
+            *row = unit(if T::ZERO < room && room < size { room } else { size });
+        }
+        part_mut(variables, place.n, place.ld - place.n).fill(T::ONE);
+        general.fill(T::ONE);
+        let matrix = part(qp.data, place.data + place.next * place.ld, place.ng * place.ld);
+        for (row, column) in general.iter_mut().zip(matrix.chunks_exact(place.ld.max(1))) {
+            let terms = column.iter().zip(&*variables);
+            let size = terms.fold(T::ZERO, |most, (c, &unit)| (c.abs() * unit).max(most));
+            far |= Sizes { least: size, most: size }.are_far_from_one();
+            *row = unit(size);
+        }
+    }
+    far.then_some(objective)
+}
+
+/// The unit of the objective, and the roots of all curvatures; nothing of a linear program.
+fn unit_of_objective<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
+    let (mut gains, mut rooms) = (Mean::EMPTY, Sizes::new());
+    let mut any = false;
+    for place in Places::<T>::new(qp.dims).rev() {
+        any |= curvatures(qp, &place, rows, &mut gains);
+        let roots = part(rows, place.row, place.n);
+        for ((limits, &root), slope) in limits(qp, &place, reading).zip(roots).zip(slopes(qp, &place)) {
+            let room = limits.room();
+            rooms.add(root * room);
+            gains.add(root * limits.distance());
+            let is_bounded = slope > root * root * room;
+            gains.add(if is_bounded { (slope * room).sqrt() } else { slope / root });
+        }
+    }
+    // Where there is little to gain, at a point of rest, it is what the least room costs, but for
+    // problems with units near one.
+    let gain = gains.square();
+    let most = gain.max(if rooms.most > T::ZERO { rooms.least * rooms.least } else { T::ZERO });
+    any.then(|| unit(gain.max(most.min(T::ONE))))
+}
+
+/// The roots of the curvatures of a stage, and whether there is one; offsets of the dynamics cost
+/// something at the next stage.
+fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], gains: &mut Mean<T>) -> bool {
+    let StageOffsets { n, ld, row, .. } = *place;
+    let data = part(qp.data, place.data, place.data_len());
+    let (here, behind) = rows.split_at_mut_checked(row + place.rows).unwrap_or_default();
+    let (roots, mut any) = (part(behind, 0, place.next), false);
+    for j in 0..n {
+        let mut curvature = data.get(place.matrix() + j * (ld + 1)).copied().unwrap_or(T::ZERO);
+        if curvature <= T::ZERO {
+            let slopes = data.get(j..).unwrap_or_default().iter().step_by(ld.max(1));
+            curvature =
+                slopes.zip(roots).fold(T::ZERO, |sum, (&slope, &root)| sum + (slope * root) * (slope * root));
+        }
+        any |= curvature > T::ZERO;
+        set(here, row + j, curvature.sqrt());
+    }
+    for (&offset, &root) in part(data, place.offset(), place.next).iter().zip(roots) {
+        gains.add(offset.abs() * root);
+    }
+    any
+}
+
+/// The bounds of the variables of a stage.
+fn limits<T: Real>(
+    qp: QpView<'_, T>,
+    place: &StageOffsets,
+    reading: &Reading<T>,
+) -> impl Iterator<Item = Limits<T>> {
+    let no_bound = reading.no_bound;
+    let bound = |row| part(qp.data, place.data + place.row_data(row), place.n).iter();
+    let bounds = bound(Row::Lower).zip(bound(Row::Upper));
+    let penalties = bound(Row::LowerLinear).zip(bound(Row::UpperLinear));
+    bounds.zip(penalties).map(move |((&lower, &upper), (of_lower, of_upper))| {
+        let hard = !of_lower.is_finite() && !of_upper.is_finite();
+        Limits { lower, upper, hard, no_bound }
+    })
+}
+
+/// The sizes of the gradient of a stage.
+fn slopes<'a, T: Real>(qp: QpView<'a, T>, place: &StageOffsets) -> impl Iterator<Item = T> + use<'a, T> {
+    part(qp.data, place.data + place.gradient(), place.n).iter().map(|slope| slope.abs())
+}

@@ -1,0 +1,8 @@
+//! Control and estimation in closed loop: real-time iterations that contract or diverge, estimates
+//! with their covariance.
+
+mod ball_on_plate;
+mod covariance;
+mod glucose;
+
+type Test = Result<(), Box<dyn std::error::Error>>;

@@ -1,0 +1,387 @@
+//! Which root of several is taken: that of the start, wherever Newton's method from there leads to
+//! it.
+//!
+//! Ten thousand starts of random models with two to four roots in each algebraic equation. The
+//! reference is Newton's method with the current Jacobian in every iteration, written here, with
+//! derivatives by hand.
+
+use casados::options::{Jacobian, Newton};
+use casados::prelude::*;
+use casados::testing::Random;
+use nalgebra::{SVector, vector};
+
+/// Equations `c₀ + c₁ w + … + c₄ w⁴ + c₅ exp w + c₆ sin(c₇ w) + e sin z_{j+1} = 0` with
+/// `w_j = z_j + m z_{j+1}`, beside two states and two linear algebraic states.
+#[dae(N = [1, 2, 3, 4, 5])]
+fn family<const N: usize>(
+    xdot: [f64; 2],
+    x: [f64; 2],
+    z: ([f64; 2], [f64; N]),
+    p: ([[f64; 8]; N], [f64; 2]),
+) -> ([f64; 2], [f64; 2], [f64; N]) {
+    let ([first, second], roots) = z;
+    let (coefficients, [m, e]) = p;
+    let equations: [f64; N] = core::array::from_fn(|j| {
+        let next = roots[(j + 1) % N];
+        let w = roots[j] + m * next;
+        let c = coefficients[j];
+        let polynomial = c[0] + w * (c[1] + w * (c[2] + w * (c[3] + w * c[4])));
+        polynomial + c[5] * w.exp() + c[6] * (c[7] * w).sin() + e * next.sin() - 0.1 * (x[0] - 1.0)
+    });
+    (
+        [xdot[0] + x[0] - 0.01 * first, xdot[1] - x[0] + 0.1 * second],
+        [first - 40.0 * x[0] - roots[0], second - 30.0 * x[1] + first],
+        equations,
+    )
+}
+
+/// A model of the family, its roots (of each equation without coupling), and a start near one.
+struct Problem<const N: usize> {
+    coefficients: [[f64; 8]; N],
+    coupling: [f64; 2],
+    /// The solution near which it starts, and how far the next root of each equation is.
+    solution: SVector<f64, N>,
+    separation: [f64; N],
+    start: SVector<f64, N>,
+}
+
+/// The coefficients of an equation, one of its roots and the distance to the next.
+fn equation(random: &mut Random) -> ([f64; 8], f64, f64) {
+    let mut c = [0.0; 8];
+    let scale = (2.0 * random.symmetric()).exp() * if random.below(2) == 0 { 1.0 } else { -1.0 };
+    let mut roots = [0.0; 4];
+    let count = match random.below(4) {
+        // Roots of a polynomial, at least half apart.
+        0 | 1 => {
+            let count = 2 + random.below(3);
+            let mut root = 3.0 * random.symmetric();
+            let mut polynomial = [scale, 0.0, 0.0, 0.0, 0.0];
+            for to in roots.iter_mut().take(count) {
+                *to = root;
+                for k in (0..5).rev() {
+                    polynomial[k] = if k > 0 { polynomial[k - 1] } else { 0.0 } - root * polynomial[k];
+                }
+                root += 0.5 + 2.5 * random.unit();
+            }
+            c[..5].copy_from_slice(&polynomial);
+            count
+        }
+        // A chord of the exponential function.
+        2 => {
+            let first = 2.0 * random.symmetric();
+            let second = first + 0.5 + 2.0 * random.unit();
+            let slope = (second.exp() - first.exp()) / (second - first);
+            (c[0], c[1], c[5]) = (-scale * (first.exp() - slope * first), -scale * slope, scale);
+            (roots[0], roots[1]) = (first, second);
+            2
+        }
+        // `sin(k (w − q)) = s (w − q)`, with q = 0: three roots.
+        _ => {
+            let (k, s) = (0.5 + 2.0 * random.unit(), 0.25 + 0.5 * random.unit());
+            let mut root = 2.5;
+            for _ in 0..40 {
+                root -= (f64::sin(root) - s * root) / (f64::cos(root) - s);
+            }
+            (c[1], c[6], c[7]) = (-scale * s * k, scale, k);
+            (roots[0], roots[2]) = (-root / k, root / k);
+            3
+        }
+    };
+    let own = random.below(count);
+    let mut apart = f64::INFINITY;
+    for other in (0..count).filter(|other| *other != own) {
+        apart = apart.min((roots[other] - roots[own]).abs());
+    }
+    (c, roots[own], apart)
+}
+
+/// Gaussian elimination with partial pivoting.
+fn solve<const N: usize>(mut a: [[f64; N]; N], mut b: SVector<f64, N>) -> Option<SVector<f64, N>> {
+    for k in 0..N {
+        let pivot = (k..N).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs()))?;
+        a.swap(k, pivot);
+        b.swap_rows(k, pivot);
+        if !(a[k][k].abs() > 0.0) {
+            return None;
+        }
+        for i in k + 1..N {
+            let factor = a[i][k] / a[k][k];
+            for j in k..N {
+                a[i][j] -= factor * a[k][j];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    for i in (0..N).rev() {
+        let sum: f64 = (i + 1..N).map(|j| a[i][j] * b[j]).sum();
+        b[i] = (b[i] - sum) / a[i][i];
+    }
+    Some(b)
+}
+
+impl<const N: usize> Problem<N> {
+    fn residual(&self, z: &SVector<f64, N>) -> (SVector<f64, N>, [[f64; N]; N]) {
+        let (mut f, mut jacobian) = (SVector::zeros(), [[0.0; N]; N]);
+        let [m, e] = self.coupling;
+        for (j, c) in self.coefficients.iter().enumerate() {
+            let next = (j + 1) % N;
+            let w = z[j] + m * z[next];
+            let polynomial = c[0] + w * (c[1] + w * (c[2] + w * (c[3] + w * c[4])));
+            let slope = c[1] + w * (2.0 * c[2] + w * (3.0 * c[3] + w * 4.0 * c[4]));
+            f[j] = polynomial + c[5] * w.exp() + c[6] * (c[7] * w).sin() + e * z[next].sin();
+            let slope = slope + c[5] * w.exp() + c[6] * c[7] * (c[7] * w).cos();
+            jacobian[j][j] += slope;
+            jacobian[j][next] += m * slope + e * z[next].cos();
+        }
+        (f, jacobian)
+    }
+
+    /// Newton's method with the current Jacobian in every iteration: where it ends, and how far it
+    /// was from the solution on the way, in distances to the next root.
+    fn newton(&self, mut z: SVector<f64, N>) -> Option<(SVector<f64, N>, f64)> {
+        let mut astray = 0.0f64;
+        for _ in 0..50 {
+            let (f, jacobian) = self.residual(&z);
+            let step = solve(jacobian, f)?;
+            z -= step;
+            if !z.iter().all(|z| z.is_finite()) {
+                return None;
+            }
+            for j in 0..N {
+                astray = astray.max((z[j] - self.solution[j]).abs() / self.separation[j]);
+            }
+            if step.amax() <= 1e-12 * (1.0 + z.amax()) {
+                return Some((z, astray));
+            }
+        }
+        None
+    }
+
+    /// Whether these are at the solution, and not at another.
+    fn is_there(&self, z: &[f64]) -> bool {
+        (0..N).all(|j| (z[j] - self.solution[j]).abs() < 0.2 * self.separation[j])
+    }
+
+    /// A random one.
+    fn new(random: &mut Random, reach: f64) -> Self {
+        loop {
+            let mut problem = Self {
+                coefficients: [[0.0; 8]; N],
+                coupling: [0.0; 2],
+                solution: SVector::zeros(),
+                separation: [0.0; N],
+                start: SVector::zeros(),
+            };
+            let mut w = SVector::<f64, N>::zeros();
+            for j in 0..N {
+                (problem.coefficients[j], w[j], problem.separation[j]) = equation(random);
+            }
+            if N > 1 {
+                problem.coupling = [0.2 * random.symmetric(), 0.1 * random.symmetric()];
+            }
+            let mut mixing = [[0.0; N]; N];
+            for (j, row) in mixing.iter_mut().enumerate() {
+                row[j] += 1.0;
+                row[(j + 1) % N] += problem.coupling[0];
+            }
+            let Some(near) = solve(mixing, w) else { continue };
+            let Some((solution, _)) = problem.newton(near) else { continue };
+            problem.solution = solution;
+            if !problem.is_there(near.as_slice()) {
+                continue;
+            }
+            problem.start = solution;
+            for j in 0..N {
+                problem.start[j] += reach * random.symmetric() * problem.separation[j];
+            }
+            return problem;
+        }
+    }
+}
+
+/// What became of the starts from which Newton's method leads to the root of the start, and is
+/// never further from it than the next one is.
+#[derive(Debug, Default)]
+struct Count {
+    kept: usize,
+    elsewhere: usize,
+    failed: usize,
+    /// Where Newton's method was thrown beyond other roots and came back by chance.
+    by_chance: [usize; 2],
+    /// Where it ends elsewhere: the root is reached all the same, or not.
+    lost: [usize; 2],
+}
+
+impl Count {
+    fn take(&mut self, newton: Option<f64>, there: Option<bool>) {
+        let reached = usize::from(there != Some(true));
+        match (newton, there) {
+            (None, _) => self.lost[reached] += 1,
+            (Some(astray), _) if astray > 1.0 => self.by_chance[reached] += 1,
+            (_, Some(true)) => self.kept += 1,
+            (_, Some(false)) => self.elsewhere += 1,
+            (_, None) => self.failed += 1,
+        }
+    }
+}
+
+const H: f64 = 1e-3;
+const METHODS: [&str; 8] =
+    ["auto", "simplified", "full", "frozen", "two stages", "five steps", "batch", "adaptive"];
+
+fn campaign<const N: usize>(random: &mut Random, starts: usize, reach: f64, counts: &mut [Count; 8])
+where
+    Problem<N>: Runs,
+{
+    for start in 0..starts {
+        let problem = Problem::<N>::new(random, reach);
+        let newton = problem.newton(problem.start);
+        let newton = newton.filter(|(z, _)| problem.is_there(z.as_slice())).map(|(_, astray)| astray);
+        problem.run(start % 10 == 0, |method, there| counts[method].take(newton, there));
+    }
+}
+
+trait Runs {
+    /// By the default method, or by `all`.
+    fn run(&self, all: bool, take: impl FnMut(usize, Option<bool>));
+}
+
+macro_rules! runs {
+    ($($n:literal),*) => {$(
+        impl Runs for Problem<$n> {
+            fn run(&self, all: bool, mut take: impl FnMut(usize, Option<bool>)) {
+                type M = Family<$n>;
+                let flat = self.coefficients.as_flattened().iter().chain(&self.coupling).copied();
+                let p = SVector::<f64, { 8 * $n + 2 }>::from_iterator(flat);
+                let z = SVector::<f64, { $n + 2 }>::from_fn(|i, _| if i < 2 { 0.0 } else { self.start[i - 2] });
+                let (x0, none, zero) = (vector![1.0, 0.5], SVector::<f64, 0>::zeros(), vector![0.0, 0.0]);
+                macro_rules! irk {
+                    ($index:literal, $method:ty, $jacobian:ident, $steps:literal) => {
+                        let newton = Newton { jacobian: Jacobian::$jacobian, ..Default::default() };
+                        let options = Options { newton, steps: $steps, ..Default::default() };
+                        let mut irk = Irk::<M, $method>::new(options).unwrap();
+                        irk.set_parameters(&p).unwrap();
+                        irk.set_start(&zero, &z).unwrap();
+                        let step = irk.solve(&x0, &none, $steps as f64 * H);
+                        take($index, step.ok().map(|step| {
+                            self.is_there(&step.z0.as_slice()[2..]) && self.is_there(&step.z.as_slice()[2..])
+                        }));
+                    };
+                }
+                irk!(0, RadauIIA<3>, Auto, 1);
+                if !all {
+                    return;
+                }
+                irk!(1, RadauIIA<3>, Simplified, 1);
+                irk!(2, RadauIIA<3>, Full, 1);
+                irk!(3, RadauIIA<3>, Frozen, 1);
+                irk!(4, Gauss<2>, Auto, 1);
+                irk!(5, RadauIIA<3>, Auto, 5);
+                let mut batch = Batch::<M, RadauIIA<3>>::new(Options::default()).unwrap();
+                batch.set_start(&zero, &z).unwrap();
+                let (states, parameters) = ([x0; 4], [p; 4]);
+                let mut results = [casados::result::Nominal::default(); 4];
+                let intervals = Intervals { x0: &states, p: &parameters, h: &[H], ..Default::default() };
+                let solved = batch.solve(&intervals, &mut results).is_ok();
+                take(6, solved.then(|| self.is_there(&results[2].z0.as_slice()[2..])));
+                let mut radau = Adaptive::<M, Radau>::new(AdaptiveOptions::default()).unwrap();
+                radau.set_parameters(&p).unwrap();
+                radau.set_start(&zero, &z).unwrap();
+                let step = radau.solve(&x0, &none, H);
+                take(7, step.ok().map(|step| self.is_there(&step.z0.as_slice()[2..])));
+            }
+        }
+    )*};
+}
+runs!(1, 2, 3, 4, 5);
+
+#[test]
+fn starts_near_a_root_end_there() {
+    let mut counts = <[Count; 8]>::default();
+    let mut random = Random::new(7);
+    // In parts of the distance to the next root.
+    let reach = 0.4;
+    campaign::<1>(&mut random, 2000, reach, &mut counts);
+    campaign::<2>(&mut random, 2000, reach, &mut counts);
+    campaign::<3>(&mut random, 2000, reach, &mut counts);
+    campaign::<4>(&mut random, 2000, reach, &mut counts);
+    campaign::<5>(&mut random, 2000, reach, &mut counts);
+    for (name, count) in METHODS.iter().zip(&counts) {
+        println!("{name}: {count:?}");
+    }
+    for (name, count) in METHODS.iter().zip(&counts) {
+        assert!(count.elsewhere == 0 && count.failed == 0, "{name}: {count:?}");
+    }
+}
+
+/// Ions by `ion² + ion/2 = a`, where one root is negative, beside two linear algebraic states.
+#[dae(nominal(z = [1.0, 10.0, 0.1]))]
+fn reactor(xdot: [f64; 4], x: [f64; 4], z: [f64; 3]) -> [f64; 7] {
+    let ([a, b, temperature, level], [rate, heat, ion]) = (x, z);
+    [
+        xdot[0] + rate,
+        xdot[1] - rate + 0.1 * b,
+        xdot[2] - heat + 0.2 * (temperature - 300.0),
+        xdot[3] + 0.01 * level,
+        rate - 0.3 * a - 0.1 * b,
+        heat - 20.0 * rate + 0.05 * temperature,
+        ion * ion + 0.5 * ion - a,
+    ]
+}
+
+#[test]
+fn the_reactor_has_positive_ions() {
+    let none = SVector::<f64, 0>::zeros();
+    let states: Vec<_> = (0..100).map(|i| vector![0.5 + 0.01 * f64::from(i), 0.4, 310.0, 1.0]).collect();
+    for jacobian in [Jacobian::Auto, Jacobian::Simplified, Jacobian::Full, Jacobian::Frozen] {
+        let newton = Newton { jacobian, ..Default::default() };
+        for steps in [1, 5] {
+            let options = Options { newton, steps, ..Default::default() };
+            let mut irk = Irk::<Reactor, RadauIIA<3>>::new(options).unwrap();
+            let mut gauss = Irk::<Reactor, Gauss<2>>::new(options).unwrap();
+            for x0 in &states {
+                let z = irk.solve(x0, &none, 1e-3).unwrap().z;
+                assert!(z[2] > 0.0, "{jacobian:?} {}", x0[0]);
+                assert!(gauss.solve(x0, &none, 1e-3).unwrap().z[2] > 0.0, "{jacobian:?} {}", x0[0]);
+            }
+            let mut batch = Batch::<Reactor, RadauIIA<3>>::new(options).unwrap();
+            let mut results = vec![casados::result::Nominal::default(); states.len()];
+            batch.solve(&Intervals { x0: &states, h: &[1e-3], ..Default::default() }, &mut results).unwrap();
+            for (x0, step) in states.iter().zip(&results) {
+                assert!(step.z[2] > 0.0, "{jacobian:?} {}", x0[0]);
+            }
+        }
+    }
+    let mut radau = Adaptive::<Reactor, Radau>::new(AdaptiveOptions::default()).unwrap();
+    for x0 in &states {
+        assert!(radau.solve(x0, &none, 1e-3).unwrap().z[2] > 0.0, "{}", x0[0]);
+    }
+}
+
+/// The voltage at the end of a line, `v² − v + x = 0`, of a load that grows to more than the line
+/// can carry: at `x = 1/4` its two solutions meet.
+#[dae(nominal(z = [1.0, 0.0]))]
+fn line(xdot: f64, x: f64, z: [f64; 2]) -> [f64; 3] {
+    let [voltage, current] = z;
+    [xdot - 1.0, current - 3.0 * x, voltage * voltage - voltage + x]
+}
+
+#[test]
+fn a_voltage_collapse_names_the_voltage() {
+    let (x0, none) = (vector![0.1], SVector::<f64, 0>::zeros());
+    let mut radau = Adaptive::<Line, Radau>::new(AdaptiveOptions::default()).unwrap();
+    let error = radau.solve(&x0, &none, 1.0).unwrap_err();
+    let casados::Error::StepSizeUnderflow { t, reason, .. } = error else { panic!("{error}") };
+    assert!((t - 0.15).abs() < 1e-6, "{error}");
+    assert_eq!(reason, casados::error::Refusal::SingularAlgebraic { unknown: "z[0]" }, "{error}");
+    assert!(error.to_string().contains("`z[0]`") && error.to_string().contains("∂f/∂z"), "{error}");
+    for steps in [7, 20] {
+        let mut irk = Irk::<Line, RadauIIA<3>>::new(Options { steps, ..Default::default() }).unwrap();
+        let error = irk.solve(&x0, &none, 1.0).unwrap_err();
+        let casados::Error::SingularAlgebraic { unknown, .. } = error else { panic!("{error}") };
+        assert_eq!(unknown, "z[0]", "{error}");
+        assert!(error.to_string().contains("∂f/∂z becomes singular along `z[0]`"), "{error}");
+        // Before the collapse there is nothing to be said.
+        assert!((irk.solve(&x0, &none, 0.1).unwrap().z[0] - 0.5 - f64::sqrt(0.05)).abs() < 1e-6);
+    }
+}
