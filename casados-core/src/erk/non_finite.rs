@@ -1,4 +1,5 @@
-//! Values that are not finite: among single numbers the first one is an error at once; //! side by side its lane is masked, and the others go on.
+//! Values that are not finite: among single numbers the first one is an error at once; of several
+//! side by side its lane is masked, and the others go on.
 
 use crate::error::Error;
 use crate::linalg::{are_finite, kernels, run_plain};

@@ -35,7 +35,7 @@ pub fn product<A: Arithmetic, E: Field, const S: usize>(
     product
 }
 
-/// `−panel_row`
+/// `−panel row`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn negate<E: Field, const S: usize, const W: usize>(panel_row: &mut PanelRow<E, S, W>) {
     for row in panel_row {

@@ -16,8 +16,8 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 /// Clarabel's interior point for sparse problems.
 ///
 /// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order
-/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is previous as
-/// long as the elements that are not zero stay the same.
+/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept
+/// as long as the elements that are not zero stay the same.
 ///
 /// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
 /// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,

@@ -51,7 +51,7 @@ macro_rules! mask_logic {
 }
 pub(crate) use mask_logic;
 
-/// Numbers that are their own demote ones.
+/// Numbers that are their own demoted ones.
 macro_rules! as_it_is {
     () => {
         type Demoted = Self;

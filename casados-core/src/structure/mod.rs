@@ -105,9 +105,9 @@ pub struct Structure {
     /// them.
     /// Read where results are written.
     pub column_of_direction: &'static [u32],
-    /// Variables that occur in the pattern of the Hessian, ascending, less those of `diagonal_controls`: only
-    /// their rows of `D_i` enter second derivatives.
-    /// Read by second derivatives: their stage sensitivities.
+    /// Variables that occur in the pattern of the Hessian, ascending, less those of
+    /// `diagonal_controls`: only their rows of `D_i` enter second derivatives. Read by second
+    /// derivatives: their stage sensitivities.
     pub curved: &'static [u32],
     /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`]
     /// makes of it.

@@ -5,8 +5,8 @@ use crate::irk::directions::weight;
 use crate::linalg::{Ahead, Arithmetic, PanelRow, Visitor};
 use crate::scalar::{Field, each};
 
-/// So many accumulators a sum over all columns has; of numbers that are registers themselves only the
-/// first is used.
+/// So many accumulators a sum over all columns has; of numbers that are registers themselves only
+/// the first is used.
 pub(in crate::irk) const STRANDS: usize = 4;
 
 /// Whether sums have one accumulator: those of other rows are computed meanwhile, and its memory is

@@ -33,7 +33,7 @@ use core::marker::PhantomData;
 
 /// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products
 /// that panels take, counted for each direction. A solve waits for memory, which products of panels
-/// do not. Only of single numbers: registers of them leave no room for panel_rows.
+/// do not. Only of single numbers: registers of them leave no room for panel rows.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {

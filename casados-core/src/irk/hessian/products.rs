@@ -122,8 +122,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
 }
 
 /// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each
-/// tile is in registers while it goes through all variables at all stages, in as many accumulators as
-/// hide how long an addition takes. Above the diagonal it writes what nobody reads.
+/// tile is in registers while it goes through all variables at all stages, in as many accumulators
+/// as hide how long an addition takes. Above the diagonal it writes what nobody reads.
 #[inline(always)]
 fn tiles<
     A: Arithmetic,

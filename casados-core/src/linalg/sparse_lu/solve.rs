@@ -20,8 +20,8 @@ use core::marker::PhantomData;
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
 /// columns.
 ///
-/// Columns are taken in panel_rows that fit registers, each through the whole elimination: a panel_row of
-/// all rows stays in the nearest cache.
+/// Columns are taken in panel rows that fit registers, each through the whole elimination: a
+/// panel row of all rows stays in the nearest cache.
 pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -38,7 +38,7 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
 }
 
 /// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
-/// registers themselves two at a time, or the panel_row of all stages would not fit them.
+/// registers themselves two at a time, or the panel row of all stages would not fit them.
 struct Solve<'a, M, E, R, First, Second, const S: usize> {
     factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
@@ -77,7 +77,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, First: System, Second: System, const
     }
 }
 
-/// Who is present while panel_rows are solved. What is here is to be `#[inline(always)]`.
+/// Who is present while panel rows are solved. What is here is to be `#[inline(always)]`.
 pub trait Visitor<E, const S: usize, const W: usize> {
     /// Sees an unknown that has just been found, but not of a transposed system.
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -232,8 +232,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
             return;
         }
         // Directions that have not reached this unknown, as at the start of an interval. Of
-        // registers the memory is asked: a panel_row of which single elements are looked at is not
-        // kept in registers. Of numbers the panel_row is, all of it at once.
+        // registers the memory is asked: a panel row of which single elements are looked at is not
+        // kept in registers. Of numbers the panel row is, all of it at once.
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
@@ -283,7 +283,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
-            // Of one number the inverse: the panel_row then stays in its registers.
+            // Of one number the inverse: the panel row then stays in its registers.
             if const { S == 1 } {
                 let mut inverse = *inverse;
                 negate(&mut inverse);

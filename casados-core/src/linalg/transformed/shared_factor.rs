@@ -1,5 +1,5 @@
 //! Factors of the shared Jacobian of the stages, in the eigenbasis of the tableau, of
-//! [demote](Lanes::Demoted) numbers: increments that they give are corrected by the next iteration
+//! [demoted](Lanes::Demoted) numbers: increments that they give are corrected by the next iteration
 //! in any case.
 
 use super::basis::Eigenbasis;

@@ -34,7 +34,7 @@ pub(super) fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
 }
 
 /// A type of numbers: its documentation, its name, the type of one lane, the module of its
-/// instructions, the macro of its elementary functions, and that of its demote numbers.
+/// instructions, the macro of its elementary functions, and that of its demoted numbers.
 macro_rules! register {
     ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $demote:ident) => {
         $(#[$attribute])*

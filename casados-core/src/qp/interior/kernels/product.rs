@@ -140,8 +140,8 @@ pub enum Part {
 /// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
 ///
 /// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in
-/// its columns. [`PADDING_COLUMNS`] columns than asked for are written if the target has them, and rows up to
-/// whole registers.
+/// its columns. [`PADDING_COLUMNS`] more columns than asked for are written if the target has them,
+/// and rows up to whole registers.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
     target: &mut [T],

@@ -79,7 +79,7 @@ macro_rules! of_singles {
     };
 }
 
-/// Eight `f64`, whose demote numbers take half a register.
+/// Eight `f64`, whose demotedd numbers take half a register.
 #[cfg(target_arch = "x86_64")]
 macro_rules! in_half_a_register {
     () => {
