@@ -117,13 +117,13 @@ pub mod __private {
     #[cfg(feature = "num-dual")]
     pub use crate::dual;
     pub use crate::function::{self, ArrayY, FunctionStructure, begins, by_row};
-    pub use crate::memory::{Absent, Fallback, Family, Inside, Kept, Stored};
+    pub use crate::memory::{Absent, Fallback, Family, Inside, OptionalPlace, Stored};
     pub use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Range};
     pub use crate::scalar::{Float, Known, Piece, Rows, Tangent, elementary};
     pub use crate::shape::{Aligned, Array, Count, Matrix, Outputs, Plain};
     pub use crate::structure::{
-        Assembly, Cost, Dependent, Elimination, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-        Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+        Assembly, Cost, Dependent, DiagonalControl, Elimination, Kinematic, Left, NO_COLUMN, Operations,
+        Pattern, Pivot, Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
     };
     pub use crate::tables;
     pub use crate::{

@@ -31,7 +31,7 @@ pub mod fallback;
 mod heap;
 pub mod mode;
 
-pub use fallback::{Fallback, Kept};
+pub use fallback::{Fallback, OptionalPlace};
 #[cfg(feature = "alloc")]
 pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
 #[cfg(feature = "alloc")]

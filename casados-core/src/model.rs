@@ -8,8 +8,8 @@ use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
-    Assembly, Cost, Dependent, Elimination, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-    Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Assembly, Cost, Dependent, DiagonalControl, Elimination, Kinematic, Left, NO_COLUMN, Operations, Pattern,
+    Pivot, Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 

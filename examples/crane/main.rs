@@ -28,7 +28,7 @@ fn duration(_x: [f64; 4], u: [f64; 2]) -> f64 {
 }
 
 const DISTANCE: f64 = 5.0; // m
-const MOST: f64 = 1.5; // m/s²
+const MAX_ACCELERATION: f64 = 1.5; // m/s²
 const N: usize = 60;
 
 fn main() -> ExitCode {
@@ -44,14 +44,19 @@ fn main() -> ExitCode {
 fn run() -> Result<(), Box<dyn Error>> {
     println!("swing at most   duration s   iterations   accelerations, one letter each three intervals");
     // Without its load the trolley is there after `2 √(d/a)`.
-    let trolley = 2.0 * (DISTANCE / MOST).sqrt();
+    let trolley = 2.0 * (DISTANCE / MAX_ACCELERATION).sqrt();
     let mut last = f64::INFINITY;
     for degrees in [3.0f64, 6.0, 12.0, 60.0] {
         let batch = Batch::<Crane, Gauss<2>>::new(Options::default())?;
         let mut ocp = Problem::new(Shooting::new(batch))
             .running_cost(GeneralCost::<Duration>::new())
             .on(Horizon::uniform(N, 1.0 / N as f64))?;
-        ocp.shared("u[1]")?.bound("u[1]", ..1, 1.0, 20.0)?.bound("u[0]", .., -MOST, MOST)?;
+        ocp.shared("u[1]")?.bound("u[1]", ..1, 1.0, 20.0)?.bound(
+            "u[0]",
+            ..,
+            -MAX_ACCELERATION,
+            MAX_ACCELERATION,
+        )?;
         let swing = degrees.to_radians();
         ocp.fix_initial_state(&[0.0; 4])?.bound("x[2]", 1..N, -swing, swing)?;
         for (i, end) in [DISTANCE, 0.0, 0.0, 0.0].into_iter().enumerate() {
@@ -69,9 +74,9 @@ fn run() -> Result<(), Box<dyn Error>> {
             .step_by(3)
             .filter_map(|stage| stage.u.first().copied())
             .map(|a| {
-                if a > 0.95 * MOST {
+                if a > 0.95 * MAX_ACCELERATION {
                     '+'
-                } else if a < -0.95 * MOST {
+                } else if a < -0.95 * MAX_ACCELERATION {
                     '-'
                 } else {
                     '.'

@@ -14,6 +14,7 @@ mod return_map;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;
+mod verdicts;
 mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

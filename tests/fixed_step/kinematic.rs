@@ -138,7 +138,7 @@ fn kinematic<M: Dae>() -> Vec<usize> {
 #[test]
 fn derivatives_are_those_of_the_solution() -> Test {
     assert_eq!(kinematic::<Points<0>>(), [0, 1, 2]);
-    assert_eq!(<Points<1> as Dae>::STRUCTURE.lone.len(), 1);
+    assert_eq!(<Points<1> as Dae>::STRUCTURE.diagonal_controls.len(), 1);
     check(steps::<Points<0>, Gauss<2>, 2>()?, false)?;
     check(steps::<Points<0>, Gauss<1>, 1>()?, false)?;
     check(steps::<Points<0>, RadauIIA<3>, 3>()?, false)?;

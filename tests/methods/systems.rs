@@ -176,7 +176,7 @@ macro_rules! system {
                             &all::<{ NV - 1 }>(),
                         )
                     },
-                    lone: &[],
+                    diagonal_controls: &[],
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,
                     reduction: None,

@@ -187,7 +187,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
             self.change = self.change.max(branches[0].change(Branches::of::<M, Own<T>>(&point.v)));
         }
-        record.end(&self.scheme, &grid, 0, end, None, &mut point.doubt)
+        record.end(&self.scheme, &grid, 0, end, None, &mut point.non_finite)
     }
 
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {

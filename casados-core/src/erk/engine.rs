@@ -2,9 +2,9 @@
 
 use super::adjoint::{Multipliers, Sweep, Way};
 use super::along::{Beside, Nothing};
-use super::doubt::Doubt;
 use super::forward::{Variation, write};
 use super::hessian::Curvature;
+use super::non_finite::NonFiniteLanes;
 use super::scheme::{Grid, Scheme};
 use super::step::{Base, Counts, Record};
 use super::sweeps::Sweeps;
@@ -88,7 +88,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let Base { point, x, .. } = W::nominal(&mut self.base)?;
         self.counts = Counts::default();
         point.counts = Counts::default();
-        point.doubt.forget();
+        point.non_finite.reset();
         Ok([x.as_mut(), point.variables_mut()])
     }
 
@@ -107,7 +107,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         along.finish()?;
         let Base { point, x, result, .. } = base;
         result.x.as_mut_slice().copy_from_slice(x.as_ref());
-        Ok((point.doubt.none(), result))
+        Ok((point.non_finite.finite_lanes(), result))
     }
 
     pub fn forward(
@@ -120,7 +120,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         W: WithForward,
     {
         let (base, memory) = self.differentiate(grid, sweeps, along)?;
-        Ok((base.point.doubt.none(), &memory.result.forward))
+        Ok((base.point.non_finite.finite_lanes(), &memory.result.forward))
     }
 
     pub fn forward_adjoint(
@@ -138,8 +138,8 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         weigh::<M, E, _>(&forward.dx, lambda, &mut *gradient);
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &mut *result;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
-        write_gradient(gradient.as_ref(), to, grid.steps - 1, &mut base.point.doubt)?;
-        Ok((base.point.doubt.none(), result))
+        write_gradient(gradient.as_ref(), to, grid.steps - 1, &mut base.point.non_finite)?;
+        Ok((base.point.non_finite.finite_lanes(), result))
     }
 
     /// The derivatives, where they belong.
@@ -186,9 +186,9 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         along.finish()?;
         let Adjoint { nominal, grad_x0, grad_u, grad_p } = &mut *result;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
-        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.doubt)?;
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.non_finite)?;
         write_state(base, nominal);
-        Ok((base.point.doubt.none(), result))
+        Ok((base.point.non_finite.finite_lanes(), result))
     }
 
     pub fn hessian(
@@ -236,12 +236,12 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut result.first;
         write_forward(grid, base, variation, forward)?;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
-        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.doubt)?;
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.non_finite)?;
         if let Some(second) = along.second() {
             curvature.add_lower(second);
         }
-        write_hessian(curvature, result, &mut base.point.doubt)?;
-        Ok((base.point.doubt.none(), result))
+        write_hessian(curvature, result, &mut base.point.non_finite)?;
+        Ok((base.point.non_finite.finite_lanes(), result))
     }
 }
 
@@ -276,10 +276,10 @@ fn write_forward<M: Ode, E: Lanes, const S: usize>(
     result: &mut Forward<M, E>,
 ) -> Result<(), Error> {
     let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-    let (dx, step, doubt) = (variation.dx.as_ref(), grid.steps - 1, &mut base.point.doubt);
-    write(dx, 0..nx, &mut result.dx_dx0, 0, step, doubt)?;
-    write(dx, nx..nx + nu, &mut result.dx_du, 0, step, doubt)?;
-    write(dx, nx + nu..nw, &mut result.dx_dp, 0, step, doubt)?;
+    let (dx, step, non_finite) = (variation.dx.as_ref(), grid.steps - 1, &mut base.point.non_finite);
+    write(dx, 0..nx, &mut result.dx_dx0, 0, step, non_finite)?;
+    write(dx, nx..nx + nu, &mut result.dx_du, 0, step, non_finite)?;
+    write(dx, nx + nu..nw, &mut result.dx_dp, 0, step, non_finite)?;
     write_state(base, &mut result.nominal);
     Ok(())
 }
@@ -289,14 +289,14 @@ fn write_gradient<E: Lanes, R: Array<E>>(
     rows: &[R],
     parts: [&mut [E]; 3],
     step: usize,
-    doubt: &mut Doubt<E>,
+    non_finite: &mut NonFiniteLanes<E>,
 ) -> Result<(), Error> {
     let mut begin = 0;
     for part in parts {
         for (to, row) in part.iter_mut().zip(rows.iter().skip(begin)) {
             *to = row.as_ref()[0];
         }
-        doubt.check(part, |index, _| Error::Overflow { step, index: begin + index })?;
+        non_finite.check(part, |index, _| Error::Overflow { step, index: begin + index })?;
         begin += part.len();
     }
     Ok(())
@@ -305,16 +305,16 @@ fn write_gradient<E: Lanes, R: Array<E>>(
 fn write_hessian<M: Ode, E: Lanes>(
     curvature: &mut Curvature<M, E>,
     result: &mut Hessian<M, E>,
-    doubt: &mut Doubt<E>,
+    non_finite: &mut NonFiniteLanes<E>,
 ) -> Result<(), Error> {
     curvature.mirror();
     let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
     let rows = curvature.sum.as_ref();
     let (x, u, p) = (0..nx, nx..nx + nu, nx + nu..nw);
-    write(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0, doubt)?;
-    write(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0, doubt)?;
-    write(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0, doubt)?;
-    write(&rows[x], p.clone(), &mut result.h_xp, 0, 0, doubt)?;
-    write(&rows[u], p.clone(), &mut result.h_up, 0, 0, doubt)?;
-    write(&rows[p.clone()], p, &mut result.h_pp, 0, 0, doubt)
+    write(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0, non_finite)?;
+    write(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0, non_finite)?;
+    write(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0, non_finite)?;
+    write(&rows[x], p.clone(), &mut result.h_xp, 0, 0, non_finite)?;
+    write(&rows[u], p.clone(), &mut result.h_up, 0, 0, non_finite)?;
+    write(&rows[p.clone()], p, &mut result.h_pp, 0, 0, non_finite)
 }

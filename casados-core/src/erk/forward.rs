@@ -1,6 +1,6 @@
 //! First-order sensitivities along with the step: the variational equations of the stages.
 
-use super::doubt::Doubt;
+use super::non_finite::NonFiniteLanes;
 use super::scheme::{Grid, Scheme, is_zero};
 use super::step::{Base, Own, Point, Record, add};
 use super::tiles::{self, AtColumns, each_tile};
@@ -104,7 +104,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
             let Base { point, record, x, rest, .. } = &mut *base;
             record.x = *x;
             self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
             self.end(scheme, &grid.h, directions);
             point.counts.steps += 1;
         }
@@ -237,16 +237,16 @@ kernels! { by run_plain;
         source: Range<usize>,
         target: &'k mut K,
         first: usize,
-        doubt: &'k mut Doubt<E>,
+        non_finite: &'k mut NonFiniteLanes<E>,
     ) {
-        let mut finite = doubt.none();
+        let mut finite = non_finite.finite_lanes();
         for (r, row) in rows.iter().enumerate() {
             for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
                 finite = E::and(finite, value.is_finite());
                 target[(r, first + column)] = value;
             }
         }
-        doubt.keep(finite);
+        non_finite.set_finite_lanes(finite);
     }
 }
 
@@ -360,10 +360,10 @@ pub(super) fn write<E: Lanes, R: Array<E>>(
     target: &mut impl Matrix<E>,
     first: usize,
     step: usize,
-    doubt: &mut Doubt<E>,
+    non_finite: &mut NonFiniteLanes<E>,
 ) -> Result<(), Error> {
     if const { E::LANES > 1 } {
-        copy(rows, source, target, first, doubt);
+        copy(rows, source, target, first, non_finite);
         return Ok(());
     }
     for (r, row) in rows.iter().enumerate() {

@@ -11,11 +11,11 @@
 mod adjoint;
 mod along;
 mod calls;
-mod doubt;
 mod engine;
 mod forward;
 mod hessian;
 mod integrator;
+mod non_finite;
 #[cfg(feature = "alloc")]
 mod panels;
 mod scheme;

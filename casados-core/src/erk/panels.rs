@@ -89,7 +89,7 @@ impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Panels<M, E, S> {
                 point.go(scheme, grid, record, at(stage))?;
                 at_stage(point, dxi, at(stage))?;
             }
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())

@@ -2,10 +2,10 @@
 
 use super::adjoint::{Sweep, Way};
 use super::along::Nothing;
-use super::doubt::Doubt;
 use super::engine::write_state;
 use super::forward::{Seeded, write};
 use super::integrator::{Integrator, finite};
+use super::non_finite::NonFiniteLanes;
 use super::sweeps::Whole;
 use crate::error::{Argument, Error};
 use crate::integrator::Integrator as _;
@@ -89,8 +89,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             let run = variation.run(&self.engine.scheme, &grid, base, directions, |_, _, _| Ok(()));
             self.engine.counts = base.point.counts;
             run?;
-            let doubt = &mut base.point.doubt;
-            write(variation.dx.as_ref(), 0..columns, &mut result.dx, first, grid.steps - 1, doubt)?;
+            let non_finite = &mut base.point.non_finite;
+            write(variation.dx.as_ref(), 0..columns, &mut result.dx, first, grid.steps - 1, non_finite)?;
         }
         write_state(base, &mut result.nominal);
         Ok(result)
@@ -156,7 +156,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             let run = sweep.run(way, &mut base.point, records, None, &mut Nothing);
             self.engine.counts = base.point.counts;
             run?;
-            write_gradient(sweep, 0..columns, &mut result, first, &mut base.point.doubt)?;
+            write_gradient(sweep, 0..columns, &mut result, first, &mut base.point.non_finite)?;
         }
         write_state(base, &mut result.nominal);
         Ok(result)
@@ -204,11 +204,11 @@ fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
     source: Range<usize>,
     result: &mut Adjoint<M, T, C>,
     first: usize,
-    doubt: &mut Doubt<T>,
+    non_finite: &mut NonFiniteLanes<T>,
 ) -> Result<(), Error> {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let lambda = sweep.lambda.as_ref();
-    write(&lambda[..nx], source.clone(), &mut result.grad_x0, first, 0, doubt)?;
-    write(&lambda[nx..nx + nu], source.clone(), &mut result.grad_u, first, 0, doubt)?;
-    write(&lambda[nx + nu..], source, &mut result.grad_p, first, 0, doubt)
+    write(&lambda[..nx], source.clone(), &mut result.grad_x0, first, 0, non_finite)?;
+    write(&lambda[nx..nx + nu], source.clone(), &mut result.grad_u, first, 0, non_finite)?;
+    write(&lambda[nx + nu..], source, &mut result.grad_p, first, 0, non_finite)
 }

@@ -1,7 +1,7 @@
 //! One step of an explicit method: the stages one after the other, and the end.
 
 use super::along::Beside;
-use super::doubt::{Doubt, ONE_BY_ONE};
+use super::non_finite::{CHECK_EACH_VALUE, NonFiniteLanes};
 use super::scheme::{Grid, Scheme, is_zero};
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, dispatch, displaced, dot_compensated, kernels, run_plain};
@@ -28,7 +28,7 @@ pub(crate) struct Record<M: Ode, E: Lanes, const S: usize> {
 pub(crate) struct Point<M: Ode, E: Lanes> {
     pub v: ArrayV<M, [E; 1]>,
     pub f: ArrayK<M, [E; 1]>,
-    pub doubt: Doubt<E>,
+    pub non_finite: NonFiniteLanes<E>,
     pub counts: Counts,
 }
 
@@ -63,11 +63,11 @@ impl<M: Ode, E: Lanes> Point<M, E> {
         if let Some(index) = place(scheme, grid, record, at, &mut self.v) {
             return Err(error(index));
         }
-        if const { ONE_BY_ONE && E::LANES == 1 } {
+        if const { CHECK_EACH_VALUE && E::LANES == 1 } {
             return Ok(());
         }
         let state = &self.v.as_ref()[M::Shape::NX..2 * M::Shape::NX];
-        self.doubt.check(state.as_flattened(), |index, _| error(index))
+        self.non_finite.check(state.as_flattened(), |index, _| error(index))
     }
 
     /// `k = g` at this point.
@@ -109,8 +109,8 @@ impl<M: Ode, E: Lanes> Point<M, E> {
     }
 
     fn check_residual(&mut self, at: Place) -> Result<(), Error> {
-        let Self { f, doubt, .. } = self;
-        check(doubt, f.as_ref().as_flattened(), Quantity::Residual, at, |equation| equation)
+        let Self { f, non_finite, .. } = self;
+        check(non_finite, f.as_ref().as_flattened(), Quantity::Residual, at, |equation| equation)
     }
 
     /// A value of the model that is not finite is an error, or doubted.
@@ -121,18 +121,18 @@ impl<M: Ode, E: Lanes> Point<M, E> {
         at: Place,
         equation: impl FnOnce(usize) -> usize,
     ) -> Result<(), Error> {
-        check(&mut self.doubt, values, quantity, at, equation)
+        check(&mut self.non_finite, values, quantity, at, equation)
     }
 }
 
 fn check<E: Lanes>(
-    doubt: &mut Doubt<E>,
+    non_finite: &mut NonFiniteLanes<E>,
     values: &[E],
     quantity: Quantity,
     at: Place,
     equation: impl FnOnce(usize) -> usize,
 ) -> Result<(), Error> {
-    doubt.check(values, |index, value| Error::NonFiniteModel {
+    non_finite.check(values, |index, value| Error::NonFiniteModel {
         quantity,
         equation: equation(index),
         value,
@@ -162,7 +162,7 @@ kernels! { by run_plain;
         }
         for (index, (xi, &x)) in state.iter_mut().zip(record.x.as_ref()).enumerate() {
             *xi = A::add(x, grid.h, *xi);
-            if const { ONE_BY_ONE && E::LANES == 1 } && !E::all(xi.is_finite()) {
+            if const { CHECK_EACH_VALUE && E::LANES == 1 } && !E::all(xi.is_finite()) {
                 return Some(index);
             }
         }
@@ -247,7 +247,7 @@ impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
         step: usize,
         end: &mut ArrayX<M, E>,
         rest: Option<&mut ArrayX<M, E>>,
-        doubt: &mut Doubt<E>,
+        non_finite: &mut NonFiniteLanes<E>,
     ) -> Result<(), Error> {
         match rest {
             None => advance(scheme, &grid.h, self, end),
@@ -258,7 +258,7 @@ impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
                 advance_compensated(scheme, &grid.h, self, end.as_mut(), rest.as_mut());
             }
         }
-        doubt.check(end.as_ref(), |index, _| Error::Overflow { step, index })
+        non_finite.check(end.as_ref(), |index, _| Error::Overflow { step, index })
     }
 }
 
@@ -288,7 +288,7 @@ impl<M: Ode, E: Lanes, const S: usize> Base<M, E, S> {
             record.x = *x;
             record.stages(scheme, grid, point, step, along)?;
             let rest = grid.compensated.then_some(&mut *rest);
-            record.end(scheme, grid, step, x, rest, &mut point.doubt)?;
+            record.end(scheme, grid, step, x, rest, &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())
@@ -307,7 +307,7 @@ impl<M: Ode, E: Lanes, const S: usize> Base<M, E, S> {
             record.x = *x;
             record.stages(scheme, grid, point, step, along)?;
             let rest = grid.compensated.then_some(&mut *rest);
-            record.end(scheme, grid, step, x, rest, &mut point.doubt)?;
+            record.end(scheme, grid, step, x, rest, &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())

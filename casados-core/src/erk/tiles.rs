@@ -15,12 +15,12 @@ pub(super) trait AtColumns {
 /// All columns from `first` on, eight or four at most at a time: as many have a register each for
 /// their sums, and as many products under way as the processor can have.
 #[inline(always)]
-pub(super) fn each_tile<A: Arithmetic, V: AtColumns, const MOST: usize>(
+pub(super) fn each_tile<A: Arithmetic, V: AtColumns, const MAX_WIDTH: usize>(
     mut first: usize,
     end: usize,
     visit: &mut V,
 ) {
-    while const { MOST >= 8 } && first + 8 <= end {
+    while const { MAX_WIDTH >= 8 } && first + 8 <= end {
         visit.at::<A, 8>(first);
         first += 8;
     }

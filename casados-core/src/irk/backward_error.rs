@@ -227,8 +227,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         }
         for (unknown, stages) in stage_sums.iter().enumerate() {
             let mut sum = [zero; S];
-            for (sum, strands) in sum.iter_mut().zip(stages) {
-                *sum = total(strands);
+            for (sum, accumulators) in sum.iter_mut().zip(stages) {
+                *sum = total(accumulators);
             }
             let size = sizes_of(&sum);
             if unknown < nx {

@@ -11,7 +11,7 @@ use crate::shape::Shape;
 use core::marker::PhantomData;
 
 /// So many bytes are in the nearest cache, beside others.
-pub(super) const NEAREST: usize = 1 << 15;
+pub(super) const L1_CACHE_BYTES: usize = 1 << 15;
 
 /// How many of some numbers, in their order, come before one: of directions that have any
 /// influence, of curved variables.
@@ -24,9 +24,9 @@ pub(super) const fn before(numbers: &[u32], number: usize) -> usize {
 }
 
 /// How many columns the widest panels have: eight; of numbers that are registers themselves four,
-/// or the packet of all stages would not fit beside what it is multiplied by. Of two stages eight
-/// do where there are thirty-two registers: if columns are many, factors, which then come from the
-/// second cache, are read half as often.
+/// or the panel row of all stages would not fit beside what it is multiplied by. Of two stages
+/// eight do where there are thirty-two registers: if columns are many, factors, which then come
+/// from the second cache, are read half as often.
 pub(super) const fn width<E>(stages: usize, count: usize) -> usize {
     let many = size_of::<E>() == 64 && stages <= 2 && count >= 16;
     if size_of::<E>() <= 8 || many { 8 } else { 4 }

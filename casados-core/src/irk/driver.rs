@@ -65,10 +65,10 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
                 reason: "the memory of the integrator has fewer",
             });
         }
-        if !W::Fallback::KEPT && !M::STRUCTURE.elimination.has_plan() {
+        if !W::Fallback::HAS_MEMORY && !M::STRUCTURE.elimination.has_plan() {
             return Err(Error::NotPivoted { step: 0 });
         }
-        let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::KEPT);
+        let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::HAS_MEMORY);
         let ends = [&coefficients.start, &coefficients.end];
         if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
             return Err(Error::NoInterpolation);

@@ -128,7 +128,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 stay(before, y);
             }
         }
-        if !F::KEPT {
+        if !F::HAS_MEMORY {
             return Err(
                 undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
             );

@@ -8,7 +8,7 @@ use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
 
 /// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
-pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
+pub type PanelRow<E, const S: usize, const W: usize> = [[E; W]; S];
 
 /// `−hA` of a tableau: what states at the stages have of the derivatives there, with another sign.
 #[cfg_attr(not(debug_assertions), inline(always))]
@@ -35,63 +35,63 @@ pub fn product<A: Arithmetic, E: Field, const S: usize>(
     product
 }
 
-/// `−packet`
+/// `−panel row`
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S, W>) {
-    for row in packet {
+pub fn negate<E: Field, const S: usize, const W: usize>(panel_row: &mut PanelRow<E, S, W>) {
+    for row in panel_row {
         for element in row {
             *element = -*element;
         }
     }
 }
 
-/// `packet − block · other`
+/// `panel_row − block · other`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
+    panel_row: &mut PanelRow<E, S, W>,
     block: &Block<E, S>,
-    other: &Packet<E, S, W>,
+    other: &PanelRow<E, S, W>,
 ) {
     if const { W == 1 } {
         let (mut target, mut x) = ([E::from_f64(0.0); S], [E::from_f64(0.0); S]);
-        target.copy_from_slice(packet.as_flattened());
+        target.copy_from_slice(panel_row.as_flattened());
         x.copy_from_slice(other.as_flattened());
         A::subtract_columns(&mut target, block, &x);
-        packet.as_flattened_mut().copy_from_slice(&target);
+        panel_row.as_flattened_mut().copy_from_slice(&target);
         return;
     }
     each!(k < S => {
-        each!(i < S => { A::subtract_row(&mut packet[i], block[k][i], &other[k]); });
+        each!(i < S => { A::subtract_row(&mut panel_row[i], block[k][i], &other[k]); });
     });
 }
 
-/// `packet − diag(scale) · other`
+/// `panel_row − diag(scale) · other`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_diagonal<A: Arithmetic, E: Field, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
+    panel_row: &mut PanelRow<E, S, W>,
     scale: &[E; S],
-    other: &Packet<E, S, W>,
+    other: &PanelRow<E, S, W>,
 ) {
     if const { W == 1 } {
         let (mut target, mut x) = ([E::from_f64(0.0); S], [E::from_f64(0.0); S]);
-        target.copy_from_slice(packet.as_flattened());
+        target.copy_from_slice(panel_row.as_flattened());
         x.copy_from_slice(other.as_flattened());
         A::subtract_products(&mut target, scale, &x);
-        packet.as_flattened_mut().copy_from_slice(&target);
+        panel_row.as_flattened_mut().copy_from_slice(&target);
         return;
     }
-    each!(i < S => { A::subtract_row(&mut packet[i], scale[i], &other[i]); });
+    each!(i < S => { A::subtract_row(&mut panel_row[i], scale[i], &other[i]); });
 }
 
-/// `packet − blockᵀ · other`
+/// `panel_row − blockᵀ · other`
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
+    panel_row: &mut PanelRow<E, S, W>,
     block: &Block<E, S>,
-    other: &Packet<E, S, W>,
+    other: &PanelRow<E, S, W>,
 ) {
     each!(i < S => {
-        each!(j < S => { A::subtract_row(&mut packet[i], block[i][j], &other[j]); });
+        each!(j < S => { A::subtract_row(&mut panel_row[i], block[i][j], &other[j]); });
     });
 }
 

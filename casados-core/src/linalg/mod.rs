@@ -23,7 +23,7 @@ mod newton_matrix;
 mod sparse_lu;
 mod transformed;
 
-pub(crate) use block::{Packet, minus_ha, subtract, subtract_diagonal, subtract_transposed};
+pub(crate) use block::{PanelRow, minus_ha, subtract, subtract_diagonal, subtract_transposed};
 pub(crate) use kernel::{
     arithmetic::{Arithmetic, Block},
     dispatch::{Kernel, dispatch, kernels, run_plain},

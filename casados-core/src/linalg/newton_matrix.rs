@@ -8,7 +8,7 @@ use super::kernel::vector::axpy;
 use super::sparse_lu::factor::{self, Planned};
 use super::sparse_lu::solve;
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
-use crate::memory::{Fallback, Kept, fallback::Pivoting};
+use crate::memory::{Fallback, OptionalPlace, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Aligned, Array, Plain, Shape, assign};

@@ -42,16 +42,16 @@ pub(crate) struct OneStep;
 /// [`Pivoting`] or [`Refusing`].
 pub trait Fallback: sealed::Sealed + 'static {
     /// A place for what only the fallback needs.
-    type Place<V: Stored>: Kept<V>;
+    type Place<V: Stored>: OptionalPlace<V>;
     /// Whether there is one.
-    const KEPT: bool;
+    const HAS_MEMORY: bool;
     /// Whether intervals may have several steps, and any options.
     #[doc(hidden)]
     const INTERVALS: bool = true;
 }
 
 /// A place that has a value, or has none.
-pub trait Kept<V>: Stored {
+pub trait OptionalPlace<V>: Stored {
     /// The value.
     fn get(&self) -> Option<&V>;
     /// The value, to be written.
@@ -61,12 +61,12 @@ pub trait Kept<V>: Stored {
 impl sealed::Sealed for Pivoting {}
 impl Fallback for Pivoting {
     type Place<V: Stored> = Inside<V>;
-    const KEPT: bool = true;
+    const HAS_MEMORY: bool = true;
 }
 impl sealed::Sealed for Refusing {}
 impl Fallback for Refusing {
     type Place<V: Stored> = Absent;
-    const KEPT: bool = false;
+    const HAS_MEMORY: bool = false;
 }
 
 #[cfg(feature = "alloc")]
@@ -74,11 +74,11 @@ impl sealed::Sealed for OneStep {}
 #[cfg(feature = "alloc")]
 impl Fallback for OneStep {
     type Place<V: Stored> = Inside<V>;
-    const KEPT: bool = true;
+    const HAS_MEMORY: bool = true;
     const INTERVALS: bool = false;
 }
 
-impl<V: Stored> Kept<V> for Inside<V> {
+impl<V: Stored> OptionalPlace<V> for Inside<V> {
     #[inline(always)]
     fn get(&self) -> Option<&V> {
         Some(&self.0)
@@ -88,7 +88,7 @@ impl<V: Stored> Kept<V> for Inside<V> {
         Some(&mut self.0)
     }
 }
-impl<V> Kept<V> for Absent {
+impl<V> OptionalPlace<V> for Absent {
     #[inline(always)]
     fn get(&self) -> Option<&V> {
         None

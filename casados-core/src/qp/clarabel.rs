@@ -16,8 +16,8 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 /// Clarabel's interior point for sparse problems.
 ///
 /// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order
-/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept as
-/// long as the elements that are not zero stay the same.
+/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept
+/// as long as the elements that are not zero stay the same.
 ///
 /// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
 /// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,
@@ -54,7 +54,7 @@ pub struct Clarabel {
     pub cones: Vec<SecondOrderCone>,
     /// What the caller needs; infinite if nobody said so.
     needed: f64,
-    kept: Option<Kept>,
+    previous: Option<PreviousSolver>,
 }
 
 /// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
@@ -63,7 +63,7 @@ const PART: f64 = 1e-3;
 const LEAST: f64 = 1e-13;
 
 /// A solver and the pattern that it is for.
-struct Kept {
+struct PreviousSolver {
     solver: DefaultSolver<f64>,
     p: CscMatrix<f64>,
     k: CscMatrix<f64>,
@@ -88,7 +88,7 @@ impl Clarabel {
             tol_feas: 1e-9,
             ..DefaultSettings::default()
         };
-        Self { settings, cones: Vec::new(), needed: f64::INFINITY, kept: None }
+        Self { settings, cones: Vec::new(), needed: f64::INFINITY, previous: None }
     }
 
     /// # Errors
@@ -189,15 +189,17 @@ impl Clarabel {
             ),
         ];
         cones.extend(sparse.cones.iter().map(|&count| SupportedConeT::SecondOrderConeT(count)));
-        let same = |kept: &Kept| {
+        let same = |previous: &PreviousSolver| {
             let equal = |a: &CscMatrix<f64>, b: &CscMatrix<f64>| a.colptr == b.colptr && a.rowval == b.rowval;
-            equal(&kept.p, &p) && equal(&kept.k, &k) && (kept.k.m, &kept.cones) == (k.m, &cones)
+            equal(&previous.p, &p)
+                && equal(&previous.k, &k)
+                && (previous.k.m, &previous.cones) == (k.m, &cones)
         };
         let settings = self.refined();
         // Settings that hold for the life of a solver are refused, and make a new one.
-        let updated = self.kept.as_mut().filter(|kept| same(kept)).is_some_and(|kept| {
-            kept.solver.update_settings(settings.clone()).is_ok()
-                && kept.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
+        let updated = self.previous.as_mut().filter(|previous| same(previous)).is_some_and(|previous| {
+            previous.solver.update_settings(settings.clone()).is_ok()
+                && previous.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
         });
         if !updated {
             // What clarabel checks here are the dimensions, which are right by construction, and
@@ -205,10 +207,10 @@ impl Clarabel {
             let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, settings);
             let invalid =
                 QpError::InvalidValue { field: QpField::Settings, stage: 0, index: 0, value: f64::NAN };
-            self.kept = Some(Kept { solver: solver.map_err(|_| invalid)?, p, k, cones });
+            self.previous = Some(PreviousSolver { solver: solver.map_err(|_| invalid)?, p, k, cones });
         }
-        match &mut self.kept {
-            Some(kept) => Ok((&mut kept.solver, sparse)),
+        match &mut self.previous {
+            Some(previous) => Ok((&mut previous.solver, sparse)),
             None => Err(QpError::OutOfMemory { bytes: 0 }),
         }
     }

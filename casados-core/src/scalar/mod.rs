@@ -215,11 +215,11 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain + Sealed {
     const SMALLEST: f64;
     /// As many numbers with half of the digits, where that saves half of the operations: for what
     /// need not be exact.
-    type Coarse: Lanes;
+    type Demoted: Lanes;
     /// Rounded to these, infinite beyond their largest number.
-    fn coarse(self) -> Self::Coarse;
+    fn demote(self) -> Self::Demoted;
     /// The same numbers.
-    fn fine(coarse: Self::Coarse) -> Self;
+    fn promote(demote: Self::Demoted) -> Self;
     /// One of them. `lane < LANES`
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`

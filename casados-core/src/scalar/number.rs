@@ -51,17 +51,17 @@ macro_rules! mask_logic {
 }
 pub(crate) use mask_logic;
 
-/// Numbers that are their own coarse ones.
+/// Numbers that are their own demoted ones.
 macro_rules! as_it_is {
     () => {
-        type Coarse = Self;
+        type Demoted = Self;
         #[inline(always)]
-        fn coarse(self) -> Self {
+        fn demote(self) -> Self {
             self
         }
         #[inline(always)]
-        fn fine(coarse: Self) -> Self {
-            coarse
+        fn promote(demote: Self) -> Self {
+            demote
         }
     };
 }

@@ -159,14 +159,14 @@ impl<E: Lanes, const S: usize> Lanes for Strided<E, S> {
     const EPSILON: f64 = E::EPSILON;
     const STAGNATION: f64 = E::STAGNATION;
     const SMALLEST: f64 = E::SMALLEST;
-    type Coarse = Strided<E::Coarse, S>;
+    type Demoted = Strided<E::Demoted, S>;
     #[inline(always)]
-    fn coarse(self) -> Self::Coarse {
-        Strided(self.0.coarse())
+    fn demote(self) -> Self::Demoted {
+        Strided(self.0.demote())
     }
     #[inline(always)]
-    fn fine(coarse: Self::Coarse) -> Self {
-        Self(E::fine(coarse.0))
+    fn promote(demote: Self::Demoted) -> Self {
+        Self(E::promote(demote.0))
     }
 
     #[inline(always)]

@@ -23,7 +23,7 @@ pub struct Term {
 /// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has
 /// one element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lone {
+pub struct DiagonalControl {
     /// The entry of the Hessian on its diagonal.
     pub entry: u32,
     /// The direction.

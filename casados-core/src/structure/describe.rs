@@ -126,7 +126,7 @@ impl Structure {
             "{} of {} in the lower triangle, of {} of {variables} variables",
             self.hessian.len(),
             variables * (variables + 1) / 2,
-            self.curved.len() + self.lone.len(),
+            self.curved.len() + self.diagonal_controls.len(),
         )?;
         title(f, "directions")?;
         let directions = self.x.len() + self.u.len() + self.p.len();

@@ -9,7 +9,9 @@ mod explicit;
 mod reduction;
 
 pub use cost::Cost;
-pub use curvature::{Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
+pub use curvature::{
+    DiagonalControl, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric,
+};
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 pub use reduction::Reduction;
 
@@ -103,9 +105,9 @@ pub struct Structure {
     /// them.
     /// Read where results are written.
     pub column_of_direction: &'static [u32],
-    /// Variables that occur in the pattern of the Hessian, ascending, less those of `lone`: only
-    /// their rows of `D_i` enter second derivatives.
-    /// Read by second derivatives: their stage sensitivities.
+    /// Variables that occur in the pattern of the Hessian, ascending, less those of
+    /// `diagonal_controls`: only their rows of `D_i` enter second derivatives. Read by second
+    /// derivatives: their stage sensitivities.
     pub curved: &'static [u32],
     /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`]
     /// makes of it.
@@ -113,7 +115,7 @@ pub struct Structure {
     pub symmetric: &'static [Term],
     /// Controls and parameters that occur in the Hessian's diagonal only.
     /// Read by second derivatives: sums on the diagonal.
-    pub lone: &'static [Lone],
+    pub diagonal_controls: &'static [DiagonalControl],
     /// Numbers of arithmetic operations.
     /// Read by [`Structure::cost`] and the Jacobian update policy.
     pub operations: Operations,

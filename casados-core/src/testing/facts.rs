@@ -86,8 +86,9 @@ fn patterns<M: Dae>(report: &mut Report, number: usize) {
         let pattern = [structure.hessian.rows, structure.hessian.columns];
         pattern.iter().flat_map(|list| list.iter()).filter(|&&variable| variable as usize == i).count()
     };
-    let lone = structure.lone.iter().map(|lone| lone.entry);
-    let apart = lone.filter_map(diagonal);
+    let diagonal_controls =
+        structure.diagonal_controls.iter().map(|diagonal_controls| diagonal_controls.entry);
+    let apart = diagonal_controls.filter_map(diagonal);
     let listed: Vec<u32> = structure.curved.iter().copied().chain(apart).collect();
     absent("curved variables", time, &listed, &curved);
     let influential: Vec<u32> =

@@ -232,7 +232,7 @@ fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
                                 &#krate::__private::all(),
                             )
                         },
-                        lone: &[],
+                        diagonal_controls: &[],
                         operations: #krate::__private::Operations {
                             residual: 0,
                             residual_jacobian: 0,

@@ -15,9 +15,9 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let name = model.name.to_string();
     let Variables { x, z, u, p } = &model.variables;
     let width = Literal::usize_unsuffixed(x.len() + u.len() + p.len());
-    let lone = facts.lone.iter().map(|&(entry, direction)| {
+    let diagonal_controls = facts.diagonal_controls.iter().map(|&(entry, direction)| {
         let [entry, direction] = [entry, direction].map(Literal::u32_unsuffixed);
-        quote!(#krate::__private::Lone { entry: #entry, direction: #direction })
+        quote!(#krate::__private::DiagonalControl { entry: #entry, direction: #direction })
     });
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let variables = Literal::usize_unsuffixed(2 * x.len() + z.len() + u.len() + p.len());
@@ -57,7 +57,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             column_of_direction: &const { #krate::__private::columns::<#width>(DIRECTIONS) },
             curved: CURVED,
             symmetric: &const { #krate::__private::symmetric::<#count, #terms>(&HESSIAN, CURVED) },
-            lone: &[#(#lone),*],
+            diagonal_controls: &[#(#diagonal_controls),*],
             operations: #operations,
             elimination: #elimination,
             reduction: #reduction,

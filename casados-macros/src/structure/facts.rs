@@ -25,7 +25,7 @@ pub struct Facts {
     pub curved: Vec<u32>,
     /// Diagonal entries that belong to a control or a parameter alone: the entry, and the
     /// direction.
-    pub lone: Vec<(u32, u32)>,
+    pub diagonal_controls: Vec<(u32, u32)>,
 }
 
 /// Reads the facts off the derivatives. `ends` is where `ẋ, x, z, u, p` end among the variables.
@@ -73,14 +73,14 @@ pub fn find(
         quadratures: (0..nx).filter(|state| !used.contains(&(state + nx))).collect(),
         directions: used.iter().filter_map(direction).collect(),
         curved: curved.variables.into_iter().collect(),
-        lone: curved.lone,
+        diagonal_controls: curved.diagonal_controls,
     }
 }
 
 /// What second derivatives are made of.
 struct Curved {
     variables: BTreeSet<u32>,
-    lone: Vec<(u32, u32)>,
+    diagonal_controls: Vec<(u32, u32)>,
 }
 
 impl Curved {
@@ -94,13 +94,13 @@ impl Curved {
             (own.next().is_none() && entry.0 == entry.1).then_some(index)
         };
         let inputs: Vec<u32> = variables.range(end_z..).copied().collect();
-        let mut lone = Vec::new();
+        let mut diagonal_controls = Vec::new();
         for variable in inputs {
             if let Some(entry) = alone(variable) {
                 variables.remove(&variable);
-                lone.push((entry, variable - end_z + end_x - nx));
+                diagonal_controls.push((entry, variable - end_z + end_x - nx));
             }
         }
-        Self { variables, lone }
+        Self { variables, diagonal_controls }
     }
 }

@@ -6,7 +6,7 @@ use super::elimination::Plan;
 use std::collections::HashMap;
 
 /// So many pivots at most does the engine take together.
-const MOST: usize = 4;
+const MAX_SUPERNODE: usize = 4;
 
 /// How many pivots from each on are one; zero if one before has counted it.
 pub fn find(plan: &Plan) -> Vec<u32> {
@@ -36,7 +36,7 @@ pub fn find(plan: &Plan) -> Vec<u32> {
     let mut supernodes = vec![0; pivots.len()];
     let mut first = 0;
     while first < pivots.len() {
-        let last = (pivots.len() - 1).min(first + MOST - 1);
+        let last = (pivots.len() - 1).min(first + MAX_SUPERNODE - 1);
         let more = (first..last).take_while(goes_on).count();
         supernodes[first] = more as u32 + 1;
         first += more + 1;

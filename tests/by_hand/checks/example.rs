@@ -74,7 +74,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         column_of_direction: &[0, 1, 2],
         curved: if FAULT == CURVED_LEFT_OUT { &[1, 3] } else { &[1, 2, 3] },
         symmetric: &const { symmetric::<3, 5>(&Pattern { rows: &[1, 2, 3], columns: &[1, 1, 1] }, &[1, 2, 3]) },
-        lone: &[],
+        diagonal_controls: &[],
         operations: NONE,
         elimination: Elimination::NONE,
         reduction: None,

@@ -232,7 +232,7 @@ mod logistic {
             symmetric: &const {
                 symmetric::<3, 8>(&Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] }, &[1, 2, 3])
             },
-            lone: &[],
+            diagonal_controls: &[],
             operations: NONE,
             elimination: Elimination::NONE,
             reduction: None,

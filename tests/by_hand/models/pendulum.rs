@@ -115,7 +115,7 @@ impl Dae for Pendulum {
         column_of_direction: &columns::<5>(&[1, 2, 3, 4]),
         curved: &[5, 7, 8],
         symmetric: &symmetric::<3, 9>(&HESSIAN, &[5, 7, 8]),
-        lone: &[],
+        diagonal_controls: &[],
         operations: NONE,
         elimination: Elimination::NONE,
         reduction: None,

@@ -72,7 +72,7 @@ impl Dae for Rod {
         symmetric: &const {
             symmetric::<N, N>(&Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN }, &ROD_HESSIAN)
         },
-        lone: &[],
+        diagonal_controls: &[],
         operations: NONE,
         elimination: Elimination::NONE,
         reduction: None,

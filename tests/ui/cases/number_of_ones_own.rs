@@ -95,12 +95,12 @@ impl Lanes for Wide {
     const EPSILON: f64 = f64::EPSILON;
     const STAGNATION: f64 = 1e-10;
     const SMALLEST: f64 = f64::MIN_POSITIVE;
-    type Coarse = f64;
-    fn coarse(self) -> f64 {
+    type Demoted = f64;
+    fn demote(self) -> f64 {
         self.0
     }
-    fn fine(coarse: f64) -> Self {
-        Self(coarse)
+    fn promote(demote: f64) -> Self {
+        Self(demote)
     }
     fn lane(cell: &Self, _: usize) -> f64 {
         cell.0

@@ -13,7 +13,7 @@ const LARGEST_GNSF: usize = 69;
 
 /// Who is farther from the reference than this, in units of its largest element, computes something
 /// else: the tolerance of Newton's method is 1e-8 / steps.
-const FAR: f64 = 1e-6;
+const MAX_PEER_ERROR: f64 = 1e-6;
 
 /// An installation.
 pub struct Acados {
@@ -54,7 +54,7 @@ impl Acados {
             "do": "time", "case": case.json(case.single), "integrator": integrator, "mode": mode.name(), "seconds": seconds,
         }))?;
         let error = reference.and_then(|r| Values::read(&answer["values"]).error(r, mode));
-        if let Some(error) = error.filter(|error| error.is_nan() || *error > FAR) {
+        if let Some(error) = error.filter(|error| error.is_nan() || *error > MAX_PEER_ERROR) {
             return Err(format!("{}, {integrator}: an error of {error:.0e}", case.name));
         }
         Ok(Measured { time: Summary::read(&answer["time"]), error, ..Default::default() })

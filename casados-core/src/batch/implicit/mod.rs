@@ -36,7 +36,7 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
             S > 2 && fixed_iterations.is_none() && jacobian.is_adaptive() && !M::STRUCTURE.linear_in_state;
         // Derivatives take the factors of each stage in any case.
         let factors = if shared && columns == 0 {
-            size_of::<M::Factors<[E::Coarse; S]>>()
+            size_of::<M::Factors<[E::Demoted; S]>>()
         } else {
             size_of::<M::Factors<[[E; S]; S]>>()
         };

@@ -2,23 +2,23 @@
 //! (`backward_error`, `refine`).
 
 use crate::irk::directions::weight;
-use crate::linalg::{Ahead, Arithmetic, Packet, Visitor};
+use crate::linalg::{Ahead, Arithmetic, PanelRow, Visitor};
 use crate::scalar::{Field, each};
 
-/// So many strands a sum over all columns has; of numbers that are registers themselves only the
-/// first is used.
+/// So many accumulators a sum over all columns has; of numbers that are registers themselves only
+/// the first is used.
 pub(in crate::irk) const STRANDS: usize = 4;
 
-/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is
+/// Whether sums have one accumulator: those of other rows are computed meanwhile, and its memory is
 /// written once for each row of a panel.
 const fn is_one<E>() -> bool {
     size_of::<E>() > 8
 }
 
-/// The sum of all strands.
+/// The sum of all accumulators.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(in crate::irk) fn total<E: Field>(strands: &[E; STRANDS]) -> E {
-    let [a, b, c, d] = *strands;
+pub(in crate::irk) fn total<E: Field>(accumulators: &[E; STRANDS]) -> E {
+    let [a, b, c, d] = *accumulators;
     if const { is_one::<E>() } { a } else { (a + b) + (c + d) }
 }
 
@@ -43,18 +43,18 @@ pub(in crate::irk) struct Summed<'a, E, const S: usize, const W: usize> {
 impl<E: Field, const S: usize, const W: usize> Summed<'_, E, S, W> {
     /// Adds all unknowns of a panel.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub fn all<A: Arithmetic>(&mut self, packets: &[Packet<E, S, W>]) {
-        for (slot, packet) in packets.iter().enumerate() {
-            self.on_solved::<A>(slot, packet);
+    pub fn all<A: Arithmetic>(&mut self, panel_rows: &[PanelRow<E, S, W>]) {
+        for (slot, panel_row) in panel_rows.iter().enumerate() {
+            self.on_solved::<A>(slot, panel_row);
         }
     }
 }
 
 impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn on_solved<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
+    fn on_solved<A: Arithmetic>(&mut self, slot: usize, panel_row: &PanelRow<E, S, W>) {
         let Some(sums) = self.sums.get_mut(slot) else { return };
-        each!(i < S => { accumulate::<A, E, W>(&mut sums[i], self.minus_weights, &packet[i]); });
+        each!(i < S => { accumulate::<A, E, W>(&mut sums[i], self.minus_weights, &panel_row[i]); });
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pass(&mut self) {
@@ -64,30 +64,30 @@ impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E
 
 /// A sum over no columns.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(in crate::irk) fn clear<E: Field>(strands: &mut [E; STRANDS]) {
-    let [first, others @ ..] = strands;
+pub(in crate::irk) fn clear<E: Field>(accumulators: &mut [E; STRANDS]) {
+    let [first, others @ ..] = accumulators;
     *first = E::from_f64(0.0);
     if const { !is_one::<E>() } {
         *others = [E::from_f64(0.0); STRANDS - 1];
     }
 }
 
-/// `strands += weights · row`, as far apart as the strands are.
+/// `accumulators += weights · row`, as far apart as the accumulators are.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
-    strands: &mut [E; STRANDS],
+    accumulators: &mut [E; STRANDS],
     minus_weights: &[E; W],
     row: &[E; W],
 ) {
     if const { is_one::<E>() } {
-        let [sum, ..] = strands;
+        let [sum, ..] = accumulators;
         each!(w < W => { *sum = A::subtract(*sum, minus_weights[w], row[w]); });
         return;
     }
     let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
     // In registers: the optimiser cannot know that they do not overlap.
-    let mut own = *strands;
+    let mut own = *accumulators;
     each!(n < W / STRANDS => { A::subtract_products(&mut own, &weights[n], &row[n]); });
     each!(n < W % STRANDS => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
-    *strands = own;
+    *accumulators = own;
 }

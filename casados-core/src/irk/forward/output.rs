@@ -1,6 +1,6 @@
 //! What derivatives over a step are written to: matrices of results, and rows of `D` at a stage.
 
-use crate::linalg::{Arithmetic, Packet};
+use crate::linalg::{Arithmetic, PanelRow};
 use crate::scalar::Lanes;
 use core::ops::Range;
 
@@ -21,7 +21,7 @@ pub(in crate::irk) struct Columns<'a, E, const S: usize, const W: usize> {
     /// In which row each column of the unit matrix has its one; empty without one.
     pub ones: &'a [u32],
     /// The derivatives of the stages.
-    pub dy: &'a [Packet<E, S, W>],
+    pub dy: &'a [PanelRow<E, S, W>],
     /// The unknown of each row.
     pub unknowns: Range<usize>,
     /// `−weight_i`
@@ -60,7 +60,7 @@ impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
     fn rows<A: Arithmetic, const R: usize>(
         &self,
         begin: usize,
-        dy: &[Packet<E, S, W>; R],
+        dy: &[PanelRow<E, S, W>; R],
         to: &mut [&mut [E]; W],
         sums: &mut [E; W],
     ) {

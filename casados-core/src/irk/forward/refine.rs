@@ -20,7 +20,7 @@ use super::sweep::{Linearized, Outputs, Sweep};
 use crate::irk::coefficients::{Coefficients, stage_values};
 use crate::irk::directions::{Directions, panel, panel_mut, panels};
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, minus_ha, slot};
+use crate::linalg::{Arithmetic, Kernel, PanelRow, dispatch, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Piece, Real, SideBySide, Tangent};
@@ -100,7 +100,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     ) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         panels!(D::COLUMNS, T, S, column, W => {
-            let mut right = ArrayK::<M, Packet<T, S, W>>::zeroed();
+            let mut right = ArrayK::<M, PanelRow<T, S, W>>::zeroed();
             for c in 0..W {
                 let inputs = work.probe[0].as_mut().get_mut(nx + nk..).unwrap_or_default();
                 for (index, input) in inputs.iter_mut().enumerate() {
@@ -142,7 +142,7 @@ fn correct<T: Real>(x: &mut [T], corrections: &[T]) {
 /// The direction of one column, `(dk, V_n + h Σ_j a_j dk_j, dz)` at all stages.
 struct Aim<'a, M, T, const S: usize, const W: usize> {
     v: &'a [[T; W]],
-    dy: &'a [Packet<T, S, W>],
+    dy: &'a [PanelRow<T, S, W>],
     a: &'a [[T; S]; S],
     h: T,
     c: usize,

@@ -8,7 +8,7 @@
 use crate::irk::directions::{Directions, panel_of};
 use crate::irk::jacobian_entries::entry;
 use crate::irk::kinematic::{KinematicPanel, dependence, minus_c};
-use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
+use crate::linalg::{Arithmetic, AtRow, PanelRow, each_row, is_short, kinematic, slot};
 use crate::model::{Dae, Dependent};
 use crate::scalar::{Lanes, each};
 use crate::shape::{Plain, Shape};
@@ -118,12 +118,12 @@ pub(in crate::irk) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, 
     jacobian: &M::Jacobian<[E; S]>,
     nodes: &[E; S],
     placed: &mut Placed,
-    dy: &mut [Packet<E, S, W>],
+    dy: &mut [PanelRow<E, S, W>],
     begin: usize,
 ) {
-    for (slot, packet) in dy.iter_mut().enumerate() {
+    for (slot, panel_row) in dy.iter_mut().enumerate() {
         if kinematic::<M>(slot).is_none() {
-            *packet = [[E::from_f64(0.0); W]; S];
+            *panel_row = [[E::from_f64(0.0); W]; S];
         }
     }
     while let Some(dependent) = M::STRUCTURE.elimination.dependents.get(placed.dependents) {
@@ -154,13 +154,13 @@ pub(in crate::irk) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, 
 /// Subtracts from one column of a row.
 #[inline(always)]
 fn subtract_at<E: Lanes, const S: usize, const W: usize>(
-    dy: &mut [Packet<E, S, W>],
+    dy: &mut [PanelRow<E, S, W>],
     slot: usize,
     column: usize,
     values: &[E; S],
 ) {
-    let Some(packet) = dy.get_mut(slot) else { return };
-    for (row, &value) in packet.iter_mut().zip(values) {
+    let Some(panel_row) = dy.get_mut(slot) else { return };
+    for (row, &value) in panel_row.iter_mut().zip(values) {
         if let Some(to) = row.get_mut(column) {
             *to = *to - value;
         }
@@ -181,7 +181,7 @@ fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
 pub(in crate::irk) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     pub kinematic: KinematicPanel<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
-    pub dy: &'a mut [Packet<E, S, W>],
+    pub dy: &'a mut [PanelRow<E, S, W>],
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
@@ -213,32 +213,32 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     /// Each row in registers, and written once; zeros where equations have no states.
     #[inline(always)]
     fn row_by_row<A: Arithmetic>(&mut self) {
-        let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], 0);
+        let (mut panel_row, mut last) = ([[E::from_f64(0.0); W]; S], 0);
         for row in 0..Self::ROWS {
             let Some((r, c, values)) = entry::<M, _>(self.kinematic.jacobian, Self::FIRST + row) else {
                 return;
             };
             if last != r {
-                self.put(last, &packet);
+                self.put(last, &panel_row);
                 self.clear(last + 1, r);
-                (packet, last) = ([[E::from_f64(0.0); W]; S], r);
+                (panel_row, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            self.subtract::<A>(&mut packet, c - M::Shape::NX, values);
+            self.subtract::<A>(&mut panel_row, c - M::Shape::NX, values);
         }
-        self.put(last, &packet);
+        self.put(last, &panel_row);
         self.clear(last + 1, M::Shape::NK);
     }
 
-    /// `packet − f_x,i V`, of one state.
+    /// `panel_row − f_x,i V`, of one state.
     #[inline(always)]
-    fn subtract<A: Arithmetic>(&self, packet: &mut Packet<E, S, W>, state: usize, values: &[E; S]) {
+    fn subtract<A: Arithmetic>(&self, panel_row: &mut PanelRow<E, S, W>, state: usize, values: &[E; S]) {
         if kinematic::<M>(state).is_some() {
             let Some(x) = self.dy.get(state) else { return };
-            each!(i < S => { A::subtract_row(&mut packet[i], values[i], &x[i]); });
+            each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], &x[i]); });
             return;
         }
         let Some(v) = self.kinematic.v.get(state) else { return };
-        each!(i < S => { A::subtract_row(&mut packet[i], values[i], v); });
+        each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], v); });
     }
 
     /// The equation that follows that of the entry before this one.
@@ -248,13 +248,13 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
 
     /// The row of an equation.
     #[inline(always)]
-    fn put(&mut self, equation: usize, packet: &Packet<E, S, W>) {
+    fn put(&mut self, equation: usize, panel_row: &PanelRow<E, S, W>) {
         let slot = slot::<M>(equation);
         if kinematic::<M>(slot).is_some() {
             return;
         }
         if let Some(to) = self.dy.get_mut(slot) {
-            *to = *packet;
+            *to = *panel_row;
         }
     }
 
@@ -276,18 +276,18 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         let slot = slot::<M>(r);
         let next = Self::after(row);
         // The first entry of an equation has nothing to add to.
-        let mut packet = [[E::from_f64(0.0); W]; S];
+        let mut panel_row = [[E::from_f64(0.0); W]; S];
         if Self::AT_ONCE || r < next {
-            packet = *self.dy.get(slot).unwrap_or(&packet);
+            panel_row = *self.dy.get(slot).unwrap_or(&panel_row);
         } else {
             self.clear(next, r);
         }
         if kinematic::<M>(slot).is_some() {
             return;
         }
-        self.subtract::<A>(&mut packet, c - M::Shape::NX, values);
+        self.subtract::<A>(&mut panel_row, c - M::Shape::NX, values);
         if let Some(to) = self.dy.get_mut(slot) {
-            *to = packet;
+            *to = panel_row;
         }
     }
 }
@@ -296,7 +296,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
 struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     directions: &'a D,
-    dy: &'a mut [Packet<E, S, W>],
+    dy: &'a mut [PanelRow<E, S, W>],
     column: usize,
 }
 
@@ -308,8 +308,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         let shift = M::Shape::NX + M::Shape::NZ;
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
         let slot = slot::<M>(r);
-        let (None, Some(packet)) = (kinematic::<M>(slot), self.dy.get_mut(slot)) else { return };
-        for (row, &value) in packet.iter_mut().zip(values) {
+        let (None, Some(panel_row)) = (kinematic::<M>(slot), self.dy.get_mut(slot)) else { return };
+        for (row, &value) in panel_row.iter_mut().zip(values) {
             self.directions.add(c - shift, -value, self.column, row);
         }
     }

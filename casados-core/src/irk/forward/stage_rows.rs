@@ -1,8 +1,8 @@
 //! The rows of `D` that enter second derivatives: of curved variables at all stages, from the
 //! derivatives of a step.
 
-use crate::irk::directions::{Directions, NEAREST, all_columns, width};
-use crate::linalg::{Arithmetic, Block, Packet};
+use crate::irk::directions::{Directions, L1_CACHE_BYTES, all_columns, width};
+use crate::linalg::{Arithmetic, Block, PanelRow};
 use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
@@ -12,7 +12,7 @@ use core::marker::PhantomData;
 /// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
 pub(in crate::irk) const fn together<M: Dae, E, const S: usize>() -> bool {
     let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, all_columns::<M, E>()) * size_of::<E>();
-    panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
+    panel <= L1_CACHE_BYTES / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
 }
 
 /// Where the row of a curved variable at a stage lies in a panel of `D`.
@@ -39,7 +39,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> CurvedRows<'_, M, E, D,
     pub fn panel<A: Arithmetic, const W: usize>(
         &self,
         v: &[[E; W]],
-        dy: &[Packet<E, S, W>],
+        dy: &[PanelRow<E, S, W>],
         d: &mut [[E; W]],
         column: usize,
     ) {

@@ -7,7 +7,7 @@ use super::right_hand_side::{Later, Placed, Scatter, place};
 use super::stage_rows::CurvedRows;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
-use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
+use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel, panel_mut, panels};
 use crate::irk::kinematic::KinematicPanel;
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
@@ -33,7 +33,7 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     begun: bool,
     /// `d(k, z)/dw` at its stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
-    /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
+    /// Weighted sums over all columns of `dy` and of `V_n`, in accumulators.
     pub(in crate::irk) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
     pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; STRANDS]>>,
     /// Zero if all that was written to a result after the last step is finite, else NaN.
@@ -241,8 +241,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
     fn run<A: Arithmetic>(mut self) -> E {
         let nodes = nodes(&self.coefficients.a, self.h);
         if self.phase != Phase::Before {
-            for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
-                clear(strands);
+            for accumulators in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
+                clear(accumulators);
             }
             if D::SPARSE && self.first {
                 for (state, [sum, ..]) in self.start_sums.iter_mut().enumerate() {
@@ -277,7 +277,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COLUMNS * M::Shape::NK * S * size_of::<E>();
-        bytes <= NEAREST && is_short::<A, Scatter<'_, M, E, D, S>>()
+        bytes <= L1_CACHE_BYTES && is_short::<A, Scatter<'_, M, E, D, S>>()
     }
 
     /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
@@ -351,8 +351,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         }
         let unit = Self::UNIT || self.first && D::SPARSE;
         if const { !Self::UNIT } && !unit {
-            for (strands, row) in self.start_sums.iter_mut().zip(v) {
-                accumulate::<A, E, W>(strands, minus_weights, row);
+            for (accumulators, row) in self.start_sums.iter_mut().zip(v) {
+                accumulate::<A, E, W>(accumulators, minus_weights, row);
             }
         }
         // The unit matrix need not be read.

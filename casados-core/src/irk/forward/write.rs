@@ -105,15 +105,15 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
                 let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
                 let v = panel::<E, W>(v, column, nx);
                 let mut values = [zero; W];
-                if let Some(packet) = dy.get(unknown) {
+                if let Some(panel_row) = dy.get(unknown) {
                     match (v.get(unknown), coefficients.a.get(stage)) {
                         (Some(v), Some(a)) if (nx..2 * nx).contains(&variable) => {
                             values = *v;
-                            for (&a, dk) in a.iter().zip(packet) {
+                            for (&a, dk) in a.iter().zip(panel_row) {
                                 A::subtract_row(&mut values, -(h * a), dk);
                             }
                         }
-                        _ => values = packet.get(stage).copied().unwrap_or(values),
+                        _ => values = panel_row.get(stage).copied().unwrap_or(values),
                     }
                 }
                 for (c, &value) in values.iter().enumerate() {

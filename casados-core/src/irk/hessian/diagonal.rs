@@ -20,10 +20,10 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Diagonal<'_, M, E
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        for lone in M::STRUCTURE.lone {
-            let Some(column) = Identity::<M>::column(lone.direction as usize) else { continue };
+        for diagonal_controls in M::STRUCTURE.diagonal_controls {
+            let Some(column) = Identity::<M>::column(diagonal_controls.direction as usize) else { continue };
             let (Some(entries), Some(row)) =
-                (self.entries.get(lone.entry as usize), self.sum.get_mut(column))
+                (self.entries.get(diagonal_controls.entry as usize), self.sum.get_mut(column))
             else {
                 continue;
             };

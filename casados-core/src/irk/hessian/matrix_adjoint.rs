@@ -22,7 +22,7 @@ use crate::irk::forward::sweep::Phase;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Factors, Kernel, Packet, Planned, TransposedDown, TransposedUp, dispatch,
+    Ahead, Arithmetic, Block, Factors, Kernel, PanelRow, Planned, TransposedDown, TransposedUp, dispatch,
     is_long, minus_ha, sweeps,
 };
 use crate::memory::Fallback;
@@ -33,7 +33,7 @@ use core::marker::PhantomData;
 
 /// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products
 /// that panels take, counted for each direction. A solve waits for memory, which products of panels
-/// do not. Only of single numbers: registers of them leave no room for packets.
+/// do not. Only of single numbers: registers of them leave no room for panel rows.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
@@ -235,42 +235,42 @@ struct RightHandSide<'a, E, R, const S: usize, const W: usize> {
 
 impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E, R, S, W> {
     #[inline(always)]
-    fn all<A: Arithmetic, M: Dae>(&self, m: &mut [Packet<E, S, W>]) {
+    fn all<A: Arithmetic, M: Dae>(&self, m: &mut [PanelRow<E, S, W>]) {
         let nx = M::Shape::NX;
         let (mut derivative, mut state) = (0, const { before(M::STRUCTURE.curved, M::Shape::NX) });
         let mut algebraic = const { before(M::STRUCTURE.curved, 2 * M::Shape::NX) };
         for (unknown, to) in m.iter_mut().enumerate() {
-            let mut packet = [[E::from_f64(0.0); W]; S];
+            let mut panel_row = [[E::from_f64(0.0); W]; S];
             if unknown >= nx {
                 if is_at::<M>(algebraic, unknown + nx) {
-                    add_stages::<A, M, E, S, W>(&mut packet, self.g, algebraic);
+                    add_stages::<A, M, E, S, W>(&mut panel_row, self.g, algebraic);
                     algebraic += 1;
                 }
-                *to = packet;
+                *to = panel_row;
                 continue;
             }
             if !self.sum.is_empty()
                 && let Some(row) = Identity::<M>::column(unknown)
                 && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
             {
-                for (row, &minus_hb) in packet.iter_mut().zip(self.minus_hb) {
+                for (row, &minus_hb) in panel_row.iter_mut().zip(self.minus_hb) {
                     A::subtract_row(row, minus_hb, lambda);
                 }
             }
             if is_at::<M>(derivative, unknown) {
-                add_stages::<A, M, E, S, W>(&mut packet, self.g, derivative);
+                add_stages::<A, M, E, S, W>(&mut panel_row, self.g, derivative);
                 derivative += 1;
             }
             if is_at::<M>(state, nx + unknown) {
                 for stage in 0..S {
                     let Some(g) = self.g.get(row_of::<M, E, S>(state, stage)) else { continue };
-                    for (row, minus_ha) in packet.iter_mut().zip(self.minus_ha) {
+                    for (row, minus_ha) in panel_row.iter_mut().zip(self.minus_ha) {
                         A::subtract_row(row, minus_ha[stage], g);
                     }
                 }
                 state += 1;
             }
-            *to = packet;
+            *to = panel_row;
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::before;
 use crate::irk::forward::stage_rows::row_of;
 use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, Packet, slot};
+use crate::linalg::{Arithmetic, PanelRow, slot};
 use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Array, Plain, Shape};
@@ -39,7 +39,7 @@ pub(in crate::irk) struct Inverse<E, const S: usize> {
 
 impl<E: Lanes, const S: usize> Inverse<E, S> {
     /// No more than this may `Σ |b_i (A⁻¹ 1)_i|` be: so often rounding errors of `Λ` are added.
-    const MOST: f64 = 16.0;
+    const MAX_GROWTH: f64 = 16.0;
 
     /// Of a tableau whose `A` has an inverse that is good enough, and steps of a size that has a
     /// reciprocal: not of length zero.
@@ -53,7 +53,7 @@ impl<E: Lanes, const S: usize> Inverse<E, S> {
         }
         let finite = minus_weights.iter().all(|weight| E::all(weight.is_finite()));
         // What is not finite is not small either.
-        (finite && size <= Self::MOST).then_some(Self { minus_weights, keep: E::from_f64(keep) })
+        (finite && size <= Self::MAX_GROWTH).then_some(Self { minus_weights, keep: E::from_f64(keep) })
     }
 }
 
@@ -88,7 +88,7 @@ fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
 pub(in crate::irk) struct Advance<'a, M: Dae, E: Plain, R, const S: usize, const W: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     pub g: &'a [[E; W]],
-    pub m: &'a [Packet<E, S, W>],
+    pub m: &'a [PanelRow<E, S, W>],
     /// `(Λ, Λ_w)`
     pub sum: &'a mut [R],
     pub column: usize,
@@ -128,17 +128,17 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
         state: usize,
         derivative: &mut usize,
     ) {
-        let mut packet = [E::from_f64(0.0); W];
+        let mut panel_row = [E::from_f64(0.0); W];
         if !self.last
             && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
         {
-            A::subtract_row(&mut packet, -inverse.keep, lambda);
+            A::subtract_row(&mut panel_row, -inverse.keep, lambda);
         }
         if let Some((equation, _, values)) = entry::<M, _>(self.jacobian, state)
             && let Some(m) = self.m.get(slot::<M>(equation))
         {
             for ((&weight, &value), m) in inverse.minus_weights.iter().zip(values).zip(m) {
-                A::subtract_row(&mut packet, weight * value, m);
+                A::subtract_row(&mut panel_row, weight * value, m);
             }
         }
         while let Some(&of) = M::STRUCTURE.curved.get(*derivative)
@@ -148,12 +148,12 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
                 if of as usize == state
                     && let Some(g) = self.g.get(row_of::<M, E, S>(*derivative, stage))
                 {
-                    A::subtract_row(&mut packet, -weight, g);
+                    A::subtract_row(&mut panel_row, -weight, g);
                 }
             }
             *derivative += 1;
         }
-        self.put(row, &packet);
+        self.put(row, &panel_row);
     }
 
     /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
@@ -199,21 +199,21 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
                 }
                 c += 1;
             }
-            let Some((packet, others)) = sums.split_first_mut() else { return };
+            let Some((panel_row, others)) = sums.split_first_mut() else { return };
             for other in others {
-                A::subtract_row(packet, E::from_f64(-1.0), other);
+                A::subtract_row(panel_row, E::from_f64(-1.0), other);
             }
-            let packet = *packet;
-            self.put(row, &packet);
+            let panel_row = *panel_row;
+            self.put(row, &panel_row);
             row += 1;
         }
     }
 
     #[inline(always)]
-    fn put(&mut self, row: usize, packet: &[E; W]) {
+    fn put(&mut self, row: usize, panel_row: &[E; W]) {
         let to = self.sum.get_mut(row).and_then(|row| row.as_mut().get_mut(self.column..));
         if let Some(to) = to.and_then(|to| to.first_chunk_mut()) {
-            *to = *packet;
+            *to = *panel_row;
         }
     }
 }
@@ -245,14 +245,14 @@ pub(in crate::irk) fn columns<E: Plain, R: Array<E>, const W: usize>(
     }
 }
 
-/// `packet += G` of a curved variable.
+/// `panel_row += G` of a curved variable.
 #[inline(always)]
 pub(in crate::irk) fn add_stages<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
+    panel_row: &mut PanelRow<E, S, W>,
     g: &[[E; W]],
     curved: usize,
 ) {
-    for (stage, row) in packet.iter_mut().enumerate() {
+    for (stage, row) in panel_row.iter_mut().enumerate() {
         if let Some(g) = g.get(row_of::<M, E, S>(curved, stage)) {
             A::subtract_row(row, E::from_f64(-1.0), g);
         }

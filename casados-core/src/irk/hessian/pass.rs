@@ -195,7 +195,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
                 model: PhantomData,
             });
         }
-        if const { !M::STRUCTURE.lone.is_empty() } {
+        if const { !M::STRUCTURE.diagonal_controls.is_empty() } {
             dispatch(Diagonal::<M, E, ArrayC<M, E>, S> { entries, sum, model: PhantomData });
         }
     }

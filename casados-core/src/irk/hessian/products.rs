@@ -122,8 +122,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
 }
 
 /// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each
-/// tile is in registers while it goes through all variables at all stages, in as many strands as
-/// hide how long an addition takes. Above the diagonal it writes what nobody reads.
+/// tile is in registers while it goes through all variables at all stages, in as many accumulators
+/// as hide how long an addition takes. Above the diagonal it writes what nobody reads.
 #[inline(always)]
 fn tiles<
     A: Arithmetic,
@@ -142,14 +142,14 @@ fn tiles<
     [row, column]: [usize; 2],
 ) {
     for t in 0..V / ROWS {
-        let mut strands = [[[[E::from_f64(0.0); W]; P]; ROWS]; STRANDS];
+        let mut accumulators = [[[[E::from_f64(0.0); W]; P]; ROWS]; STRANDS];
         let ((d, last_d), (g, last_g)) = (d.as_chunks::<STRANDS>(), g.as_chunks::<STRANDS>());
         for (d, g) in d.iter().zip(g) {
-            for ((tile, d), g) in strands.iter_mut().zip(d).zip(g) {
+            for ((tile, d), g) in accumulators.iter_mut().zip(d).zip(g) {
                 subtract_outer::<A, E, V, ROWS, W, P>(tile, d, g, t);
             }
         }
-        let Some((tile, others)) = strands.split_first_mut() else { return };
+        let Some((tile, others)) = accumulators.split_first_mut() else { return };
         for (d, g) in last_d.iter().zip(last_g) {
             subtract_outer::<A, E, V, ROWS, W, P>(tile, d, g, t);
         }

@@ -111,25 +111,30 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         g: &mut [[[[E; W]; P]; L]],
         row: usize,
     ) -> &'static [Term] {
-        let mut packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
+        let mut panel_rows = [[[[E::from_f64(0.0); W]; P]; L]; N];
         let Some(&first) = terms.get(row) else { return &[] };
         while let Some((now, rest)) = terms.split_first_chunk::<R>()
             && let Some(term) = now.get(row)
             && term.row == first.row
         {
             if let Some(values) = self.entries.get(term.entry as usize) {
-                for (group, (packet, of_d)) in packets.iter_mut().zip(self.d).enumerate() {
+                for (group, (panel_row, of_d)) in panel_rows.iter_mut().zip(self.d).enumerate() {
                     for (p, d) in of_d.iter().enumerate() {
                         let Some(d) = d.get(term.column as usize) else { continue };
-                        subtract_stages::<A, E, L, W, P>(packet, p, from(values, self.stage + group * L), d);
+                        subtract_stages::<A, E, L, W, P>(
+                            panel_row,
+                            p,
+                            from(values, self.stage + group * L),
+                            d,
+                        );
                     }
                 }
             }
             terms = rest;
         }
-        for (group, packet) in packets.iter().enumerate() {
+        for (group, panel_row) in panel_rows.iter().enumerate() {
             if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + first.row as usize) {
-                *to = *packet;
+                *to = *panel_row;
             }
         }
         terms
@@ -163,7 +168,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
         of_d: &[&[[[E; W]; L]]; P],
         [stage, part, of_values]: [usize; 3],
     ) -> &'static [Term] {
-        let mut packets = [[[[E::from_f64(0.0); C]; P]; K]; R];
+        let mut panel_rows = [[[[E::from_f64(0.0); C]; P]; K]; R];
         let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
         while let Some((now, rest)) = terms.split_first_chunk::<R>()
             && now[0].row == rows[0].row
@@ -178,24 +183,24 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
                     }
                 }
             }
-            for (term, packets) in now.iter().zip(&mut packets) {
+            for (term, panel_rows) in now.iter().zip(&mut panel_rows) {
                 let Some(values) = self.entries.get(term.entry as usize) else { continue };
-                for ((packets, &value), factors) in
-                    packets.iter_mut().zip(from(values, of_values)).zip(&factors)
+                for ((panel_rows, &value), factors) in
+                    panel_rows.iter_mut().zip(from(values, of_values)).zip(&factors)
                 {
-                    for (packet, factors) in packets.iter_mut().zip(factors) {
-                        A::subtract_row(packet, value, factors);
+                    for (panel_row, factors) in panel_rows.iter_mut().zip(factors) {
+                        A::subtract_row(panel_row, value, factors);
                     }
                 }
             }
             terms = rest;
         }
-        for (term, packets) in rows.iter().zip(&packets) {
+        for (term, panel_rows) in rows.iter().zip(&panel_rows) {
             let Some(to) = g.get_mut(term.row as usize) else { continue };
             let Some(to) = to.as_chunks_mut::<K>().0.get_mut(stage) else { continue };
-            for (to, packets) in to.as_flattened_mut().iter_mut().zip(packets.as_flattened()) {
+            for (to, panel_rows) in to.as_flattened_mut().iter_mut().zip(panel_rows.as_flattened()) {
                 if let Some(to) = to.as_chunks_mut::<C>().0.get_mut(part) {
-                    *to = *packets;
+                    *to = *panel_rows;
                 }
             }
         }
@@ -203,24 +208,24 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     }
 }
 
-/// `packet − values d` at `N` stages, in one of `P` panels.
+/// `panel_row − values d` at `N` stages, in one of `P` panels.
 #[inline(always)]
 fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, const P: usize>(
-    packet: &mut [[[E; W]; P]; N],
+    panel_row: &mut [[[E; W]; P]; N],
     p: usize,
     values: &[E],
     d: &[[E; W]; N],
 ) {
     if const { W == 1 && P == 1 }
-        && let Some(packet) = packet.as_flattened_mut().as_flattened_mut().first_chunk_mut::<N>()
+        && let Some(panel_row) = panel_row.as_flattened_mut().as_flattened_mut().first_chunk_mut::<N>()
         && let (Some(values), Some(d)) = (values.first_chunk(), d.as_flattened().first_chunk())
     {
         // The stages of one column side by side.
-        A::subtract_products(packet, values, d);
+        A::subtract_products(panel_row, values, d);
         return;
     }
-    for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
-        A::subtract_row(&mut packet[p], value, d);
+    for ((panel_row, &value), d) in panel_row.iter_mut().zip(values).zip(d) {
+        A::subtract_row(&mut panel_row[p], value, d);
     }
 }
 

@@ -20,7 +20,7 @@ use crate::irk::directions::Directions;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, dispatch, each_row, kinematic, minus_ha, slot,
+    Arithmetic, AtRow, Block, Kernel, PanelRow, Visitor, dispatch, each_row, kinematic, minus_ha, slot,
     subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
@@ -99,7 +99,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     pub(super) fn solve<const W: usize>(
         &self,
         (coefficients, h): (&Coefficients<E, S>, E),
-        b: &mut ArrayK<M, Packet<E, S, W>>,
+        b: &mut ArrayK<M, PanelRow<E, S, W>>,
     ) {
         if const { !is_any::<M>() } {
             return self.factors.solve(b);
@@ -114,7 +114,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     pub(super) fn solve_transposed<const W: usize>(
         &self,
         (coefficients, h): (&Coefficients<E, S>, E),
-        b: &mut ArrayK<M, Packet<E, S, W>>,
+        b: &mut ArrayK<M, PanelRow<E, S, W>>,
     ) {
         if const { !is_any::<M>() } {
             return self.factors.solve_transposed(b);
@@ -137,7 +137,7 @@ struct Around<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: 
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
-    rows: &'a mut [Packet<E, S, W>],
+    rows: &'a mut [PanelRow<E, S, W>],
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
@@ -157,7 +157,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
 pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8>(
     jacobian: &M::Jacobian<[E; S]>,
     minus_ha: &Block<E, S>,
-    rows: &mut [Packet<E, S, W>],
+    rows: &mut [PanelRow<E, S, W>],
 ) {
     if rows.len() != M::Shape::NK {
         return;
@@ -174,9 +174,9 @@ pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: u
 struct Rows<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
     jacobian: &'a M::Jacobian<[E; S]>,
     minus_ha: Block<E, S>,
-    rows: &'a mut [Packet<E, S, W>],
+    rows: &'a mut [PanelRow<E, S, W>],
     /// What is known of a state between the first and the last entry by which others depend on it.
-    sum: Packet<E, S, W>,
+    sum: PanelRow<E, S, W>,
 }
 
 /// About how many instructions a product with `hA` takes.
@@ -286,7 +286,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
 
     /// Writes `V_q + h c_i c V_v`, what entries of `f_q` multiply, to the rows of the states.
     #[inline(always)]
-    pub fn place<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [Packet<E, S, W>]) {
+    pub fn place<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [PanelRow<E, S, W>]) {
         for state in 0..count::<M>() {
             let Some(of) = kinematic::<M>(state) else { continue };
             let (own, Some(v), Some(to)) = (self.own::<A>(of), self.v.get(state), rows.get_mut(state)) else {
@@ -302,7 +302,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
 
     /// Subtracts `f_q̇ c V_v` from the equations that depend on derivatives.
     #[inline(always)]
-    pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [Packet<E, S, W>]) {
+    pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [PanelRow<E, S, W>]) {
         if const { !depend_on_derivatives::<M>() } {
             return;
         }
@@ -323,7 +323,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
     pub fn reconstruct<A: Arithmetic>(
         &self,
         minus_ha: &Block<E, S>,
-        rows: &mut [Packet<E, S, W>],
+        rows: &mut [PanelRow<E, S, W>],
         visitor: &mut impl Visitor<E, S, W>,
     ) {
         each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, visitor });
@@ -334,7 +334,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
 struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
     of: &'b KinematicPanel<'a, M, E, D, S, W>,
     minus_ha: &'b Block<E, S>,
-    rows: &'b mut [Packet<E, S, W>],
+    rows: &'b mut [PanelRow<E, S, W>],
     visitor: &'b mut V,
 }
 
@@ -347,23 +347,23 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, co
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Self { of: forward, minus_ha, rows, visitor } = self;
         let Some(of) = kinematic::<M>(state) else { return };
-        let mut packet = [[E::from_f64(0.0); W]; S];
+        let mut panel_row = [[E::from_f64(0.0); W]; S];
         match (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian)) {
             (Some(velocity), Some(minus_c)) => {
                 if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity)) {
-                    packet = [*v; S];
-                    subtract::<A, E, S, W>(&mut packet, minus_ha, dk);
+                    panel_row = [*v; S];
+                    subtract::<A, E, S, W>(&mut panel_row, minus_ha, dk);
                 }
                 each!(i < S => {
-                    each!(w < W => { packet[i][w] = -(minus_c * packet[i][w]); });
+                    each!(w < W => { panel_row[i][w] = -(minus_c * panel_row[i][w]); });
                 });
             }
-            _ => packet = [forward.own::<A>(of); S],
+            _ => panel_row = [forward.own::<A>(of); S],
         }
         if let Some(row) = rows.get_mut(state) {
-            *row = packet;
+            *row = panel_row;
         }
-        visitor.on_solved::<A>(state, &packet);
+        visitor.on_solved::<A>(state, &panel_row);
     }
 }
 

@@ -147,7 +147,7 @@ fn subtract<E: Lanes, const S: usize, const N: usize>(
     }
 }
 
-/// What is known of the increments of some unknowns, in `N` strands.
+/// What is known of the increments of some unknowns, in `N` accumulators.
 struct Increments<E, const N: usize> {
     largest: [E; N],
     /// By how much one, and the one that is expected next, is too large; not positive if that is

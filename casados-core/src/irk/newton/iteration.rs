@@ -37,7 +37,7 @@ use super::rejection::grows_much;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{Eigenbasis, dispatch};
-use crate::memory::{Fallback, Kept};
+use crate::memory::{Fallback, OptionalPlace};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::Lanes;
@@ -364,7 +364,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// Whether stages may share a Jacobian: of one stage or two there is no eigenbasis. A single
     /// step starts near its solution, where that saves little in small models.
-    const SHARES: bool = S > 2 && F::KEPT && (F::INTERVALS || !Policy::<M, E, S>::EXACT);
+    const SHARES: bool = S > 2 && F::HAS_MEMORY && (F::INTERVALS || !Policy::<M, E, S>::EXACT);
 
     /// Factors of the shared Jacobian, if there is memory for them.
     #[inline(always)]

@@ -6,7 +6,7 @@
 //! Jacobian of its own, the residual that it leaves tells. A new one, with three stages or more, is
 //! shared by the stages: their mean, or that in their middle where they are not evaluated side by
 //! side. Its system is solved in the eigenbasis of the tableau, in numbers that may be
-//! [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for each stage.
+//! [demoted](Lanes::Demoted): it costs a fraction of one with a Jacobian for each stage.
 
 use super::convergence::{Status, remaining};
 use crate::irk::workspace::Validity;

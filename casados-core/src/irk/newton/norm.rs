@@ -64,7 +64,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     }
 }
 
-/// What is known of the relative size of the increments of some unknowns, in `N` strands.
+/// What is known of the relative size of the increments of some unknowns, in `N` accumulators.
 struct Relative<E, const N: usize> {
     largest: [E; N],
     /// What is not a number is not lost in a sum.
@@ -200,7 +200,7 @@ pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
     of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
 }
 
-/// The largest of two strands, or what is not a number.
+/// The largest of two accumulators, or what is not a number.
 #[inline(always)]
 pub(super) fn larger_strand<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
     let total = sum + other;

@@ -16,7 +16,7 @@ mod lines;
 const UNROLLING: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
 /// So many chunks, and so many pivots, can be written one after the other.
-const MOST: usize = 48;
+const MAX_ROWS: usize = 48;
 
 /// So many rows.
 const MOST_ROWS: usize = 384;
@@ -211,7 +211,7 @@ const fn is_short_plan<A: Arithmetic, M: Dae>(updates: bool, instructions: usize
     let few = updates && instructions <= FEW;
     let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };
-    UNROLLING && A::UNROLLED && plan.pivots.len() <= MOST && count * instructions <= most
+    UNROLLING && A::UNROLLED && plan.pivots.len() <= MAX_ROWS && count * instructions <= most
 }
 
 /// How many blocks a pivot updates.

@@ -1,6 +1,6 @@
 //! Packets of right-hand sides, between memory and registers.
 
-use crate::linalg::block::{Packet, subtract};
+use crate::linalg::block::{PanelRow, subtract};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
 use crate::shape::{Array, Plain};
@@ -11,34 +11,34 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
-) -> Packet<E, S, W> {
-    let mut packet = [[E::from_f64(0.0); W]; S];
+) -> PanelRow<E, S, W> {
+    let mut panel_row = [[E::from_f64(0.0); W]; S];
     if let Some(row) = rows.get(slot) {
-        for (packet, row) in packet.iter_mut().zip(row) {
+        for (panel_row, row) in panel_row.iter_mut().zip(row) {
             if let Some(columns) = row.chunk(column) {
-                *packet = *columns;
+                *panel_row = *columns;
             }
         }
     }
-    packet
+    panel_row
 }
 
-/// `packet − block · other`, with the other in the memory.
+/// `panel_row − block · other`, with the other in the memory.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
+    panel_row: &mut PanelRow<E, S, W>,
     block: &Block<E, S>,
     other: &[R; S],
     column: usize,
 ) {
     if const { W == 1 || size_of::<E>() <= 8 } {
         let other = load(core::slice::from_ref(other), 0, column);
-        subtract::<A, E, S, W>(packet, block, &other);
+        subtract::<A, E, S, W>(panel_row, block, &other);
         return;
     }
     each!(k < S => {
         if let Some(other) = other[k].chunk(column) {
-            each!(i < S => { A::subtract_row(&mut packet[i], block[k][i], other); });
+            each!(i < S => { A::subtract_row(&mut panel_row[i], block[k][i], other); });
         }
     });
 }
@@ -65,12 +65,12 @@ pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &mut [[R; S]],
     slot: usize,
     column: usize,
-    packet: &Packet<E, S, W>,
+    panel_row: &PanelRow<E, S, W>,
 ) {
     if let Some(row) = rows.get_mut(slot) {
-        for (packet, row) in packet.iter().zip(row) {
+        for (panel_row, row) in panel_row.iter().zip(row) {
             if let Some(columns) = row.chunk_mut(column) {
-                *columns = *packet;
+                *columns = *panel_row;
             }
         }
     }

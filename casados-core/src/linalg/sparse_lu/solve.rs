@@ -7,7 +7,7 @@
 
 use super::factor::{Planned, blocks_with_slots, has_all};
 use super::micro_panel::{is_zero, load, store, subtract_of};
-use crate::linalg::block::{Packet, negate, subtract};
+use crate::linalg::block::{PanelRow, negate, subtract};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::prefetch::Ahead;
@@ -20,8 +20,8 @@ use core::marker::PhantomData;
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
 /// columns.
 ///
-/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of
-/// all rows stays in the nearest cache.
+/// Columns are taken in panel rows that fit registers, each through the whole elimination: a
+/// panel row of all rows stays in the nearest cache.
 pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -38,7 +38,7 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
 }
 
 /// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
-/// registers themselves two at a time, or the packet of all stages would not fit them.
+/// registers themselves two at a time, or the panel row of all stages would not fit them.
 struct Solve<'a, M, E, R, First, Second, const S: usize> {
     factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
@@ -77,11 +77,11 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, First: System, Second: System, const
     }
 }
 
-/// Who is present while packets are solved. What is here is to be `#[inline(always)]`.
+/// Who is present while panel rows are solved. What is here is to be `#[inline(always)]`.
 pub trait Visitor<E, const S: usize, const W: usize> {
     /// Sees an unknown that has just been found, but not of a transposed system.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn on_solved<A: Arithmetic>(&mut self, _slot: usize, _packet: &Packet<E, S, W>) {}
+    fn on_solved<A: Arithmetic>(&mut self, _slot: usize, _packet: &PanelRow<E, S, W>) {}
     /// A pivot of the second system is done.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pass(&mut self) {}
@@ -232,14 +232,14 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
             return;
         }
         // Directions that have not reached this unknown, as at the start of an interval. Of
-        // registers the memory is asked: a packet of which single elements are looked at is not
-        // kept in registers. Of numbers the packet is, all of it at once.
+        // registers the memory is asked: a panel row of which single elements are looked at is not
+        // kept in registers. Of numbers the panel row is, all of it at once.
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
-        let packet = load::<E, R, S, W>(rows, slot, *column);
+        let panel_row = load::<E, R, S, W>(rows, slot, *column);
         if const { W > 1 && size_of::<E>() <= 8 }
-            && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0))
+            && panel_row.as_flattened().iter().all(|element| *element == E::from_f64(0.0))
         {
             return;
         }
@@ -248,7 +248,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
                 continue;
             }
             let mut target = load(rows, other, *column);
-            subtract::<A, E, S, W>(&mut target, block, &packet);
+            subtract::<A, E, S, W>(&mut target, block, &panel_row);
             store(rows, other, *column, &target);
         }
     }
@@ -261,13 +261,13 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         if slot >= rows.len() || pivot.left().is_empty() {
             return;
         }
-        let mut packet = load(rows, slot, *column);
+        let mut panel_row = load(rows, slot, *column);
         for left in M::STRUCTURE.elimination.left.get(pivot.left()).unwrap_or_default() {
             let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
             let (Some(block), Some(other)) = (block, other) else { continue };
-            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+            subtract_of::<A, E, R, S, W>(&mut panel_row, block, other, *column);
         }
-        store(rows, slot, *column, &packet);
+        store(rows, slot, *column, &panel_row);
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -276,26 +276,26 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
         if pivot.slot as usize >= rows.len() {
             return;
         }
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             let Some(other) = rows.get(other) else { continue };
-            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+            subtract_of::<A, E, R, S, W>(&mut panel_row, block, other, *column);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
-            // Of one number the inverse: the packet then stays in its registers.
+            // Of one number the inverse: the panel row then stays in its registers.
             if const { S == 1 } {
                 let mut inverse = *inverse;
                 negate(&mut inverse);
-                subtract::<A, E, S, W>(&mut solution, &inverse, &packet);
+                subtract::<A, E, S, W>(&mut solution, &inverse, &panel_row);
             } else {
-                negate(&mut packet);
-                subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+                negate(&mut panel_row);
+                subtract::<A, E, S, W>(&mut solution, inverse, &panel_row);
             }
-            packet = solution;
+            panel_row = solution;
         }
-        store(rows, pivot.slot as usize, *column, &packet);
-        visitor.on_solved::<A>(pivot.slot as usize, &packet);
+        store(rows, pivot.slot as usize, *column, &panel_row);
+        visitor.on_solved::<A>(pivot.slot as usize, &panel_row);
     }
 }
 

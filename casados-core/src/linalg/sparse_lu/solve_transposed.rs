@@ -23,20 +23,20 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         if pivot.slot as usize >= rows.len() {
             return;
         }
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
-            negate(&mut packet);
-            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
-            packet = solution;
-            store(rows, pivot.slot as usize, *column, &packet);
+            negate(&mut panel_row);
+            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &panel_row);
+            panel_row = solution;
+            store(rows, pivot.slot as usize, *column, &panel_row);
         }
         for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             if other >= rows.len() {
                 continue;
             }
             let mut target = load(rows, other, *column);
-            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
+            subtract_transposed::<A, E, S, W>(&mut target, block, &panel_row);
             store(rows, other, *column, &target);
         }
     }
@@ -51,16 +51,16 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         if pivot.slot as usize >= rows.len() {
             return;
         }
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for index in pivot.lower().rev() {
             let Some((block, other)) = one(*factors, index) else { continue };
             if other >= rows.len() {
                 continue;
             }
             let other = load(rows, other, *column);
-            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+            subtract_transposed::<A, E, S, W>(&mut panel_row, block, &other);
         }
-        store(rows, pivot.slot as usize, *column, &packet);
+        store(rows, pivot.slot as usize, *column, &panel_row);
     }
 
     /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
@@ -73,8 +73,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         }
         let mut slots = M::STRUCTURE.elimination.slots.get(pivot.lower()).unwrap_or_default();
         let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
-        let mut packet = load::<E, R, S, W>(rows, slot, *column);
-        let mut strand = [[E::from_f64(0.0); W]; S];
+        let mut panel_row = load::<E, R, S, W>(rows, slot, *column);
+        let mut accumulator = [[E::from_f64(0.0); W]; S];
         while let Some((rest, [block, last])) = blocks.split_last_chunk()
             && let Some((rest_of_slots, &[other, of_last])) = slots.split_last_chunk()
         {
@@ -83,20 +83,20 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
                 continue;
             }
             let of_last = load(rows, of_last as usize, *column);
-            subtract_transposed::<A, E, S, W>(&mut packet, last, &of_last);
+            subtract_transposed::<A, E, S, W>(&mut panel_row, last, &of_last);
             let other = load(rows, other as usize, *column);
-            subtract_transposed::<A, E, S, W>(&mut strand, block, &other);
+            subtract_transposed::<A, E, S, W>(&mut accumulator, block, &other);
         }
         if let ([block], &[other]) = (blocks, slots)
             && (other as usize) < rows.len()
         {
             let other = load(rows, other as usize, *column);
-            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+            subtract_transposed::<A, E, S, W>(&mut panel_row, block, &other);
         }
-        for (row, strand) in packet.iter_mut().zip(&strand) {
-            A::subtract_row(row, E::from_f64(-1.0), strand);
+        for (row, accumulator) in panel_row.iter_mut().zip(&accumulator) {
+            A::subtract_row(row, E::from_f64(-1.0), accumulator);
         }
-        store(rows, slot, *column, &packet);
+        store(rows, slot, *column, &panel_row);
     }
 }
 

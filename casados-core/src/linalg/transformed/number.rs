@@ -4,10 +4,10 @@ use super::complex::Complex;
 use crate::scalar::Lanes;
 
 /// What systems in the eigenbasis are solved with.
-pub(in crate::linalg) type Number<E, const S: usize> = Complex<<E as Lanes>::Coarse, S>;
+pub(in crate::linalg) type Number<E, const S: usize> = Complex<<E as Lanes>::Demoted, S>;
 
 /// With half of the digits.
 #[inline(always)]
-pub(in crate::linalg) fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
-    Complex { parts: number.parts.map(T::coarse) }
+pub(in crate::linalg) fn demote<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
+    Complex { parts: number.parts.map(T::demote) }
 }

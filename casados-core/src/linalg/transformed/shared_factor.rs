@@ -1,10 +1,10 @@
 //! Factors of the shared Jacobian of the stages, in the eigenbasis of the tableau, of
-//! [coarse](Lanes::Coarse) numbers: increments that they give are corrected by the next iteration
+//! [demoted](Lanes::Demoted) numbers: increments that they give are corrected by the next iteration
 //! in any case.
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
-use super::number::{Number, coarse};
+use super::number::{Number, demote};
 use super::shared_solve::Solve;
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
@@ -77,7 +77,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, values, h, blocks } = self;
         let (scale, share) = (values.scaled(h), E::from_f64(Rows::<M, E, S, FIRST_ONLY>::SHARE));
-        let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(coarse);
+        let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(demote);
         each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { jacobian, scales, blocks });
     }
 }
@@ -111,9 +111,9 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_
                 value = -(minus_c[0] * value);
             }
             element = match of.order {
-                0 => element.plus((E::from_f64(Self::SHARE) * value).coarse()),
-                1 => element + scale.scaled(value.coarse()),
-                _ => element + square.scaled(value.coarse()),
+                0 => element.plus((E::from_f64(Self::SHARE) * value).demote()),
+                1 => element + scale.scaled(value.demote()),
+                _ => element + square.scaled(value.demote()),
             };
         }
         *to = element;

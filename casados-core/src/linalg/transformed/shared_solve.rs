@@ -6,7 +6,7 @@
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
-use super::number::{Number, coarse};
+use super::number::{Number, demote};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::Kernel;
 use crate::linalg::kernel::unroll::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
@@ -67,7 +67,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
         let mut sums = [Complex::zero(); P];
         for (sum, pivot) in sums.iter_mut().zip(pivots) {
             if let Some(f) = self.f.as_ref().get(pivot.equation as usize) {
-                *sum = coarse(self.basis.split::<A>(f));
+                *sum = demote(self.basis.split::<A>(f));
             }
         }
         for left in M::STRUCTURE.elimination.left.get(pivots[0].left()).unwrap_or_default() {
@@ -135,7 +135,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
                 *row = sum;
             }
             if let Some(solution) = self.solution.as_mut().get_mut(slot) {
-                let sum = Complex { parts: sum.parts.map(E::fine) };
+                let sum = Complex { parts: sum.parts.map(E::promote) };
                 solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&sum));
             }
         }

@@ -49,13 +49,13 @@ impl core::ops::AddAssign for Measure {
 /// Whether a step of this length is expected to make the objective far smaller than there is
 /// violation: then the objective decides (equation (19)).
 pub(in crate::ocp) fn objective_decides(length: f64, slope: f64, violation: f64) -> bool {
-    slope < 0.0 && length * Scalar::powf(-slope, POWER_OBJECTIVE) > Scalar::powf(violation, POWER_VIOLATION)
+    slope < 0.0 && length * Scalar::powf(-slope, S_PHI) > Scalar::powf(violation, S_THETA)
 }
 
 /// `s_φ`
-pub(in crate::ocp) const POWER_OBJECTIVE: f64 = 2.3;
+pub(in crate::ocp) const S_PHI: f64 = 2.3;
 /// `s_θ`
-pub(in crate::ocp) const POWER_VIOLATION: f64 = 1.1;
+pub(in crate::ocp) const S_THETA: f64 = 1.1;
 /// `γ_θ`
 pub(in crate::ocp) const GAMMA_THETA: f64 = 1e-5;
 /// Entries; the oldest one is forgotten when there are more.

@@ -11,14 +11,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Linearises at the guess; where something has no value there, at the point nearest to it that
     /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
     ///
+    /// Where the gradient of a violated constraint vanishes, the start is a point beside it.
+    /// Whether it is.
+    ///
     /// # Errors
     /// That at the guess, if there is none at that point either.
     pub(in crate::ocp) fn linearise_guess<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
         copy: &mut Solution<T, D, M>,
-    ) -> Result<(), OcpError> {
-        let Err(error) = self.linearise(curvature) else { return Ok(()) };
+    ) -> Result<bool, OcpError> {
+        let Err(error) = self.linearise(curvature) else {
+            return self.leave_degenerate_start(copy, |ocp| ocp.linearise(curvature));
+        };
         if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {
             return Err(error);
         }
@@ -28,7 +33,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if result.is_err() {
             self.iterate.copy_from(copy);
         }
-        result.map_err(|_| error)
+        result.map(|()| false).map_err(|_| error)
     }
 
     /// Moves states and controls of the iterate into their bounds.

@@ -1,6 +1,8 @@
 //! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), and
 //! what both of them use.
 
+pub(in crate::ocp) mod consistency;
+mod degenerate;
 pub(in crate::ocp) mod elastic;
 pub(in crate::ocp) mod filter;
 pub(in crate::ocp) mod guess;

@@ -15,9 +15,9 @@ use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
 /// A run begins again at a simulation that violates less than this part of what its iterate does.
-pub(in crate::ocp) const BETTER: f64 = 0.5;
+pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
 /// It asks for one after so many steps in a row that lead nowhere.
-pub(in crate::ocp) const STRAYING: usize = 16;
+pub(in crate::ocp) const RESTART_AFTER: usize = 16;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes a guess the iterate, moved into its bounds, with the states that follow from its

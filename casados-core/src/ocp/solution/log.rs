@@ -82,6 +82,9 @@ pub struct Iteration {
     pub elastic: bool,
     /// Whether the step has a second-order correction.
     pub corrected: bool,
+    /// Whether the start is a point beside the guess, where the gradient of a violated constraint
+    /// vanishes. Said of the first iteration.
+    pub perturbed: bool,
     /// The barrier parameter `μ`; zero in sequential quadratic programming.
     pub barrier: f64,
     /// How long it took.
@@ -179,6 +182,12 @@ impl fmt::Display for Log<'_> {
         }
         if self.0.iter().any(|i| i.corrected && !i.elastic) {
             writeln!(f, "s: the step has a second-order correction of the constraints")?;
+        }
+        if self.0.iter().any(|i| i.perturbed) {
+            writeln!(
+                f,
+                "warning: the gradient of a violated constraint vanishes at the guess; the start is beside it"
+            )?;
         }
         Ok(())
     }

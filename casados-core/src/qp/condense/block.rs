@@ -2,7 +2,7 @@
 
 use super::plan::{Kind, Origin, blocks, limits};
 use crate::qp::element::{get, set};
-use crate::qp::interior::{Columns, MORE, Part, Source, product, subtract};
+use crate::qp::interior::{Columns, PADDING_COLUMNS, Part, Source, product, subtract};
 use crate::qp::layout::{Places, StageDims, StageOffsets, assign, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::Row;
@@ -40,7 +40,7 @@ pub struct Largest {
 impl<'a, T: Real> Work<'a, T> {
     pub fn lengths(largest: &Largest) -> [usize; 10] {
         let (ld, ld_x, ld_z) = (pad::<T>(largest.n), pad::<T>(largest.nx), pad::<T>(largest.rows));
-        let n = largest.n + MORE;
+        let n = largest.n + PADDING_COLUMNS;
         [ld_z * n, ld_z * n, ld_x * n, ld * n, ld * n, ld * n, ld_z, ld, ld, ld_x]
     }
     pub fn new(largest: &Largest, mut memory: &'a mut [T]) -> Self {

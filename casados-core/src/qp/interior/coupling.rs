@@ -3,7 +3,7 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
-use super::kernels::MORE;
+use super::kernels::PADDING_COLUMNS;
 use super::riccati::{Extent, First};
 use super::vector::{add_scaled, shrink};
 use crate::qp::element::set;
@@ -71,7 +71,7 @@ impl<'a, T: Real> Coupling<'a, T> {
     pub const fn memory(dims: &[StageDims], conditions: usize, shared: usize) -> usize {
         let Extent { n, nx, end, .. } = Extent::of::<T>(dims);
         let count = conditions + shared;
-        let columns = n + MORE + nx + 1 + count + MORE + end.v;
+        let columns = n + PADDING_COLUMNS + nx + 1 + count + PADDING_COLUMNS + end.v;
         let (first, border) = (first_nx(dims), first_nx(dims) + count);
         pad::<T>(count) * columns
             + 2 * conditions
@@ -112,9 +112,9 @@ impl<'a, T: Real> Coupling<'a, T> {
             theta: take_mut(memory, conditions),
             step: take_mut(memory, count),
             columns: take_mut(memory, parameters * v),
-            schur: take_mut(memory, ld * (count + MORE)),
+            schur: take_mut(memory, ld * (count + PADDING_COLUMNS)),
             linear: take_mut(memory, count),
-            gamma: take_mut(memory, ld * (extent.n + MORE)),
+            gamma: take_mut(memory, ld * (extent.n + PADDING_COLUMNS)),
             minus: take_mut(memory, ld * extent.nx),
             offset: take_mut(memory, ld),
             eliminated: take_mut(memory, ld * v),

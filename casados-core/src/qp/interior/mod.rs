@@ -29,7 +29,7 @@ pub(crate) use kernels::{
     Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
 };
 #[cfg(feature = "alloc")]
-pub(super) use kernels::{MORE, Part, Source, product};
+pub(super) use kernels::{PADDING_COLUMNS, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub(crate) use riccati::{Extent, First};
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed};

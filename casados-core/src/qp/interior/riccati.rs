@@ -10,7 +10,7 @@
 //! stage are few, so that this classical form needs less than the one with the square root of `P`.
 
 use super::cholesky::{eliminate, substitute};
-use super::kernels::{Columns, MORE, add_transposed, subtract};
+use super::kernels::{Columns, PADDING_COLUMNS, add_transposed, subtract};
 use super::shared::Shared;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Places, StageDims, StageOffsets, assign, end, pad, part, part_mut, take_mut};
@@ -103,16 +103,18 @@ impl<'a, T: Real> Riccati<'a, T> {
     /// How many numbers it takes.
     pub const fn memory(dims: &[StageDims]) -> usize {
         let Extent { n, ld, nx, next_and_ng, end } = Extent::of::<T>(dims);
-        let matrices = ld * (n + MORE) + ld * (next_and_ng + MORE) + pad::<T>(nx) * (nx + MORE);
+        let matrices = ld * (n + PADDING_COLUMNS)
+            + ld * (next_and_ng + PADDING_COLUMNS)
+            + pad::<T>(nx) * (nx + PADDING_COLUMNS);
         matrices + end.factor + 3 * end.v + end.dynamics + ld + pad::<T>(next_and_ng)
     }
     /// In memory that is zero.
     pub fn new(extent: &Extent, memory: &mut &'a mut [T]) -> Self {
         let Extent { n, ld, nx, next_and_ng, end } = *extent;
         Self {
-            m: take_mut(memory, ld * (n + MORE)),
-            w: take_mut(memory, ld * (next_and_ng + MORE)),
-            p: take_mut(memory, pad::<T>(nx) * (nx + MORE)),
+            m: take_mut(memory, ld * (n + PADDING_COLUMNS)),
+            w: take_mut(memory, ld * (next_and_ng + PADDING_COLUMNS)),
+            p: take_mut(memory, pad::<T>(nx) * (nx + PADDING_COLUMNS)),
             panels: take_mut(memory, end.factor),
             inverse: take_mut(memory, end.v),
             added: take_mut(memory, end.v),

@@ -34,9 +34,9 @@ pub(super) fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
 }
 
 /// A type of numbers: its documentation, its name, the type of one lane, the module of its
-/// instructions, the macro of its elementary functions, and that of its coarse numbers.
+/// instructions, the macro of its elementary functions, and that of its demoted numbers.
 macro_rules! register {
-    ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $coarse:ident) => {
+    ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $demote:ident) => {
         $(#[$attribute])*
         #[derive(Clone, Copy)]
         #[repr(transparent)]
@@ -232,7 +232,7 @@ macro_rules! register {
             const EPSILON: f64 = <$element as Lanes>::EPSILON;
             const STAGNATION: f64 = <$element as Lanes>::STAGNATION;
             const SMALLEST: f64 = <$element as Lanes>::SMALLEST;
-            $coarse!();
+            $demote!();
 
             #[inline(always)]
             fn lane(cell: &Self::Cell, lane: usize) -> f64 {

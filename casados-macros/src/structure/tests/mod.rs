@@ -154,7 +154,7 @@ fn facts() {
         // x₀, x₁, u₀ and p₀; neither x₂ nor u₁.
         directions: vec![0, 1, 3, 5],
         curved: vec![3, 9],
-        lone: vec![],
+        diagonal_controls: vec![],
     };
     assert_eq!(build(true, true), expected);
     let straight = Facts { linear_in_state: true, ..expected.clone() };
@@ -207,10 +207,10 @@ fn squares_of_what_is_a_multiple_of_others() {
         .facts
     };
     let alone = facts(false);
-    assert_eq!((alone.curved, alone.lone), (vec![0, 1, 3], vec![(3, 2)]));
+    assert_eq!((alone.curved, alone.diagonal_controls), (vec![0, 1, 3], vec![(3, 2)]));
     // u x₀ needs both.
     let together = facts(true);
-    assert_eq!((together.curved, together.lone), (vec![0, 1, 2, 3, 5], Vec::new()));
+    assert_eq!((together.curved, together.diagonal_controls), (vec![0, 1, 2, 3, 5], Vec::new()));
 }
 
 /// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of

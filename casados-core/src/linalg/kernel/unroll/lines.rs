@@ -137,7 +137,7 @@ pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V
 
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
-    use super::super::MOST;
+    use super::super::MAX_ROWS;
     use super::*;
     use crate::linalg::kernel::arithmetic::Separate;
     use alloc::vec::Vec;
@@ -165,7 +165,7 @@ mod tests {
         rows::<1>();
         rows::<CHUNK>();
         rows::<{ CHUNK + 1 }>();
-        rows::<{ MOST * CHUNK - 1 }>();
-        rows::<{ MOST * CHUNK }>();
+        rows::<{ MAX_ROWS * CHUNK - 1 }>();
+        rows::<{ MAX_ROWS * CHUNK }>();
     }
 }

@@ -31,18 +31,18 @@ pub enum Barrier {
 }
 
 /// So many errors are remembered.
-const REMEMBERED: usize = 4;
+const KKT_ERROR_RED_ITERS: usize = 4;
 /// `κ`: an error is to be below this part of the largest of them.
-const PROGRESS: f64 = 0.9999;
+const KKT_ERROR_RED_FACT: f64 = 0.9999;
 /// So many steps without regularisation, one after the other, end a monotone phase.
-const CONVEX: usize = 3;
+const CONVEX_STEPS: usize = 3;
 /// A monotone phase does not begin with less than this, or the mean product if that is less.
-const BEGIN: f64 = 0.1;
+const MONOTONE_MU: f64 = 0.1;
 
 /// What an adaptive barrier parameter follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
-    errors: [f64; REMEMBERED],
+    errors: [f64; KKT_ERROR_RED_ITERS],
     count: usize,
     /// Whether it may follow steps at all.
     adapts: bool,
@@ -56,7 +56,7 @@ impl Progress {
     /// Of a run that begins.
     pub fn new(barrier: Barrier) -> Self {
         let adapts = barrier == Barrier::Adaptive;
-        Self { errors: [0.0; REMEMBERED], count: 0, adapts, free: adapts, convex: 0 }
+        Self { errors: [0.0; KKT_ERROR_RED_ITERS], count: 0, adapts, free: adapts, convex: 0 }
     }
 
     /// Whether it may follow steps.
@@ -74,9 +74,9 @@ impl Progress {
     pub fn next(&mut self, mu: f64, error: impl Fn(f64) -> f64, mean: f64, tolerance: f64) -> f64 {
         let now = error(0.0);
         let largest = self.errors.iter().take(self.count).fold(0.0, |m: f64, &e| m.max(e));
-        let shrinks = self.count < REMEMBERED || now <= PROGRESS * largest;
-        if shrinks && (self.free || self.adapts && self.convex >= CONVEX) {
-            if let Some(error) = self.errors.get_mut(self.count % REMEMBERED) {
+        let shrinks = self.count < KKT_ERROR_RED_ITERS || now <= KKT_ERROR_RED_FACT * largest;
+        if shrinks && (self.free || self.adapts && self.convex >= CONVEX_STEPS) {
+            if let Some(error) = self.errors.get_mut(self.count % KKT_ERROR_RED_ITERS) {
                 *error = now;
             }
             self.count += 1;
@@ -101,7 +101,7 @@ impl Progress {
 
 /// `μ` of a monotone phase that begins.
 fn begin(mu: f64, mean: f64) -> f64 {
-    mu.max(mean.min(BEGIN))
+    mu.max(mean.min(MONOTONE_MU))
 }
 
 /// The mean of the products of slacks and multipliers.
@@ -116,11 +116,11 @@ pub(super) fn least(tolerance: f64) -> f64 {
 }
 
 /// `κ_ε`: a barrier problem is solved well enough where its error is below this times `μ`.
-const ENOUGH: f64 = 10.0;
+const KAPPA_EPSILON: f64 = 10.0;
 /// `κ_μ`
-const LINEAR: f64 = 0.2;
+const KAPPA_MU: f64 = 0.2;
 /// `θ_μ`
-const SUPERLINEAR: f64 = 1.5;
+const THETA_MU: f64 = 1.5;
 
 /// `E_μ`: the largest residual of the conditions of the barrier problem.
 pub(super) fn error(residuals: &Residuals, farthest: f64) -> f64 {
@@ -145,8 +145,8 @@ pub(super) fn residuals<T: Real>(sides: &Sides<'_, T>, mu: f64) -> (f64, f64) {
 /// The next `μ` where the error is small enough for it.
 pub(super) fn shrink(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64 {
     let (mut mu, least) = (mu, least(tolerance));
-    while mu > least && error(mu) <= ENOUGH * mu {
-        mu = (LINEAR * mu).min(Scalar::powf(mu, SUPERLINEAR)).max(least);
+    while mu > least && error(mu) <= KAPPA_EPSILON * mu {
+        mu = (KAPPA_MU * mu).min(Scalar::powf(mu, THETA_MU)).max(least);
     }
     mu
 }
@@ -162,7 +162,7 @@ pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
 /// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
 /// determine does not move: that multiplier would go by steps as small as the distance. Others
 /// take over its force.
-pub(super) fn release<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
+pub(super) fn reset_small_slacks<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
     let small = T::from_f64(small);
     for ((slack, multiplier), residual) in
         sides.slack.iter_mut().zip(&mut *sides.multiplier).zip(&mut *sides.residual)
@@ -176,7 +176,7 @@ pub(super) fn release<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
 }
 
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.
-const MULTIPLIERS: f64 = 1e10;
+const KAPPA_SIGMA: f64 = 1e10;
 
 /// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
 /// what its violation costs.
@@ -184,7 +184,7 @@ pub(super) fn keep_near_centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
     let count = sides.counts.sides();
     for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
         let centre = mu / slack.to_f64();
-        let clamped = multiplier.to_f64().clamp(centre / MULTIPLIERS, centre * MULTIPLIERS);
+        let clamped = multiplier.to_f64().clamp(centre / KAPPA_SIGMA, centre * KAPPA_SIGMA);
         *multiplier = T::from_f64(clamped);
     }
     let costs = sides.linear.iter().zip(&*sides.quadratic);

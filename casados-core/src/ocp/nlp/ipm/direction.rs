@@ -3,7 +3,7 @@
 use super::Ipm;
 use super::barrier;
 use super::kkt::lengths::Lengths;
-use super::kkt::newton::{again, attach, evaluate};
+use super::kkt::newton::{evaluate, kkt_view, resolve};
 use super::kkt::work::Work;
 use super::predictor;
 use super::state::State;
@@ -62,7 +62,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         Work::new(ocp.ends(), capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
         self.linearise(ocp, capacity, state)?;
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut view = solution.view_mut();
         evaluate(&mut iterate, &mut view);
         iterate.store(&mut view);
@@ -84,7 +84,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let force = state.lengths.sizes.force;
         let least = force * barrier::least(self.options.least_error(force));
         let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
-        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = units;
         let probes = state.progress.is_free();
         let aim = if probes { 0.0 } else { state.mu };
@@ -95,7 +95,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut is_corrected = false;
         if let Some(mu) = monotone {
             state.mu = mu * force;
-            again(&mut iterate, T::from_f64(state.mu), false)?;
+            resolve(&mut iterate, T::from_f64(state.mu), false)?;
         } else if probes {
             state.mu = predictor::probe(&iterate.sides, least);
             is_corrected = predictor::correct(&mut iterate, state.mu, force, state.violation)?;

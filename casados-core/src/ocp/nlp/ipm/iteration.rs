@@ -3,9 +3,9 @@
 use super::barrier;
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{again, attach, attach_to_new, dynamics_after, evaluate};
+use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, resolve};
 use super::kkt::scaling::{Relative, relative};
-use super::line_search::{Accepted, Expected, Found, Room, longest};
+use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
 use super::predictor::{self, needs_equal_steps};
 use super::state::{GAMMA_PHI, Next, State};
 
@@ -34,7 +34,7 @@ const EXACT: Exact = Exact { convexification: Convexification::None };
 
 /// A search direction, and how far it may be gone.
 struct Direction {
-    expected: Expected,
+    expected: FilterModel,
     tau: f64,
     primal: f64,
     dual: f64,
@@ -74,8 +74,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 return Ok(Some(status));
             }
         }
-        if state.is_held() {
-            self.release(ocp, state)?;
+        if state.is_complementarity_stalled() {
+            self.reset_small_slacks(ocp, state)?;
         }
         let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
@@ -96,7 +96,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             return Ok(Some(Status::OutOfTime));
         }
         let accepted = match self.search(ocp, capacity, state, &mut direction)? {
-            Found::OutOfTime => return Ok(Some(Status::OutOfTime)),
+            SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
             found => found.accepted(),
         };
         row.times.search = watch.lap();
@@ -104,7 +104,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             return Ok(self.recover(ocp, capacity, state));
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
-        state.count_straying(row.step);
+        state.count_stalled(row.step);
         state.regularisation.gone(accepted.alpha / direction.primal);
         self.accept(ocp, capacity, state, &direction, accepted)?;
         let least =
@@ -138,7 +138,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             ocp.forget_gradients();
         }
         let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
-        attach_to_new(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
+        kkt_view_of_new_qp(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
         Ok(())
     }
 
@@ -153,7 +153,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let (plain, [_, of_stages]) = (ocp.objective.to_f64(), ocp.stages.map(|left| left.to_f64()));
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
         let mut view = solution.view_mut();
         iterate.store(&mut view);
@@ -209,12 +209,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let lengths = state.lengths;
         let Self { trial, numbers, indices, work, .. } = self;
         let plain = if lengths.alone { 0.0 } else { ocp.objective.to_f64() };
-        let iterate = attach(ocp.qp.view(), &lengths, numbers, indices)?;
+        let iterate = kkt_view(ocp.qp.view(), &lengths, numbers, indices)?;
         let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
         let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
-            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
+            let mut room = LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut work };
             here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
         }
         if !state.has_filter {
@@ -239,9 +239,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         is_corrected: bool,
     ) -> Result<Direction, QpError> {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let first = state.first_violation.max(1.0);
-        let expected = Expected {
+        let expected = FilterModel {
             here,
             slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
             small_violation: state.small_violation,
@@ -266,27 +266,27 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         capacity: &Lengths,
         state: &mut State<'_>,
         direction: &mut Direction,
-    ) -> Result<Found, OcpError> {
+    ) -> Result<SearchOutcome, OcpError> {
         if direction.tiny {
-            return Ok(Found::Step(Accepted { alpha: direction.primal, corrected: false }));
+            return Ok(SearchOutcome::Step(Accepted { alpha: direction.primal, corrected: false }));
         }
         let lengths = state.lengths;
         macro_rules! room {
             ($work:ident) => {{
                 let Self { trial, numbers, indices, work, .. } = &mut *self;
                 $work = Work::new(ocp.ends(), capacity, work.as_mut());
-                Room { lengths: &lengths, numbers, indices, trial, work: &mut $work }
+                LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut $work }
             }};
         }
         let mut work;
         if direction.is_corrected {
             let Direction { expected, primal, .. } = direction;
             if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
-                return Ok(Found::Step(Accepted { alpha: *primal, corrected: false }));
+                return Ok(SearchOutcome::Step(Accepted { alpha: *primal, corrected: false }));
             }
             let here = direction.expected.here;
-            let mut iterate = attach(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
-            again(&mut iterate, T::from_f64(state.mu), false)?;
+            let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
+            resolve(&mut iterate, T::from_f64(state.mu), false)?;
             *direction = self.along(ocp, capacity, state, here, false)?;
             self.expand(ocp, state)?;
         }
@@ -305,7 +305,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = &*core::mem::take(&mut work.units);
         let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
         if corrected {

@@ -1,7 +1,7 @@
 //! Stages of intervals that are variables: they begin, go and stay with the iterate.
 
 use super::Ipm;
-use super::kkt::newton::attach;
+use super::kkt::newton::kkt_view;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, StageAction};
@@ -51,7 +51,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !P::Dynamics::LIFTED {
             return Ok(());
         }
-        let iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let to = self.trial.view_mut();
         for place in Places::<T>::new(iterate.qp.dims) {
             assign(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));

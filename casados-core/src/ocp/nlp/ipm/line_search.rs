@@ -2,32 +2,30 @@
 
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{attach, attach_to_new, evaluate_values};
+use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp};
 use super::kkt::work::Work;
 use super::state::{GAMMA_PHI, State};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::nlp::filter::{
-    Filter, GAMMA_THETA, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides,
-};
+use crate::ocp::nlp::filter::{Filter, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides};
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `η_φ`
-const ARMIJO: f64 = 1e-8;
+const ETA_PHI: f64 = 1e-8;
 /// `γ_α`
-const SAFETY: f64 = 0.05;
+const ALPHA_MIN_FRAC: f64 = 0.05;
 /// Corrections of one step.
-const CORRECTIONS: usize = 4;
+const MAX_SOC: usize = 4;
 /// `κ_soc`: a correction that leaves more of the violation is the last one.
-const CORRECTED: f64 = 0.99;
+const KAPPA_SOC: f64 = 0.99;
 
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
+pub(super) struct FilterModel {
     pub here: Measure,
     /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
@@ -40,7 +38,7 @@ pub(super) struct Expected {
     pub delta: f64,
 }
 
-impl Expected {
+impl FilterModel {
     /// Whether the barrier function decides after a step of this length.
     fn decides(&self, alpha: f64) -> bool {
         self.here.violation <= self.small_violation
@@ -54,12 +52,11 @@ impl Expected {
         if self.slope < 0.0 {
             least = least.min(GAMMA_PHI * violation / -self.slope);
             if violation <= self.small_violation {
-                let powers =
-                    (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
+                let powers = (Scalar::powf(violation, S_THETA), Scalar::powf(-self.slope, S_PHI));
                 least = least.min(powers.0 / powers.1);
             }
         }
-        (SAFETY * least).max(1e-14)
+        (ALPHA_MIN_FRAC * least).max(1e-14)
     }
 
     /// Whether a point after a step of this length is good enough; the filter grows where the
@@ -71,7 +68,7 @@ impl Expected {
             return false;
         }
         if self.decides(alpha) {
-            return there.objective <= self.here.objective + ARMIJO * alpha * self.slope + noise;
+            return there.objective <= self.here.objective + ETA_PHI * alpha * self.slope + noise;
         }
         filter.improves(there, &self.here, noise)
     }
@@ -86,7 +83,7 @@ pub(super) struct Accepted {
 
 /// What a line search finds.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Found {
+pub(super) enum SearchOutcome {
     /// A step.
     Step(Accepted),
     /// No step is short enough.
@@ -95,7 +92,7 @@ pub(super) enum Found {
     OutOfTime,
 }
 
-impl Found {
+impl SearchOutcome {
     /// The step.
     pub fn accepted(self) -> Option<Accepted> {
         match self {
@@ -106,7 +103,7 @@ impl Found {
 }
 
 /// The memory that a line search works on.
-pub(super) struct Room<'r, 'w, T, D, M, N, I> {
+pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
     pub lengths: &'r Lengths,
     pub numbers: &'r mut N,
     pub indices: &'r mut I,
@@ -114,7 +111,7 @@ pub(super) struct Room<'r, 'w, T, D, M, N, I> {
     pub work: &'r mut Work<'w, T>,
 }
 
-impl<T, D, M, N, I> Room<'_, '_, T, D, M, N, I>
+impl<T, D, M, N, I> LineSearch<'_, '_, T, D, M, N, I>
 where
     T: Real,
     D: AsRef<[StageDims]>,
@@ -127,7 +124,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &Expected,
+        expected: &FilterModel,
         alpha: f64,
     ) -> bool {
         self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
@@ -141,17 +138,17 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
-        expected: &Expected,
+        expected: &FilterModel,
         longest: f64,
         tau: f64,
-    ) -> Result<Found, OcpError> {
+    ) -> Result<SearchOutcome, OcpError> {
         let State { filter, over, .. } = state;
         let mut alpha = longest;
         let shortest = expected.shortest();
         while alpha >= shortest {
             let there = self.measure(ocp, expected.mu, alpha);
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
-                return Ok(Found::Step(Accepted { alpha, corrected: false }));
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
             let bends =
@@ -160,14 +157,14 @@ where
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
             {
-                return Ok(Found::Step(Accepted { alpha, corrected: true }));
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: true }));
             }
             if over() {
-                return Ok(Found::OutOfTime);
+                return Ok(SearchOutcome::OutOfTime);
             }
             alpha *= 0.5;
         }
-        Ok(Found::Nothing)
+        Ok(SearchOutcome::Nothing)
     }
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
@@ -181,7 +178,7 @@ where
         let part_of_step = T::from_f64(alpha);
         ocp.step_length = Some(part_of_step);
         {
-            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
             let to = self.trial.view_mut();
             for place in Places::<T>::new(iterate.qp.dims) {
@@ -204,7 +201,7 @@ where
         if P::Dynamics::LIFTED {
             gaps += ocp.stages[0].to_f64();
         }
-        let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+        let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
         let mut violation =
             gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
@@ -225,23 +222,23 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &Expected,
+        expected: &FilterModel,
         tau: f64,
     ) -> Result<Option<f64>, OcpError> {
         {
-            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
             assign(self.work.step, iterate.step);
             assign(self.work.slack_step, iterate.sides.slack_step);
             assign(self.work.multiplier_step, iterate.sides.multiplier_step);
         }
         let mut violation = expected.here.violation;
         let mut accepted = None;
-        for _ in 0..CORRECTIONS {
+        for _ in 0..MAX_SOC {
             ocp.correct(self.trial, self.work.ends);
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
                 let mut iterate =
-                    attach_to_new(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                    kkt_view_of_new_qp(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
                 iterate.units = self.work.units;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
@@ -257,13 +254,13 @@ where
                 accepted = Some(alpha);
                 break;
             }
-            if there.violation > CORRECTED * violation {
+            if there.violation > KAPPA_SOC * violation {
                 break;
             }
             violation = there.violation;
         }
         if accepted.is_none() {
-            let iterate: Iterate<'_, T> = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            let iterate: Iterate<'_, T> = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
             assign(iterate.step, self.work.step);
             assign(iterate.sides.slack_step, self.work.slack_step);
             assign(iterate.sides.multiplier_step, self.work.multiplier_step);

@@ -3,11 +3,11 @@
 use super::Ipm;
 use super::barrier;
 use super::kkt::lengths::Lengths;
-use super::kkt::newton::{attach, attach_to_new, evaluate, evaluate_values, least_squares};
+use super::kkt::newton::{evaluate, evaluate_values, kkt_view, kkt_view_of_new_qp, least_squares};
 use super::kkt::scaling;
 use super::kkt::start::begin_sides;
 use super::kkt::work::Work;
-use super::restoration::feasibility;
+use super::restoration::phase;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
@@ -16,7 +16,7 @@ use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
 /// First multipliers that are more units are discarded.
-const LARGEST: f64 = 1e3;
+const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Slacks and multipliers of the first iteration, or of new penalties.
@@ -38,7 +38,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let rows = &*rows;
         let units = state.lengths.units(rows);
         let mut iterate =
-            attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
+            kkt_view_of_new_qp(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
         iterate.units = units.rows;
         iterate.take_point(&view);
         iterate.give_initial_state();
@@ -46,13 +46,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let force = state.lengths.sizes.force;
         begin_sides(&mut iterate, &self.options, warm, state.mu, units, &view);
         if state.lengths.alone {
-            feasibility::centre(&mut iterate.sides, state.mu);
+            phase::centre(&mut iterate.sides, state.mu);
         }
         iterate.store(&mut view);
         if warm {
             assign(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work, force).is_ok() {
-            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(LARGEST * force);
+            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * force);
             let sides = scaling::of_sides(iterate.sides.rows, work.hessian_multipliers, rows);
             if scaling::of_gaps(iterate.qp.dims, work.pi, rows).chain(sides).all(is_small) {
                 assign(view.dynamics, work.pi);
@@ -75,7 +75,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let work = Work::new(ends, capacity, self.work.as_mut());
         assign(work.slacks, iterate.sides.multiplier);
         assign(iterate.sides.multiplier, work.hessian_multipliers);
@@ -86,14 +86,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     }
 
     /// Lets go of multipliers that hold slacks shorter than distances from bounds.
-    pub(super) fn release<P: Formulation<T>>(
+    pub(super) fn reset_small_slacks<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_>,
     ) -> Result<(), OcpError> {
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        barrier::release(&mut iterate.sides, state.mu, self.options.tolerance);
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        barrier::reset_small_slacks(&mut iterate.sides, state.mu, self.options.tolerance);
         let mut view = solution.view_mut();
         iterate.store(&mut view);
         evaluate(&mut iterate, &mut view);

@@ -7,7 +7,7 @@
 //! Optim. 3 (1993).
 
 use super::barrier;
-use super::kkt::newton::again;
+use super::kkt::newton::resolve;
 use super::line_search::longest;
 use crate::qp::QpError;
 use crate::qp::interior::{Iterate, Sides};
@@ -64,13 +64,13 @@ pub(super) fn correct<T: Real>(
 ) -> Result<bool, QpError> {
     let corrections = if violation <= NEAR { CORRECTIONS } else { 1 };
     for _ in 0..corrections {
-        again(iterate, T::from_f64(mu), true)?;
+        resolve(iterate, T::from_f64(mu), true)?;
     }
     let tau = barrier::fraction_to_boundary(mu / force);
     let (primal, dual) = lengths(&iterate.sides, tau);
     let is_long = primal.min(dual) >= SHORT && iterate.step.iter().all(|d| d.is_finite());
     if !is_long {
-        again(iterate, T::from_f64(mu), false)?;
+        resolve(iterate, T::from_f64(mu), false)?;
     }
     Ok(is_long)
 }

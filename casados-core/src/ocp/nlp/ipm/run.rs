@@ -18,6 +18,26 @@ use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
+/// IPOPT's `diverging_iterates_tol`, as a multiple of the largest size in the data of a problem.
+const DIVERGING_ITERATES: f64 = 1e12;
+/// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
+const BOUND_INFINITY: f64 = 1e19;
+
+/// The largest size of variables at the start and of their bounds, at least one.
+fn largest_size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &Ocp<P, T, D, M>,
+) -> f64 {
+    let start = ocp.iterate.vectors().0.iter();
+    let mut largest = start.fold(1.0, |largest: f64, v| largest.max(v.abs().to_f64()));
+    for stage in ocp.qp().stages() {
+        for bounds in [stage.x_bounds(), stage.u_bounds()] {
+            let sizes = bounds.lower.iter().chain(bounds.upper).map(|bound| bound.abs().to_f64());
+            largest = sizes.filter(|&size| size < BOUND_INFINITY).fold(largest, f64::max);
+        }
+    }
+    largest
+}
+
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
     ///
@@ -99,15 +119,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         self.options.check()?;
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        ocp.linearise_guess(Slopes, &mut self.trial)?;
+        let perturbed = ocp.linearise_guess(Slopes, &mut self.trial)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State::new(over, lengths, is_linearised, &self.options);
         state.first_objective = ocp.objective.to_f64();
+        state.contradiction = ocp.contradiction(self.options.tolerance);
+        state.diverging_iterates = DIVERGING_ITERATES * largest_size(ocp);
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();
         let result = loop {
             let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
+            row.perturbed = perturbed && row.iteration == 0;
             let end = match self.iterate(ocp, &capacity, &mut state, &mut row) {
                 Ok(end) => end,
                 Err(error) => break Err(error),
@@ -120,8 +143,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 }
                 self.log.push(row);
             }
-            let begins_again = self.begin_again(ocp, &capacity, &mut state, end);
-            if let (Some(status), false) = (end, begins_again) {
+            let restarts = self.restart(ocp, &capacity, &mut state, end);
+            if let (Some(status), false) = (end, restarts) {
                 outcome.status = status;
                 break Ok(());
             }

@@ -17,11 +17,11 @@ pub(super) const GAMMA_PHI: f64 = 1e-8;
 
 /// So many iterations with nothing left but complementarity, each of which leaves this part of it,
 /// are no convergence of Newton's method.
-const HELD: usize = 3;
-const CRAWLS: f64 = 0.9;
+const COMPLEMENTARITY_STALL: usize = 3;
+const STALLED_DECREASE: f64 = 0.9;
 
 /// Steps that are no longer lead nowhere if there are many of them.
-const SHORT: f64 = 1.0 / 32.0;
+const SHORT_STEP: f64 = 1.0 / 32.0;
 
 /// What a run remembers from one iteration to the next.
 pub(super) struct State<'c> {
@@ -43,7 +43,7 @@ pub(super) struct State<'c> {
     /// The penalty, if bounds are soft.
     pub elastic: Option<f64>,
     /// Whether this is a second attempt.
-    pub again: bool,
+    pub second_attempt: bool,
     /// Phases in which violations alone are made small.
     pub phase: Phase,
     /// The largest gap or violation, in units.
@@ -59,11 +59,11 @@ pub(super) struct State<'c> {
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
     /// Iterations one after the other in which complementarity is all that is left, and stays.
-    pub held: usize,
+    pub complementarity_stall: usize,
     /// Steps one after the other that are short, or of phases for violations.
-    pub straying: usize,
+    pub stalled_iterations: usize,
     /// Whether slacks that multipliers held were released.
-    pub released: bool,
+    pub has_reset_slacks: bool,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
     pub has_slacks: bool,
     /// Whether the QP is that at the iterate, with whatever multipliers.
@@ -76,6 +76,10 @@ pub(super) struct State<'c> {
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
+    /// Infeasible, where bounds contradict each other.
+    pub contradiction: Option<Status>,
+    /// Variables that are larger have no end.
+    pub diverging_iterates: f64,
 }
 
 impl<'c> State<'c> {
@@ -99,7 +103,7 @@ impl<'c> State<'c> {
             regularisation: Regularisation::default(),
             delta: 0.0,
             elastic: None,
-            again: false,
+            second_attempt: false,
             phase: Phase::default(),
             violation: f64::INFINITY,
             gaps: f64::INFINITY,
@@ -107,22 +111,24 @@ impl<'c> State<'c> {
             first_objective: 0.0,
             stationary_violation: f64::INFINITY,
             acceptable: 0,
-            held: 0,
-            straying: 0,
-            released: false,
+            complementarity_stall: 0,
+            stalled_iterations: 0,
+            has_reset_slacks: false,
             has_slacks: false,
             is_linearised,
             has_filter: false,
             error: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
+            contradiction: None,
+            diverging_iterates: f64::INFINITY,
         }
     }
 
     /// Counts a step of this length.
-    pub fn count_straying(&mut self, step: f64) {
-        let strays = self.phase.force.is_some() || step <= SHORT;
-        self.straying = if strays { self.straying + 1 } else { 0 };
+    pub fn count_stalled(&mut self, step: f64) {
+        let stalls = self.phase.force.is_some() || step <= SHORT_STEP;
+        self.stalled_iterations = if stalls { self.stalled_iterations + 1 } else { 0 };
     }
 
     /// The next barrier parameter, from residuals and with a unit of products in which errors are
@@ -150,16 +156,18 @@ impl<'c> State<'c> {
     pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
         let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
         let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
-        let stays = error > tolerance.max(CRAWLS * self.error);
-        self.held = if is_last && others <= tolerance && stays { self.held + 1 } else { 0 };
+        let stays = error > tolerance.max(STALLED_DECREASE * self.error);
+        self.complementarity_stall =
+            if is_last && others <= tolerance && stays { self.complementarity_stall + 1 } else { 0 };
         self.error = error;
     }
 
     /// Whether multipliers hold slacks, which is said once.
-    pub fn is_held(&mut self) -> bool {
-        let is_held = self.held >= HELD && !self.released;
-        self.released |= is_held;
-        is_held
+    pub fn is_complementarity_stalled(&mut self) -> bool {
+        let is_complementarity_stalled =
+            self.complementarity_stall >= COMPLEMENTARITY_STALL && !self.has_reset_slacks;
+        self.has_reset_slacks |= is_complementarity_stalled;
+        is_complementarity_stalled
     }
 
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.

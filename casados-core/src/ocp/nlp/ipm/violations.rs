@@ -7,14 +7,14 @@ use crate::scalar::Real;
 
 /// Violations and gaps, in units, that are no more than this are none from which a run cannot go
 /// on.
-pub(super) const SMALL: f64 = 1e-4;
+pub(super) const SMALL_VIOLATION: f64 = 1e-4;
 /// Violations are there to stay where no step makes more than this part of them less, to first
 /// order.
-const STAYS: f64 = 1e-4;
+const STATIONARY_DECREASE: f64 = 1e-4;
 /// What is left of the dynamics by then, as a part of the violations.
-const EXACT: f64 = 1e-5;
+const CLOSED_GAPS: f64 = 1e-5;
 /// So many phases there may be in a run.
-pub(super) const PHASES: usize = 4;
+pub(super) const MAX_RESTORATION_PHASES: usize = 4;
 
 /// What there is at an iterate, in units.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,8 +41,8 @@ pub(super) struct Phase {
 
 impl Phase {
     /// Whether another phase may help.
-    pub fn may_begin(&self) -> bool {
-        self.force.is_none() && self.count < PHASES
+    pub fn may_enter(&self) -> bool {
+        self.force.is_none() && self.count < MAX_RESTORATION_PHASES
     }
 
     /// Takes what there is at an iterate with multipliers `π` of the dynamics.
@@ -72,12 +72,12 @@ impl Phase {
 impl Violations {
     /// Whether a run may go on.
     pub fn are_small(&self) -> bool {
-        self.sum <= SMALL && self.gaps <= SMALL
+        self.sum <= SMALL_VIOLATION && self.gaps <= SMALL_VIOLATION
     }
 
     /// Whether they are stationary.
-    pub fn stay(&self) -> bool {
+    pub fn is_stationary(&self) -> bool {
         let Self { sum, better, gaps } = *self;
-        sum > SMALL && better <= STAYS * sum && gaps <= EXACT * sum
+        sum > SMALL_VIOLATION && better <= STATIONARY_DECREASE * sum && gaps <= CLOSED_GAPS * sum
     }
 }

@@ -6,7 +6,7 @@ use crate::ocp::nlp::filter::{Filter, Measure, objective_decides};
 /// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
 const GAMMA_PHI: f64 = 1e-5;
 /// The part of the expected decrease that is enough.
-const ARMIJO: f64 = 1e-4;
+const ETA: f64 = 1e-4;
 
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,7 @@ pub(super) struct Line {
 impl Line {
     /// Whether the merit function, if it is a parabola along the step, has its least before the end
     /// of a step of this length: whether it shrinks by less than half of what its slope promises.
-    pub fn turns_before(&self, length: f64, there: &Measure) -> bool {
+    pub fn overshoots(&self, length: f64, there: &Measure) -> bool {
         let promised = length * (self.slope - self.here.violation);
         there.merit() - self.here.merit() > 0.5 * promised.min(0.0) + self.noise()
     }
@@ -57,14 +57,14 @@ impl Search {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;
-                there.merit() <= here.merit() + ARMIJO * length * slope.min(0.0) + noise
+                there.merit() <= here.merit() + ETA * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 if !self.filter.admits(there, noise) {
                     return false;
                 }
                 if objective_decides(length, *slope, here.violation) {
-                    return there.objective <= here.objective + ARMIJO * length * slope + noise;
+                    return there.objective <= here.objective + ETA * length * slope + noise;
                 }
                 self.filter.improves(there, here, noise)
             }

@@ -11,26 +11,27 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::solution::log::Iteration;
-use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
+use crate::qp::{QpError, QpSolver, QpStart, StageDims};
 use crate::scalar::Real;
 
 /// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
 const MOST_AT_FIRST: f64 = 1e-2;
-/// Penalties grow by this to see whether less violation is possible at all, up to that multiple.
-const GROWTH: f64 = 100.0;
-const MOST_ELASTIC: f64 = 1e4;
+/// Penalties grow by this, once, to see whether the objective is what holds violations back.
+const PENALTY_FACTOR: f64 = 100.0;
+/// Beside penalties of this multiple the objective counts nothing.
+const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
-const DIGITS: f64 = 1e-13;
+const QP_ROUNDING: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
-const STAYS: f64 = 1.0 - 1e-3;
+const STATIONARY_VIOLATION: f64 = 1.0 - 1e-3;
 /// Gaps are closed that are no more than this part of the violations of bounds.
-const CLOSED: f64 = 1e-2;
+const CLOSED_GAPS: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
-const CLOSING: usize = 4;
+const STEPS_THAT_CLOSE_GAPS: usize = 4;
 /// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
 /// penalty; then those of an easier QP.
-const FLAT: [(f64, f64); 2] = [(2e-5, DIGITS), (2e-3, 1e-9)];
+const PROXIMAL_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -88,7 +89,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        (state.nearest, state.rewritten) = (false, false);
+        (state.feasibility_step, state.rewritten) = (false, false);
         state.residual = row.residuals.largest();
         self.scale(ocp, state, Way::Into);
         if state.sizes.is_some() {
@@ -96,7 +97,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let mut direction = self.direction_in_units(ocp, state, row);
         self.scale(ocp, state, Way::Back);
-        if state.nearest || state.rewritten {
+        if state.feasibility_step || state.rewritten {
             self.linearise(ocp)?;
         }
         if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
@@ -123,7 +124,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let wrong = part * state.force();
         let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
         let permitted = if begins || state.exact { 0.0 } else { part };
-        self.qp_solver.permit(permitted.max(DIGITS * forces.to_f64()));
+        self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
@@ -153,55 +154,55 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
-        self.qp_solver.permit(DIGITS * penalty);
+        self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
         let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
         let gaps = ocp.gaps();
         let before = bounds + gaps;
+        if before == 0.0 {
+            // Nothing is violated that penalties could stand for.
+            return Err(error);
+        }
         if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
             // Without objective and curvature it is nearly a linear program.
-            if self.nearest(ocp, state, row, before).is_err() {
+            if self.feasibility_step(ocp, state, row, before).is_err() {
                 return Err(error);
             }
-            return Ok(Self::go_near(state, row));
+            return Ok(Self::take_feasibility_step(state, row));
         }
         let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
             return Ok(Direction::Step);
         };
-        if self.violation_of_solution(ocp) < STAYS * before {
+        if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
             return Ok(Direction::Step);
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
-        let most = MOST_ELASTIC * self.options.elastic_penalty;
-        let mut solved = true;
-        while solved && penalty < most {
-            penalty *= GROWTH;
-            self.set_elastic(ocp, state, penalty);
-            // Forces are as large as penalties, and have as many digits.
-            self.qp_solver.permit(DIGITS * penalty);
-            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
-            if solved && self.violation_of_solution(ocp) < STAYS * before {
-                // It is, and from now on it does.
-                state.penalty = penalty;
-                return Ok(Direction::Step);
-            }
+        penalty *= PENALTY_FACTOR;
+        self.set_elastic(ocp, state, penalty);
+        // Forces are as large as penalties, and have as many digits.
+        self.qp_solver.permit(QP_ROUNDING * penalty);
+        let solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
+        if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+            // It is, and from now on it does.
+            state.penalty = penalty.min(self.options.elastic_penalty * MAX_PENALTY_FACTOR / PENALTY_FACTOR);
+            return Ok(Direction::Step);
         }
         // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
         // gaps are closed.
-        if gaps <= CLOSED * bounds {
-            let is_near = self.nearest(ocp, state, row, before).is_ok();
-            if is_near && self.violation_of_solution(ocp) >= STAYS * before {
+        if gaps <= CLOSED_GAPS * bounds {
+            let is_near = self.feasibility_step(ocp, state, row, before).is_ok();
+            if is_near && self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
                 return Ok(Direction::Infeasible(worst));
             }
             if solved {
-                return if is_near { Ok(Self::go_near(state, row)) } else { Err(error) };
+                return if is_near { Ok(Self::take_feasibility_step(state, row)) } else { Err(error) };
             }
             // The QP has another objective now, and is to be written again.
             state.rewritten = true;
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if solved && gaps <= bounds && state.elastic_steps >= CLOSING {
+        if solved && gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
             return Ok(Direction::Infeasible(worst));
         }
         state.penalty = 0.0;
@@ -211,8 +212,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The step to the nearest point; the QP has another objective than that of the iterate.
-    fn go_near(state: &mut State<'_, T>, row: &mut Iteration) -> Direction {
-        (state.nearest, row.regularisation) = (true, 0.0);
+    fn take_feasibility_step(state: &mut State<'_, T>, row: &mut Iteration) -> Direction {
+        (state.feasibility_step, row.regularisation) = (true, 0.0);
         Direction::Step
     }
 
@@ -223,22 +224,22 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     ///
     /// Afterwards penalties are those beside which the objective counts nothing.
-    fn nearest<P: Formulation<T>>(
+    fn feasibility_step<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
         row: &mut Iteration,
         violation: f64,
     ) -> Result<(), QpError> {
-        let (one, alone) = (self.options.elastic_penalty, MOST_ELASTIC * self.options.elastic_penalty);
+        let (one, alone) = (self.options.elastic_penalty, MAX_PENALTY_FACTOR * self.options.elastic_penalty);
         // Of soft bounds that were given there are costs.
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
         self.set_elastic(ocp, state, penalty);
         let mut result = Ok(());
-        for (flat, digits) in FLAT {
+        for (weight, digits) in PROXIMAL_WEIGHTS {
             self.qp_solver.permit(digits * penalty);
-            ocp.forget_objective(T::from_f64(flat * penalty / violation));
+            ocp.forget_objective(T::from_f64(weight * penalty / violation));
             result = self.solve_qp(ocp, state, QpStart::Cold, row);
             if result.is_ok() {
                 break;
@@ -281,7 +282,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The QP from the iterate; from a cold start if a warm one was to blame.
+    /// The QP from the iterate; from a cold start if a warm one may be to blame: that no point
+    /// satisfies all constraints is proved by multipliers, whatever the start was.
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -292,18 +294,20 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut start = start;
         loop {
             self.solution.copy_from(&ocp.iterate);
-            let over = &mut || state.is_over();
-            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
-            row.qp_iterations += match &result {
-                Ok(QpStatistics { iterations, .. })
-                | Err(QpError::MaxIterations { iterations, .. } | QpError::Stalled { iterations, .. }) => {
-                    *iterations
-                }
-                Err(_) => 0,
+            let mut asked = 0;
+            let over = &mut || {
+                asked += 1;
+                state.is_over()
             };
+            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+            // A solver that fails asks in every iteration, and says no number.
+            row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
             let Err(error) = result else { return Ok(()) };
             if start == QpStart::Cold
-                || matches!(error, QpError::NotConvex { .. } | QpError::OutOfTime { .. })
+                || matches!(
+                    error,
+                    QpError::NotConvex { .. } | QpError::OutOfTime { .. } | QpError::Infeasible { .. }
+                )
             {
                 return Err(error);
             }

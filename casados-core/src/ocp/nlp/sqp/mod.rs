@@ -15,11 +15,11 @@
 //! | `again` | the second attempt, from a simulation |
 
 mod acceptance;
-mod again;
 mod direction;
 mod measure;
 mod multipliers;
 mod options;
+mod restart;
 mod run;
 mod scaled;
 mod search;

@@ -1,9 +1,9 @@
 //! The iterations.
 
 use super::Sqp;
-use super::again::violation_of;
 use super::direction::Direction;
 use super::options::Globalisation;
+use super::restart::violation_of;
 use super::scaled::Way;
 use super::secant::Take;
 use super::state::{State, Taken};
@@ -27,7 +27,7 @@ const ROOM: usize = 64;
 
 /// After so many steps with penalties in a row it is the sum of violations that is made small, and
 /// its curvature counts.
-const PASSING: usize = 4;
+const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
 /// What a step tries, where no step along the direction before is short enough.
 #[derive(Clone, Copy, PartialEq)]
@@ -129,7 +129,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.fits(self.solution.dims())?;
         self.options.check()?;
         self.qp_solver.require(self.options.tolerance);
-        let mut state = State { over: Some(over), ..State::new() };
+        let contradiction = ocp.contradiction(self.options.tolerance);
+        let mut state = State { over: Some(over), contradiction, ..State::new() };
         if C::KEEPS {
             ocp.check_without_algebraic()?;
             self.curvature.follow(f64::INFINITY);
@@ -163,8 +164,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
                 self.log.push(row);
             }
-            let begins_again = self.begin_again(ocp, &mut state, end, &row);
-            if let (Some(status), false) = (end, begins_again) {
+            let restarts = self.restart(ocp, &mut state, end, &row);
+            if let (Some(status), false) = (end, restarts) {
                 outcome.status = status;
                 if matches!(status, Status::Infeasible { .. }) {
                     state.best_iteration = row;
@@ -203,7 +204,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         row.times.linearise = match state.search.linearised.take() {
             Some(seconds) => seconds,
             None if row.iteration == 0 => {
-                ocp.linearise_guess(self.curvature, &mut self.trial)?;
+                row.perturbed = ocp.linearise_guess(self.curvature, &mut self.trial)?;
+                if row.perturbed {
+                    self.weights.copy_from(&ocp.iterate);
+                }
                 watch.lap()
             }
             None => {
@@ -243,6 +247,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             state.best_iteration = *row;
             return Ok(Some(Status::Converged));
         }
+        if let Some(status) = state.contradiction {
+            state.best_iteration = *row;
+            return Ok(Some(status));
+        }
         if row.iteration >= self.options.max_iterations {
             return Ok(Some(Status::MaxIterations));
         }
@@ -256,9 +264,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (row.step, row.corrected) = (taken.length, taken.corrected);
         let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
         state.damp(row, curvature);
-        self.leave_merit(ocp, state, row);
+        self.switch_to_filter(ocp, state, row);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
-        if row.elastic && C::EXACT && (state.nearest || state.elastic_steps <= PASSING) {
+        if row.elastic
+            && C::EXACT
+            && (state.feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
+        {
             // On the way to a feasible point forces of penalties are no multipliers: curvatures
             // would be far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -269,7 +280,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Lets the filter decide from now on where the merit function creeps.
-    fn leave_merit<P: Formulation<T>>(
+    fn switch_to_filter<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -277,7 +288,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) where
         C: Curvature<P::Dynamics, T>,
     {
-        if C::EXACT && state.creeps(row, &self.options) {
+        if C::EXACT && state.switches_to_filter(row, &self.options) {
             state.search.filter.clear();
             self.forget_weights(ocp, state);
         }
@@ -296,7 +307,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Compares the length of the full step with that of the one before.
-    fn follow<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>)
+    fn update_contraction<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>)
     where
         C: Curvature<P::Dynamics, T>,
     {
@@ -309,7 +320,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The full step, or one that a line search finds.
-    fn go<P: Formulation<T>>(
+    fn take_step<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -339,18 +350,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
-        let damps = state.again || !C::EXACT && self.curvature.update().is_none();
+        let damps = state.second_attempt || !C::EXACT && self.curvature.update().is_none();
         for attempt in ATTEMPTS {
             let (damping, skips) = match attempt {
                 Attempt::First => (0.0, false),
-                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.passing),
+                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.may_reject_short_steps),
                 Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
             };
             if skips {
                 continue;
             }
-            state.exact = state.again || attempt != Attempt::First;
-            state.passing = damps && damping.max(state.damping) < MOST_DAMPING;
+            state.exact = state.second_attempt || attempt != Attempt::First;
+            state.may_reject_short_steps = damps && damping.max(state.damping) < MOST_DAMPING;
             if attempt != Attempt::First {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.
@@ -373,8 +384,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             match direction {
                 Ok(Direction::Step) => {
-                    self.follow(ocp, state);
-                    let taken = self.go(ocp, state, row)?;
+                    self.update_contraction(ocp, state);
+                    let taken = self.take_step(ocp, state, row)?;
                     row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
                     if let Some(taken) = taken {
                         return Ok(ControlFlow::Continue(taken));

@@ -17,15 +17,15 @@ use crate::scalar::Real;
 
 /// Weights are at least this part of the largest multiplier: constraints without a force, as at
 /// states that cost nothing, would be left far behind otherwise.
-const LEAST: f64 = 1e-2;
+const MIN_WEIGHT: f64 = 1e-2;
 /// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
-const SHARE: f64 = 0.1;
+const RHO: f64 = 0.1;
 /// A step of Gauss and Newton that is no longer is refused where gaps and violations count more
 /// than the objective, if damping can be larger: a shorter step shrinks all linear gaps by the same
 /// part, a damped one goes less far in what would have to go farthest.
-const SHORT: f64 = 0.25;
+const SHORTEST_UNDAMPED_STEP: f64 = 0.25;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short
@@ -44,7 +44,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let by = state.globalisation(&self.options);
         let weighted = by == Globalisation::Merit;
-        let line = self.line(ocp, state);
+        let line = self.merit_model(ocp, state);
         let mut written = true;
         if state.search.full {
             if self.try_linearised(ocp, state, &line) {
@@ -56,8 +56,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !written {
             self.curvature.follow(f64::INFINITY);
         }
-        let passing = state.passing && weighted && line.here.violation > line.slope.abs();
-        let shortest = if passing { 2.0 * SHORT } else { self.options.shortest_step };
+        let passing = state.may_reject_short_steps && weighted && line.here.violation > line.slope.abs();
+        let shortest = if passing { 2.0 * SHORTEST_UNDAMPED_STEP } else { self.options.shortest_step };
         let mut length = 1.0;
         while length >= shortest {
             // A point without a value is one that is not good enough.
@@ -65,7 +65,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if let Some(there) = there
                 && state.search.accepts(by, length, &line, &there)
             {
-                let length = self.shortened(ocp, state, &line, length, there);
+                let length = self.backtrack_to_minimiser(ocp, state, &line, length, there);
                 return Ok(Some(Taken { length, corrected: false }));
             }
             if length == 1.0 && there.is_some_and(|there| there.is_finite()) {
@@ -121,12 +121,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let weighted = state.globalisation(&self.options) == Globalisation::Merit;
-        weighted && self.curvature.update().is_none() && line.turns_before(length, there)
+        weighted && self.curvature.update().is_none() && line.overshoots(length, there)
     }
 
     /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
     /// function says that its least is before, and shrinks. The length.
-    fn shortened<P: Formulation<T>>(
+    fn backtrack_to_minimiser<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -151,14 +151,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
-    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
-        let (here, slope) = self.weigh(ocp, state);
+    fn merit_model<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
+        let (here, slope) = self.update_weights(ocp, state);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn weigh<P: Formulation<T>>(
+    fn update_weights<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -171,7 +171,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale_weights(ocp, state, Way::Into);
         let multipliers = self.solution.multipliers_mut();
         let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
-        let (half, least) = (T::from_f64(0.5), T::from_f64(LEAST) * largest);
+        let (half, least) = (T::from_f64(0.5), T::from_f64(MIN_WEIGHT) * largest);
         // Those of this step count at least.
         self.weights.update_multipliers(&self.solution, |w, multiplier| {
             let size = multiplier.abs();
@@ -180,7 +180,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale_weights(ocp, state, Way::Back);
         let here = ocp.measure_here(&self.weights);
         let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
-        let factor = slope / ((1.0 - SHARE) * here.violation);
+        let factor = slope / ((1.0 - RHO) * here.violation);
         if !(factor > 1.0 && factor.is_finite()) {
             return (here, slope);
         }

@@ -5,6 +5,7 @@ use super::options::{Globalisation, SqpOptions};
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
+use crate::ocp::solution::outcome::Status;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
@@ -17,7 +18,7 @@ pub(super) struct State<'c, T> {
     /// Nothing has been done yet.
     pub begins: bool,
     /// The run began again.
-    pub again: bool,
+    pub second_attempt: bool,
     pub search: Search,
     /// Whether bounds have penalties.
     pub elastic: bool,
@@ -27,7 +28,7 @@ pub(super) struct State<'c, T> {
     /// The regularisation of the last step that was short, and less after others.
     pub failed: f64,
     /// Whether the last direction was that of the violations alone.
-    pub nearest: bool,
+    pub feasibility_step: bool,
     /// Whether the QP that the last direction comes from was overwritten.
     pub rewritten: bool,
     /// Steps with penalties in a row.
@@ -35,7 +36,7 @@ pub(super) struct State<'c, T> {
     /// The penalty that violations were found to need; zero at first.
     pub penalty: f64,
     /// Whether a short step may be refused, because more damping can be tried.
-    pub passing: bool,
+    pub may_reject_short_steps: bool,
     /// Whether QPs are solved to as many digits as there are.
     pub exact: bool,
     /// The largest violation of the guess.
@@ -52,24 +53,26 @@ pub(super) struct State<'c, T> {
     pub short_steps: usize,
     /// The largest change of a variable by the last full step; infinite at first.
     pub reach: f64,
+    /// Infeasible, where bounds contradict each other.
+    pub contradiction: Option<Status>,
     pub number: PhantomData<T>,
 }
 
 /// Steps that are no longer are followed by more damping: by that factor, or by what would leave
 /// of the step along a curvature the cube root of the part that was gone.
-const SHORT: f64 = 1.0 / 16.0;
-const GROWTH: f64 = 4.0;
+const SHORT_STEP: f64 = 1.0 / 16.0;
+const DAMPING_FACTOR: f64 = 4.0;
 /// After so many short steps more than full ones the merit function gives way to the filter: where
 /// constraints bend more than its weights let pass, it creeps along them.
-const CREEPING: usize = 5;
-const ROOT: f64 = -1.0 / 3.0;
+const SHORT_STEPS_BEFORE_FILTER: usize = 5;
+const DAMPING_EXPONENT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
-const RELIEF: f64 = 0.2;
-const FORGET: f64 = 0.1;
+const DAMPING_DECREASE: f64 = 0.2;
+const FAILED_DECREASE: f64 = 0.1;
 /// The least and the most of it.
-const LEAST: f64 = 1e-8;
-const MOST: f64 = 1e2;
+const MIN_DAMPING: f64 = 1e-8;
+const MAX_DAMPING: f64 = 1e2;
 
 impl<T> State<'_, T> {
     /// That of a run that begins.
@@ -78,15 +81,15 @@ impl<T> State<'_, T> {
             over: None,
             late: false,
             begins: true,
-            again: false,
+            second_attempt: false,
             search: Search::new(),
             elastic: false,
             inertia: InertiaCorrection::default(),
             damping: 0.0,
             failed: 0.0,
-            passing: false,
+            may_reject_short_steps: false,
             exact: false,
-            nearest: false,
+            feasibility_step: false,
             rewritten: false,
             penalty: 0.0,
             elastic_steps: 0,
@@ -97,6 +100,7 @@ impl<T> State<'_, T> {
             sizes: None,
             short_steps: 0,
             reach: f64::INFINITY,
+            contradiction: None,
             number: PhantomData,
         }
     }
@@ -115,15 +119,15 @@ impl<T> State<'_, T> {
     /// How far steps go: as options say, but by the filter where the merit function creeps.
     pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
         match options.globalisation {
-            Globalisation::Merit if self.short_steps >= CREEPING => Globalisation::Filter,
+            Globalisation::Merit if self.short_steps >= SHORT_STEPS_BEFORE_FILTER => Globalisation::Filter,
             given => given,
         }
     }
 
     /// Counts short steps, less full ones without a correction. Whether it was the short one after
     /// which the filter decides.
-    pub fn creeps(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
-        if options.globalisation != Globalisation::Merit || self.short_steps >= CREEPING {
+    pub fn switches_to_filter(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
+        if options.globalisation != Globalisation::Merit || self.short_steps >= SHORT_STEPS_BEFORE_FILTER {
             return false;
         }
         if self.is_short(row) && !row.elastic {
@@ -131,23 +135,24 @@ impl<T> State<'_, T> {
         } else if row.step == 1.0 && !row.corrected {
             self.short_steps = self.short_steps.saturating_sub(1);
         }
-        self.short_steps == CREEPING
+        self.short_steps == SHORT_STEPS_BEFORE_FILTER
     }
 
     /// Whether a step was so short that damping helps.
     pub fn is_short(&self, row: &Iteration) -> bool {
-        row.step <= SHORT
+        row.step <= SHORT_STEP
     }
 
     /// Damping of the next direction, after a step with such a curvature of the QP along it.
     pub fn damp(&mut self, row: &Iteration, curvature: f64) {
         if self.is_short(row) {
-            let by_curvature = curvature.max(0.0) * (Scalar::powf(row.step, ROOT) - 1.0);
-            self.failed = row.regularisation.max(LEAST);
-            self.damping = by_curvature.max(GROWTH * row.regularisation).clamp(LEAST, MOST);
-        } else if self.damping > LEAST {
-            self.damping = (RELIEF * self.damping).max(Scalar::sqrt(self.damping * self.failed));
-            self.failed *= FORGET;
+            let by_curvature = curvature.max(0.0) * (Scalar::powf(row.step, DAMPING_EXPONENT) - 1.0);
+            self.failed = row.regularisation.max(MIN_DAMPING);
+            self.damping =
+                by_curvature.max(DAMPING_FACTOR * row.regularisation).clamp(MIN_DAMPING, MAX_DAMPING);
+        } else if self.damping > MIN_DAMPING {
+            self.damping = (DAMPING_DECREASE * self.damping).max(Scalar::sqrt(self.damping * self.failed));
+            self.failed *= FAILED_DECREASE;
         } else {
             self.damping = 0.0;
         }

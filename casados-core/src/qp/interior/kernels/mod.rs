@@ -6,7 +6,7 @@
 mod product;
 mod vectors;
 
-pub use product::{MORE, Part, Source, product, subtract};
+pub use product::{PADDING_COLUMNS, Part, Source, product, subtract};
 pub use vectors::{add_symmetric, add_transposed, mirror, scale, subtract_column, symmetric};
 
 use crate::scalar::{Packed, Real};

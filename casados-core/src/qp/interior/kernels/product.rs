@@ -16,7 +16,7 @@ const WIDE: usize = 6;
 const NARROW: usize = 4;
 const PAIR: usize = 2;
 /// A product writes up to one column more than it is asked for.
-pub const MORE: usize = 1;
+pub const PADDING_COLUMNS: usize = 1;
 
 /// What a product is subtracted from; zero where it ends.
 #[derive(Clone, Copy)]
@@ -140,8 +140,8 @@ pub enum Part {
 /// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
 ///
 /// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in
-/// its columns. [`MORE`] columns than asked for are written if the target has them, and rows up to
-/// whole registers.
+/// its columns. [`PADDING_COLUMNS`] more columns than asked for are written if the target has them,
+/// and rows up to whole registers.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -315,7 +315,7 @@ mod tests {
                 let size = (rows, columns, depth);
                 let (ld, ld_y) = (padded(rows), padded(columns));
                 let (x, y) = (integers(rows, depth, ld, 1), integers(columns, depth, ld_y, 2));
-                let before = integers(rows, columns + MORE, ld, 3);
+                let before = integers(rows, columns + PADDING_COLUMNS, ld, 3);
                 let mut target = before.clone();
                 let (x_columns, y_columns) =
                     (Columns { data: &x[..], ld }, Columns { data: &y[..], ld: ld_y });

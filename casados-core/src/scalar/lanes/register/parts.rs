@@ -79,18 +79,18 @@ macro_rules! of_singles {
     };
 }
 
-/// Eight `f64`, whose coarse numbers take half a register.
+/// Eight `f64`, whose demotedd numbers take half a register.
 #[cfg(target_arch = "x86_64")]
 macro_rules! in_half_a_register {
     () => {
-        type Coarse = F32x8<N>;
+        type Demoted = F32x8<N>;
         #[inline(always)]
-        fn coarse(self) -> F32x8<N> {
-            F32x8(avx512_f64::coarse(self.0))
+        fn demote(self) -> F32x8<N> {
+            F32x8(avx512_f64::demote(self.0))
         }
         #[inline(always)]
-        fn fine(coarse: F32x8<N>) -> Self {
-            Self(avx512_f64::fine(coarse.0))
+        fn promote(demote: F32x8<N>) -> Self {
+            Self(avx512_f64::promote(demote.0))
         }
     };
 }

@@ -154,17 +154,17 @@ fn quotients<L: Lanes>() {
     });
 }
 
-/// Coarse numbers are the same with fewer digits, or with all.
-fn coarse<L: Lanes>() {
+/// Demoted numbers are the same with fewer digits, or with all.
+fn demote<L: Lanes>() {
     let values = specials();
     inside::<L>(|| {
         for start in 0..values.len() {
             let cell = cell::<L>(&values, start, 1);
             let mut found = cell;
-            L::fine(L::load(&cell).coarse()).store(&mut found);
+            L::promote(L::load(&cell).demote()).store(&mut found);
             for lane in 0..L::LANES {
                 let [a, found] = [&cell, &found].map(|cell| L::lane(cell, lane));
-                let halved = size_of::<L::Coarse>() < size_of::<L>();
+                let halved = size_of::<L::Demoted>() < size_of::<L>();
                 let expected = if halved { f64::from(a as f32) } else { a };
                 assert!(same(found, expected), "{a:e}: {found:e}, not {expected:e}");
             }
@@ -278,9 +278,9 @@ fn quotients_by_constants() {
 #[test]
 fn coarse_numbers() {
     macro_rules! check {
-        ($name:ident, $element:ident, $($n:literal),*) => { $(coarse::<$name<$n>>();)* };
+        ($name:ident, $element:ident, $($n:literal),*) => { $(demote::<$name<$n>>();)* };
     }
     on_every_register!(check);
-    coarse::<f64>();
-    coarse::<Strided<f64, 3>>();
+    demote::<f64>();
+    demote::<Strided<f64, 3>>();
 }

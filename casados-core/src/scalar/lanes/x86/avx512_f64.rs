@@ -56,8 +56,8 @@ define! {
     }}
     join(low: __m256d, high: __m256d) -> Register { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high) }
     halves(a: Register) -> [__m256d; 2] { [_mm512_castpd512_pd256(a), _mm512_extractf64x4_pd::<1>(a)] }
-    coarse(a: Register) -> __m256 { _mm512_cvtpd_ps(a) }
-    fine(a: __m256) -> Register { _mm512_cvtps_pd(a) }
+    demote(a: Register) -> __m256 { _mm512_cvtpd_ps(a) }
+    promote(a: __m256) -> Register { _mm512_cvtps_pd(a) }
     swap_halves(a: Register) -> Register { _mm512_shuffle_f64x2::<0x4e>(a, a) }
     signs_below() -> Register { _mm512_setr_pd(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
     repeat_four(a: &[f64; 4]) -> Register { _mm512_broadcast_f64x4(_mm256_loadu_pd(a.as_ptr())) }

@@ -14,7 +14,7 @@ use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 ///
 /// # Errors
 /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
-pub(in crate::ocp::nlp::ipm) fn attach<'a, T: Real>(
+pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     qp: QpView<'a, T>,
     lengths: &Lengths,
     numbers: &'a mut impl Store<T>,
@@ -29,19 +29,19 @@ pub(in crate::ocp::nlp::ipm) fn attach<'a, T: Real>(
     Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
 }
 
-/// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties. What
+/// As [`kkt_view`], where the QP is new: sides are listed, with its bounds and penalties. What
 /// equations give way is measured in `units` of their rows.
 ///
 /// # Errors
-/// As [`attach`].
-pub(in crate::ocp::nlp::ipm) fn attach_to_new<'a, T: Real>(
+/// As [`kkt_view`].
+pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
     qp: QpView<'a, T>,
     lengths: &Lengths,
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
     units: &[T],
 ) -> Result<Iterate<'a, T>, QpError> {
-    let mut iterate = attach(qp, lengths, numbers, indices)?;
+    let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
     iterate.sides.list(qp, &reading(qp));
     let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.sizes.least));
     for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
@@ -113,7 +113,7 @@ pub(in crate::ocp::nlp::ipm) fn step<T: Real>(
     delta: T,
 ) -> Result<(), QpError> {
     iterate.proximal = delta;
-    towards(iterate, mu, false, true)
+    solve_newton(iterate, mu, false, true)
 }
 
 /// The step again with the same factors, towards `μ`; `corrected` for the products of the changes
@@ -121,15 +121,15 @@ pub(in crate::ocp::nlp::ipm) fn step<T: Real>(
 ///
 /// # Errors
 /// Those of the recursion.
-pub(in crate::ocp::nlp::ipm) fn again<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn resolve<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: T,
     corrected: bool,
 ) -> Result<(), QpError> {
-    towards(iterate, mu, corrected, false)
+    solve_newton(iterate, mu, corrected, false)
 }
 
-fn towards<T: Real>(
+fn solve_newton<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: T,
     corrected: bool,

@@ -7,17 +7,17 @@ use crate::qp::interior::Iterate;
 use crate::scalar::Real;
 
 /// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
-const FIRST: f64 = 1e-4;
+const FIRST_HESSIAN_PERTURBATION: f64 = 1e-4;
 /// With this on the diagonal, directions without curvature may be left alone.
 const FLAT: f64 = 1e-6;
 /// `δ_w` is never less.
-const LEAST: f64 = 1e-20;
+const MIN_HESSIAN_PERTURBATION: f64 = 1e-20;
 /// Where this is not enough nothing is.
-const MOST: f64 = 1e20;
+const MAX_HESSIAN_PERTURBATION: f64 = 1e20;
 /// A step that goes no farther than this part of what bounds leave of it is short,
 const SHORT: f64 = 0.1;
 /// and after so many in sequence the next ones are damped,
-const PATIENCE: usize = 8;
+const SHORT_STEPS_BEFORE_DAMPING: usize = 8;
 /// at first by this, as `δ_w` is,
 const FIRST_DAMPING: f64 = 1e-3;
 /// and not at all any more where this does not help.
@@ -49,7 +49,7 @@ impl Regularisation {
             return;
         }
         self.short += 1;
-        if self.short >= PATIENCE || self.damping > 0.0 {
+        if self.short >= SHORT_STEPS_BEFORE_DAMPING || self.damping > 0.0 {
             self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last);
             if self.damping > MOST_DAMPING {
                 (self.damping, self.short) = (0.0, 0);
@@ -71,9 +71,13 @@ impl Regularisation {
             Ok(()) => return Ok(self.damping * force),
             Err(failed) => failed,
         };
-        let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
+        let mut delta = if self.last > 0.0 {
+            (self.last / 3.0).max(MIN_HESSIAN_PERTURBATION)
+        } else {
+            FIRST_HESSIAN_PERTURBATION
+        };
         delta = delta.max(8.0 * self.damping);
-        while delta < MOST {
+        while delta < MAX_HESSIAN_PERTURBATION {
             match self.attempt(iterate, mu, delta, force) {
                 Ok(()) => {
                     self.last = delta;

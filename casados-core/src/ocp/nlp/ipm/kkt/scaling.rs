@@ -10,7 +10,7 @@ use crate::scalar::Real;
 /// Gaps of a state need not be less than this part of it times the tolerance.
 const ROUNDING: f64 = 1e-5;
 /// `s_max`: a mean multiplier that is larger relaxes tolerances.
-const MEAN: f64 = 100.0;
+const S_MAX: f64 = 100.0;
 
 /// Gaps of dynamics, each with the unit of its state.
 pub(in crate::ocp::nlp::ipm) fn of_gaps<'a, T: Real>(
@@ -68,7 +68,7 @@ pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
     let in_equations = of_sides(sides.equations, sides.free, units).fold(0.0, size);
     let (all, count) = of_gaps(dims, pi, units)
         .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
-    let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / MEAN).max(1.0);
+    let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / S_MAX).max(1.0);
     let pairs = sides.counts.pairs();
     let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
     let (mut in_units, mut judged, wide) = (T::ZERO, T::ZERO, T::from_f64(WIDE));

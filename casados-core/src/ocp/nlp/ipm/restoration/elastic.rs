@@ -12,11 +12,11 @@ use crate::qp::StageDims;
 use crate::scalar::Real;
 
 /// Penalties grow to this multiple of the first.
-const LARGEST: f64 = 1e4;
+const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// A violation that larger penalties do not make smaller than this part of it is there to stay.
-const STAYS: f64 = 0.9;
+const STATIONARY_UNDER_PENALTIES: f64 = 0.9;
 /// The barrier parameter of new penalties, in units of forces.
-const BARRIER: f64 = 0.1;
+const ELASTIC_MU: f64 = 0.1;
 
 /// The hard bound that is violated most, in units, while penalties stand for it.
 pub(in crate::ocp::nlp::ipm) fn worst<
@@ -50,9 +50,9 @@ pub(in crate::ocp::nlp::ipm) fn verdict<
 ) -> Option<Status> {
     let worst = worst(ocp, state, (given, units)).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
-    let stays = worst.violation > STAYS * state.stationary_violation
+    let stays = worst.violation > STATIONARY_UNDER_PENALTIES * state.stationary_violation
         && cost >= (ocp.objective.to_f64() - state.first_objective).abs();
-    if stays || penalty >= LARGEST * options.elastic_penalty {
+    if stays || penalty >= MAX_PENALTY_FACTOR * options.elastic_penalty {
         return Some(ocp.status_of_worst(&worst));
     }
     state.stationary_violation = worst.violation;
@@ -77,7 +77,7 @@ pub(in crate::ocp::nlp::ipm) fn soften<
     state.lengths = Lengths { sizes, ..Lengths::of(ocp.qp()) };
     state.elastic = Some(penalty);
     state.has_slacks = false;
-    state.mu = BARRIER * sizes.force;
+    state.mu = ELASTIC_MU * sizes.force;
     state.regularisation = Regularisation::default();
     state.has_filter = false;
 }

@@ -1,7 +1,7 @@
 //! How a run may end, from residuals of an iterate.
 
 use super::elastic;
-use super::feasibility;
+use super::phase;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
@@ -13,8 +13,6 @@ use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store, larger};
 use crate::scalar::Real;
 
-/// Variables that are larger have no end.
-const UNBOUNDED: f64 = 1e12;
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// What follows the residuals of an iteration.
     pub(in crate::ocp::nlp::ipm) fn next<P: Formulation<T>>(
@@ -25,8 +23,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         row: &Iteration,
     ) -> Next {
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        if let Some(status) = state.contradiction {
+            return Next::End(status);
+        }
         if state.lengths.alone {
-            let next = feasibility::judge(ocp, state, (work.penalties, work.units), &self.options);
+            let next = phase::check_convergence(ocp, state, (work.penalties, work.units), &self.options);
             if let Some(next) = next {
                 return next;
             }
@@ -41,7 +42,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let violation = larger(row.residuals.dynamics, row.residuals.inequalities);
         let is_feasible = violation <= self.options.tolerance;
         let (v, _) = ocp.iterate.vectors();
-        if is_feasible && state.elastic.is_none() && v.iter().any(|v| v.abs().to_f64() > UNBOUNDED) {
+        if is_feasible
+            && state.elastic.is_none()
+            && v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates)
+        {
             return Next::End(Status::Unbounded);
         }
         if row.iteration >= self.options.max_iterations {

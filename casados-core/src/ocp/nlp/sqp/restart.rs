@@ -7,23 +7,23 @@ use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::nlp::simulation::{BETTER, STRAYING};
+use crate::ocp::nlp::simulation::{RESTART_AFTER, RESTART_GAIN};
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, larger};
 use crate::scalar::Real;
 
 /// The regularisation of the first direction.
-const DAMPING: f64 = 1.0;
+const RESTART_DAMPING: f64 = 1.0;
 /// A simulation that violates more than this multiple of what the guess does has gone astray.
-const FAR: f64 = 1e3;
+const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Whether a run begins again, with steps that are damped as those of Gauss and Newton are:
     /// once, where it failed, or has had penalties for long and a simulation with the controls of
     /// the guess violates less than its iterate. It was long steps at first that led astray, or
     /// gaps that were to be closed over unstable dynamics.
-    pub(super) fn begin_again<P: Formulation<T>>(
+    pub(super) fn restart<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -35,21 +35,24 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let failed =
             matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_)));
-        let strays = end.is_none() && state.elastic_steps == STRAYING;
-        let can = C::EXACT && !state.again && row.iteration < self.options.max_iterations;
-        if !((failed || strays) && can && self.curvature.convexification() == Convexification::Reduced) {
+        let stalls = end.is_none() && state.elastic_steps == RESTART_AFTER;
+        let can = C::EXACT
+            && !state.second_attempt
+            && state.contradiction.is_none()
+            && row.iteration < self.options.max_iterations;
+        if !((failed || stalls) && can && self.curvature.convexification() == Convexification::Reduced) {
             return false;
         }
         self.leave_elastic(ocp, state);
         let mut found = self.simulate_guess(ocp);
-        if strays && !found.is_some_and(|violation| violation < BETTER * violation_of(&row.residuals)) {
+        if stalls && !found.is_some_and(|violation| violation < RESTART_GAIN * violation_of(&row.residuals)) {
             if found.is_some() {
                 ocp.iterate.copy_from(&self.trial);
             }
             state.search.linearised = None;
             return false;
         }
-        found = found.filter(|&violation| violation <= FAR * state.violation_of_guess);
+        found = found.filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.violation_of_guess);
         if found.is_none() {
             ocp.iterate.copy_from(&self.weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -58,7 +61,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let &mut State { sizes, best_residual, best_iteration, .. } = state;
         let over = state.over.take();
         let best = State { best_residual, best_iteration, ..State::new() };
-        *state = State { over, again: true, damping: DAMPING, sizes, ..best };
+        *state = State { over, second_attempt: true, damping: RESTART_DAMPING, sizes, ..best };
         self.forget_weights(ocp, state);
         true
     }

@@ -1,5 +1,5 @@
 //! Values that are not finite: among single numbers the first one is an error at once; of several
-//! side by side each lane that has one is doubted, and the others go on.
+//! side by side its lane is masked, and the others go on.
 
 use crate::error::Error;
 use crate::linalg::{are_finite, kernels, run_plain};
@@ -9,23 +9,23 @@ use bytemuck::Zeroable;
 
 /// Zero in every lane all of whose values were finite.
 #[derive(Zeroable)]
-pub(crate) struct Doubt<E>(E);
+pub(crate) struct NonFiniteLanes<E>(E);
 
-impl<E: Lanes> Doubt<E> {
+impl<E: Lanes> NonFiniteLanes<E> {
     /// Before a call.
-    pub fn forget(&mut self) {
+    pub fn reset(&mut self) {
         self.0 = E::zeroed();
     }
 
-    /// The lanes that nobody doubts.
+    /// The lanes all of whose values were finite.
     #[inline(always)]
-    pub fn none(&self) -> E::Mask {
+    pub fn finite_lanes(&self) -> E::Mask {
         self.0.is_finite()
     }
 
-    /// These are the lanes that nobody doubts.
+    /// Sets these lanes.
     #[inline(always)]
-    pub fn keep(&mut self, lanes: E::Mask) {
+    pub fn set_finite_lanes(&mut self, lanes: E::Mask) {
         self.0 = E::select(lanes, E::zeroed(), E::from_f64(f64::NAN));
     }
 
@@ -37,10 +37,10 @@ impl<E: Lanes> Doubt<E> {
     #[inline(always)]
     pub fn check(&mut self, values: &[E], error: impl FnOnce(usize, f64) -> Error) -> Result<(), Error> {
         if const { E::LANES > 1 } {
-            notice(values, self);
+            record(values, self);
             return Ok(());
         }
-        if !ONE_BY_ONE && are_finite(values) {
+        if !CHECK_EACH_VALUE && are_finite(values) {
             return Ok(());
         }
         match values.iter().position(|value| !E::all(value.is_finite())) {
@@ -57,15 +57,15 @@ impl<E: Lanes> Doubt<E> {
 
 /// Whether single numbers are looked at one by one. Where registers take several of them all are,
 /// without a branch for each.
-pub(super) const ONE_BY_ONE: bool = !REGISTERS;
+pub(super) const CHECK_EACH_VALUE: bool = !REGISTERS;
 
 kernels! { by run_plain;
-    /// Doubts lanes with a value that is not finite.
-    fn notice [E: Lanes] [E] <A>(values: &'k [E], doubt: &'k mut Doubt<E>) {
-        let mut finite = doubt.none();
+    /// Clears lanes with a non-finite value.
+    fn record [E: Lanes] [E] <A>(values: &'k [E], non_finite: &'k mut NonFiniteLanes<E>) {
+        let mut finite = non_finite.finite_lanes();
         for value in values {
             finite = E::and(finite, value.is_finite());
         }
-        doubt.keep(finite);
+        non_finite.set_finite_lanes(finite);
     }
 }

@@ -1,4 +1,4 @@
-//! The feasibility phase: violations of hard bounds alone are made small, from where no step made
+//! The restoration phase: violations of hard bounds alone are made small, from where no step made
 //! progress. Either a point without violations is found, and the run goes on from there, or one
 //! where the sum of violations is stationary.
 //!
@@ -19,7 +19,7 @@ use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::{Next, State};
-use crate::ocp::nlp::ipm::violations::{PHASES, SMALL};
+use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
 use crate::qp::interior::{Sides, at};
@@ -28,11 +28,11 @@ use crate::scalar::{Real, Scalar};
 
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
 /// of the objective is small.
-const FORCE: f64 = 1e3;
+const PENALTY_SCALING: f64 = 1e3;
 /// Where violations are no more than this, a run begins with a monotone barrier parameter first.
-const FAR_OFF: f64 = 1e-2;
+const MONOTONE_FIRST_BELOW: f64 = 1e-2;
 /// A simulation is not far away if states move by no more than this times the gaps.
-const FAR: f64 = 100.0;
+const MAX_SIMULATED_DISTANCE: f64 = 100.0;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Goes on where no step makes progress: violations alone, then with a monotone barrier
@@ -50,23 +50,24 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 state.begin_monotone(&self.options);
                 return None;
             }
-            state.phase.count = PHASES;
-            leave(ocp, state, penalties, &self.options);
+            state.phase.count = MAX_RESTORATION_PHASES;
+            exit(ocp, state, penalties, &self.options);
             ocp.recall(&self.best);
             soften(ocp, state, (penalties, units), self.options.elastic_penalty);
             return None;
         }
         // Near a feasible point it is not violations that hinder a first attempt.
-        let is_violated = state.violation > if state.progress.adapts() { FAR_OFF } else { SMALL };
-        if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_begin() {
+        let is_violated =
+            state.violation > if state.progress.adapts() { MONOTONE_FIRST_BELOW } else { SMALL_VIOLATION };
+        if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_enter() {
             if state.violation > state.best_violation {
                 ocp.recall(&self.best);
             }
-            if state.gaps >= SMALL && !P::Dynamics::LIFTED {
+            if state.gaps >= SMALL_VIOLATION && !P::Dynamics::LIFTED {
                 self.close_gaps(ocp, capacity);
             }
             let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
-            begin(ocp, state, (&*given.penalties, &*given.units));
+            enter(ocp, state, (&*given.penalties, &*given.units));
             return None;
         }
         if state.progress.adapts() {
@@ -90,27 +91,27 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let Self { trial, work, .. } = self;
         let work = Work::new(ocp.ends(), capacity, work.as_mut());
         trial.copy_from(&ocp.iterate);
-        if ocp.simulate(trial, work.ends, work.units, FAR) {
+        if ocp.simulate(trial, work.ends, work.units, MAX_SIMULATED_DISTANCE) {
             ocp.iterate.copy_from(trial);
         }
     }
 }
 
 /// Begins a phase.
-fn begin<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
     given: (&[T], &[T]),
 ) {
     state.phase.force = Some(state.lengths.sizes.force);
     state.phase.count += 1;
-    state.lengths.sizes.force *= FORCE;
+    state.lengths.sizes.force *= PENALTY_SCALING;
     soften(ocp, state, given, 1.0);
     state.lengths.alone = true;
 }
 
 /// Ends it: bounds are as hard as they were.
-pub(in crate::ocp::nlp::ipm) fn leave<
+pub(in crate::ocp::nlp::ipm) fn exit<
     P: Formulation<T>,
     T: Real,
     D: AsRef<[StageDims]>,
@@ -130,7 +131,7 @@ pub(in crate::ocp::nlp::ipm) fn leave<
 }
 
 /// What follows an iterate of a phase: the end of the run, the end of the phase, or nothing.
-pub(in crate::ocp::nlp::ipm) fn judge<
+pub(in crate::ocp::nlp::ipm) fn check_convergence<
     P: Formulation<T>,
     T: Real,
     D: AsRef<[StageDims]>,
@@ -142,13 +143,13 @@ pub(in crate::ocp::nlp::ipm) fn judge<
     options: &IpmOptions,
 ) -> Option<Next> {
     let violations = state.phase.violations;
-    if violations.stay()
+    if violations.is_stationary()
         && let Some(worst) = elastic::worst(ocp, state, (penalties, units))
     {
         return Some(Next::End(ocp.status_of_worst(&worst)));
     }
     if violations.are_small() || state.error <= options.tolerance {
-        leave(ocp, state, penalties, options);
+        exit(ocp, state, penalties, options);
         return Some(Next::NewPenalties);
     }
     None

@@ -1,6 +1,6 @@
 //! A second attempt, from a simulation with the controls of the guess.
 
-use super::feasibility::leave;
+use super::phase::exit;
 use crate::ocp::assembly::curvature::Slopes;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
 use crate::ocp::formulation::instance::Ocp;
@@ -10,7 +10,7 @@ use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::Phase;
-use crate::ocp::nlp::simulation::{BETTER, STRAYING};
+use crate::ocp::nlp::simulation::{RESTART_AFTER, RESTART_GAIN};
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
@@ -20,7 +20,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// violations, for long: once, where a simulation with the controls of the guess violates
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
     /// astray, and violations that stay there say nothing of the problem.
-    pub(in crate::ocp::nlp::ipm) fn begin_again<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn restart<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
@@ -30,9 +30,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     where
         P::Dynamics: SecondOrder<T>,
     {
-        let strays = end.is_none() && state.straying == STRAYING;
+        let stalls = end.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || strays) || state.again || P::Dynamics::LIFTED {
+        if !(failed || stalls) || state.second_attempt || P::Dynamics::LIFTED {
             return false;
         }
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
@@ -49,13 +49,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let is_linearised = ocp.linearise(Slopes).is_ok();
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
-        if !(is_linearised && found < BETTER * left) {
+        if !(is_linearised && found < RESTART_GAIN * left) {
             core::mem::swap(&mut ocp.iterate, &mut self.trial);
             state.is_linearised = false;
             return false;
         }
-        leave(ocp, state, work.penalties, &self.options);
-        (state.phase, state.is_linearised, state.again) = (Phase::default(), true, true);
+        exit(ocp, state, work.penalties, &self.options);
+        (state.phase, state.is_linearised, state.second_attempt) = (Phase::default(), true, true);
         true
     }
 }
