@@ -90,7 +90,7 @@ impl ErrorHistory {
     }
 }
 
-/// RejectionHistory of rough steps from one point. The error of a jump falls with the step size at
+/// Rejections of rough steps from one point. The error of a jump falls with the step size at
 /// least; what does not fall are rounding errors, which are rough too.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DiscontinuityDetector {

@@ -65,10 +65,12 @@ impl Crossing {
 /// #[function]
 /// fn height(x: [f64; 2]) -> f64 { x[0] }
 ///
-/// // The integration ends on the ground. let ground =
-/// Event::terminal::<Height>(Crossing::Falling); let mut ball = Hybrid::new(Adaptive::<Ball,
-/// Radau>::new(AdaptiveOptions::default())?, &[ground])?; let end = ball.solve(&vector![5.0, 0.0],
-/// &SVector::<f64, 0>::zeros(), 9.0)?; assert!((end.t - 1.0).abs() < 1e-12);
+/// // The integration ends on the ground.
+/// let ground = Event::terminal::<Height>(Crossing::Falling);
+/// let radau = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// let mut ball = Hybrid::new(radau, &[ground])?;
+/// let end = ball.solve(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 9.0)?;
+/// assert!((end.t - 1.0).abs() < 1e-12);
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub struct Event<M: Dae, T: Real = f64> {

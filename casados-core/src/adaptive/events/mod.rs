@@ -66,10 +66,12 @@ use bytemuck::Zeroable;
 /// #[function]
 /// fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
 ///
-/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling); let mut ball =
-/// Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?; let end =
-/// ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?; // It hits the ground after
-/// a second, at 10 m/s. assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
+/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// let radau = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+/// let mut ball = Hybrid::new(radau, &[bounces])?;
+/// let end = ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?;
+/// // It hits the ground after a second, at 10 m/s.
+/// assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
 /// assert!((end.solution.nominal.x - vector![8.0 * 0.5 - 1.25, 8.0 - 5.0]).norm() < 1e-11);
 /// # Ok::<(), casados::Error>(())
 /// ```

@@ -12,10 +12,8 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `scaling` | units of forces, and the sizes of multipliers |
 //! | `barrier`, `predictor` | how `μ` shrinks, and the step that says how far |
-//! | `again` | a second attempt, from a simulation |
-//! | `feasibility`, `violations` | violations alone where no step makes progress, and that they stay |
-//! | `elastic` | penalties where that does not help |
-//! | `verdict` | how a run may end |
+//! | `restoration` | restoration phase, elastic mode, restart from a simulation, verdicts |
+//! | `violations` | whether violations are stationary |
 //! | `lifted` | stages that are variables go with the iterate |
 //!
 //! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the

@@ -12,7 +12,7 @@
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `scaled` | the QP in units |
 //! | `run` | the iterations, and how they end |
-//! | `again` | the second attempt, from a simulation |
+//! | `restart` | the second attempt, from a simulation |
 
 mod acceptance;
 mod direction;
