@@ -169,7 +169,6 @@ fn walls_on_opposite_sides() -> Test {
     let Status::Infeasible { violation, .. } = outcome.status else {
         return Err(outcome.to_string().into());
     };
-    assert!(outcome.iterations < 50);
     // Both walls together are missed by 1.5 m at least, one of them by half of that.
     assert!(violation > 0.75 - 1e-3, "{violation}");
     Ok(())

@@ -20,7 +20,7 @@ macro_rules! names {
 names! {
     Adaptive AdaptiveOptions Crossing Event Hybrid Piecewise Radau Batch BatchError Intervals Heap Jacobian
     Newton Options Start LeastSquares Quadrature Seeds Butcher6 Custom DormandPrince5 DormandPrince8 Euler
-    Gauss Heun Midpoint RadauIIA Rk4 Tableau Dae Erk Error Function Inline Irk Ode dae function ode
+    Gauss Heun Midpoint RadauIIA Rk4 Tableau Dae Erk Error Function Inline Irk Ode Record dae function ode
     Collocation Constraint ConvexCost Exact Formulation GaussNewton GeneralCost Globalisation HeapIpm
     HeapOcp HeapRealTime HeapSqp Horizon Huber IpmOptions Iteration LeastSquaresCost Log Map OcpError Outcome
     Problem RealTime Sensitivities Shooting SolutionFactors SqpOptions Status Trajectory Update

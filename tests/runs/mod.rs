@@ -85,9 +85,21 @@ const VERDICTS: [(&str, &str); 5] = [
     ("the Hessian is not positive semidefinite", "NotConvex"),
 ];
 
+/// What refused data are told by: how the text begins, a part of it, and the variant of the error.
+const CONTENTS: [(&str, &str, &str); 4] = [
+    ("the option", "", "InvalidOption"),
+    ("stage", " elements instead of ", "Length"),
+    ("stage", " is from ", "CrossedBounds"),
+    ("stage", " is ", "InvalidValue"),
+];
+
 /// The variant of a verdict; of other errors their text before the first number or name.
 pub fn kind(error: &impl Debug) -> String {
     let text = format!("{error:?}");
+    let by_content = CONTENTS.iter().find(|(start, part, _)| text.starts_with(start) && text.contains(part));
+    if let Some((.., variant)) = by_content {
+        return (*variant).into();
+    }
     match VERDICTS.iter().find(|(text_of, _)| text.starts_with(text_of)) {
         Some((_, variant)) => (*variant).into(),
         None => text

@@ -187,47 +187,6 @@ impl RejectionHistory {
     }
 }
 
-/// Rounding errors of the model in the difference of an explicit pair: of shorter steps from one
-/// point that of a smooth solution falls like a high power of the length, rounding errors fall like
-/// the length. They are of any sign from step to step, and do not add up like errors that nothing
-/// damps.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct RoundingNoise {
-    /// The largest that was seen, over the length of the step.
-    per_length: f64,
-    /// The length and the difference of the first step from here that was refused.
-    refused: Option<(f64, f64)>,
-}
-
-impl RoundingNoise {
-    /// A step is this much shorter before it is compared with the one that was refused.
-    const SHORTER: f64 = 0.8;
-
-    /// The error of a difference of which the smooth part counts so often, and rounding errors
-    /// once.
-    pub fn error(&self, h: f64, difference: f64, count: f64) -> f64 {
-        let noise = (2.0 * self.per_length * h).min(difference);
-        noise + count * (difference - noise)
-    }
-
-    /// A step from the same point as the last one, unless that was accepted; both may be refused.
-    pub fn attempted(&mut self, h: f64, difference: f64, accepted: bool) {
-        let is_small = difference <= 1.0;
-        if let Some((before, larger)) = self.refused
-            && is_small
-            && h <= Self::SHORTER * before
-            && difference * before * before >= larger * h * h
-        {
-            self.per_length = self.per_length.max(difference / h);
-        }
-        self.refused = match self.refused {
-            _ if accepted => None,
-            None if is_small => Some((h, difference)),
-            refused => refused,
-        };
-    }
-}
-
 /// How the step size of an explicit method follows its error.
 #[derive(Clone, Copy, Debug)]
 pub struct Control {

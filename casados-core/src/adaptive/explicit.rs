@@ -1,7 +1,7 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::control::{ExplicitStep, PiController, RoundingNoise};
+use super::control::{ExplicitStep, PiController};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
@@ -159,7 +159,6 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     let mut t = span.start;
     let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
     let mut controller = PiController::new(B::CONTROL);
-    let mut noise = RoundingNoise::default();
     let mut refusal = Refusal::Error;
     let (mut rejected, mut tried) = (false, 0);
     loop {
@@ -172,8 +171,7 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let (difference, count) = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
-        let error = noise.error(h.to_f64().abs(), difference, count);
+        let error = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -185,7 +183,6 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
         let error = controller.error_of_difference::<T>(tried_step, error);
         let factor = controller.factor::<T>(tried_step, error);
-        noise.attempted(tried_step.h, difference, error <= 1.0);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
@@ -225,7 +222,7 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
 }
 
 /// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
-/// of derivatives too if they take part, and how often it counts; NaN if there is none.
+/// of derivatives too if they take part; NaN if there is none.
 fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
@@ -233,25 +230,22 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     t: T,
     h: T,
     steps: f64,
-) -> (f64, f64) {
+) -> f64 {
     let error = step.take(t, h).and_then(|()| {
         let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
         step.error(t, h, steps, rtol, atol)
     });
-    let (error, count) = error.unwrap_or((f64::NAN, 1.0));
+    let error = error.unwrap_or(f64::NAN);
     match &mut run.sensitivities {
-        Some(sensitivities) if error * count <= 1.0 => {
+        Some(sensitivities) if error <= 1.0 => {
             let Workspace { point, u, parameters, rtol, atol, .. } = &*run.base;
             let taken = AcceptedStep { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
             let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
             let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
             // Written so that NaN stays.
-            match other {
-                Ok(other) if error * count >= other => (error, count),
-                other => (other.unwrap_or(f64::NAN), 1.0),
-            }
+            other.map_or(f64::NAN, |other| if error >= other { error } else { other })
         }
-        _ => (error, count),
+        _ => error,
     }
 }
 

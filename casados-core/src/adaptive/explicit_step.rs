@@ -51,13 +51,12 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The difference of the two methods relative to what is tolerated, and how often it counts
-    /// where the interval has so many steps; the derivative at the end is there if it is at most
-    /// one.
+    /// The estimated error relative to what is tolerated, where the interval has so many steps; the
+    /// derivative at the end is there if that is at most one.
     ///
     /// # Errors
     /// A value that is not finite.
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<(f64, f64), Error>;
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// How the step that was taken changes the branches of the model, if it does.
     fn change(&self) -> Option<DefectCheck>;
     /// The state at the end.
@@ -198,7 +197,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Ok(())
     }
 
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<(f64, f64), Error> {
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
         let (stages, last) = B::DIFFERENCE;
         if last != 0.0 {
             self.arrive(t, h)?;
@@ -223,12 +222,12 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         let error = B::combined(fine, coarse);
         // Written so that NaN stays.
         if error > 1.0 {
-            return Ok((error, 1.0));
+            return Ok(error);
         }
         if last == 0.0 {
             self.arrive(t, h)?;
         }
-        Ok((error, self.global_error_factor(steps)))
+        Ok(error * self.global_error_factor(steps))
     }
 
     fn change(&self) -> Option<DefectCheck> {

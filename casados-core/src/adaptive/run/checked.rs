@@ -41,7 +41,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         span: Span<T>,
     ) -> Result<(), Error> {
         let size = state.h.abs();
-        let is_short = size < shortest(span, state.t) && size < T::from_f64(SHRUNK) * state.longest_so_far;
+        // Steps over a switching surface are tried down to a part of the shortest length.
+        let least = if M::BRANCHES == 0 {
+            shortest(span, state.t).max(T::from_f64(1e-12) * (span.end - span.start).abs())
+        } else {
+            T::from_f64(0.125) * shortest(span, state.t)
+        };
+        let is_short = size < least && size < T::from_f64(SHRUNK) * state.longest_so_far;
         if !(state.is_unsolved() && is_short) {
             return Ok(());
         }

@@ -7,13 +7,13 @@ use super::*;
 use crate::adaptive::branches::Branches;
 use crate::adaptive::point::variable;
 
-/// A step of so many roundoff errors of the interval, and of 1e-12 of it, is as short as any: what
-/// an Euler step misses there is far below rounding.
+/// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
+/// there is far below rounding.
 const SHORTEST: f64 = 1e3;
 
 /// The length of a step that is as short as any.
 pub(super) fn shortest<T: Real>(span: Span<T>, t: T) -> T {
-    T::from_f64((SHORTEST * T::EPSILON).max(1e-12)) * (span.end - span.start).abs().max(t.abs())
+    T::from_f64(SHORTEST * T::EPSILON) * (span.end - span.start).abs().max(t.abs())
 }
 
 impl<M: Dae, T: Real> Run<'_, M, T> {

@@ -18,10 +18,10 @@
 //! ```
 
 use super::iterate::{Iterate, at};
-use super::run::Limits;
-use super::scaling::Units;
+use super::limits::Limits;
 use super::sides::Sides;
 use super::terms::Terms;
+use super::units::Units;
 use crate::qp::element::set;
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;

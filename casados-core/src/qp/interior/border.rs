@@ -17,9 +17,9 @@
 use super::coupling::Coupling;
 use super::kernels::{Columns, Part, Source, product, subtract};
 use super::riccati::{Equations, Riccati};
-use super::scaling::Units;
 use super::shared::Shared;
 use super::symmetric::Symmetric;
+use super::units::Units;
 use super::vector::{add_scaled, dot, shrink};
 use crate::qp::element::{add, set};
 use crate::qp::error::QpError;

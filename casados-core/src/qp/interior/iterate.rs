@@ -4,9 +4,9 @@ use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
 use super::riccati::{Extent, First, Riccati};
-use super::scaling::Units;
 use super::sides::{Counts, Sides};
 use super::terms::{Most, Terms};
+use super::units::Units;
 use crate::qp::element::get;
 use crate::qp::layout::{
     Places, StageDims, StageOffsets, assign, end, first_nx, pad, part, part_mut, take_mut,

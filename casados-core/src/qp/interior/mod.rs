@@ -8,6 +8,7 @@ mod coupling;
 mod curvature;
 mod iterate;
 mod kernels;
+mod limits;
 mod newton;
 mod options;
 mod pairs;
@@ -21,6 +22,7 @@ mod stage_factor;
 mod store;
 mod symmetric;
 mod terms;
+mod units;
 mod vector;
 mod verdict;
 
@@ -50,8 +52,9 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::marker::PhantomData;
-use run::{Attempt, Limits, Run, Runs};
-use scaling::Units;
+use limits::Limits;
+use run::{Attempt, Run, Runs};
+use units::Units;
 
 /// An interior point that exploits the structure of optimal control.
 ///

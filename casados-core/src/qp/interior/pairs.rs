@@ -8,8 +8,8 @@
 //! leaves the digits of the Hessian beside it.
 
 use super::iterate::at;
-use super::scaling::Units;
 use super::sides::Sides;
+use super::units::Units;
 use super::vector::{dot, largest_negative_ratio, largest_size};
 use crate::qp::element::set;
 use crate::qp::solution::SolutionView;

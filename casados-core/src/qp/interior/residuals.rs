@@ -1,8 +1,7 @@
 //! Residuals of an iterate, and what they are sums of.
 
 use super::iterate::Iterate;
-use super::run::Limits;
-use super::scaling::Units;
+use super::units::Units;
 use super::vector::{largest_of, largest_product, largest_size};
 use crate::qp::layout::{Places, part};
 use crate::qp::marked;
@@ -54,22 +53,13 @@ impl<T: Real> Iterate<'_, T> {
         self.measured::<E>(self.measure)
     }
 
-    /// Whether residuals are small that were [`judged`](Self::judged): in units, and as they are
-    /// beside their terms.
-    #[inline(always)]
-    pub fn are_small(&self, judged: Largest<T>, limits: &Limits<T>) -> bool {
-        limits.hold(judged, self.terms)
-            && (self.measure.rows.is_empty()
-                || limits.hold_beside(self.measured::<T>(Units::NONE), self.own_terms))
-    }
-
     /// Residuals that were [`judged`](Self::judged), in the units of the user.
     pub fn told(&self, judged: Largest<T>) -> Residuals {
         if self.measure.rows.is_empty() { judged.into() } else { self.measured::<T>(Units::NONE).into() }
     }
 
     #[inline(always)]
-    fn measured<E: Packed<T>>(&self, units: Units<'_, T>) -> Largest<T> {
+    pub fn measured<E: Packed<T>>(&self, units: Units<'_, T>) -> Largest<T> {
         let (inequalities, complementarity) = self.sides.judge(units);
         Largest {
             stationarity: self.gradient_size::<E>(units),

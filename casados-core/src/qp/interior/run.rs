@@ -1,8 +1,8 @@
 //! The iterations.
 
 use super::iterate::Iterate;
+use super::limits::Limits;
 use super::options::InteriorPointOptions;
-use super::residuals::Largest;
 use super::riccati::First;
 use super::sides::Penalties;
 use super::terms::Terms;
@@ -86,54 +86,6 @@ const PROGRESS: f64 = 0.9;
 const IDLE: usize = 50;
 /// After so many correctors may go in a circle.
 const CYCLE: usize = 8;
-
-/// Residuals as they are are to be below so many `ε` of their terms.
-const ROUNDING: f64 = 1e6;
-/// The part of the tolerance that residuals in units are to be below.
-const IN_UNITS: f64 = 0.1;
-
-/// What residuals are to be below.
-pub struct Limits<T> {
-    absolute: Terms<T>,
-    relative: T,
-}
-
-impl<T: Real> Limits<T> {
-    /// At least a tolerance that is asked for.
-    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: Penalties, scaled: bool) -> Self {
-        let values = T::from_f64(options.tolerance).max(relaxed);
-        // What multipliers are to prove depends on how well gradients vanish.
-        let share = if penalties == Penalties::Hard { 0.01 } else { 1.0 };
-        // Units are estimates.
-        let values = if scaled { values * T::from_f64(IN_UNITS) } else { values };
-        let absolute = Terms { forces: values * T::from_f64(share), values };
-        Self { absolute, relative: T::from_f64(options.relative_tolerance) }
-    }
-
-    /// Whether residuals as they are are small beside their terms; those of complementarity are
-    /// products of forces and values.
-    pub fn hold_beside(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
-        let relative = self.relative.max(T::from_f64((ROUNDING * T::EPSILON).min(1e-5)));
-        let products = (relative * terms.forces * terms.values).max(self.absolute.forces);
-        let others = Largest { complementarity: T::ZERO, ..residuals };
-        residuals.complementarity <= products && Self { relative, ..*self }.hold(others, terms)
-    }
-
-    /// Of residuals with such terms.
-    pub fn of(&self, terms: Terms<T>) -> Terms<T> {
-        Terms {
-            forces: (self.relative * terms.forces).max(self.absolute.forces),
-            values: (self.relative * terms.values).max(self.absolute.values),
-        }
-    }
-
-    /// Whether residuals with such terms are small.
-    pub fn hold(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
-        let Largest { stationarity, dynamics, inequalities, complementarity } = residuals;
-        let Terms { forces, values } = self.of(terms);
-        stationarity <= forces && complementarity <= forces && dynamics <= values && inequalities <= values
-    }
-}
 
 /// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
 const BOUNDARY: f64 = 0.005;
@@ -319,7 +271,8 @@ impl<T: Real> Iterate<'_, T> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
         let residuals = self.told(judged);
-        if objective.is_finite() && self.are_small(judged, limits) {
+        let is_solved = self.are_small(judged, limits) || self.are_small_as_given(limits);
+        if objective.is_finite() && is_solved {
             (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
             return Ok(statistics);
         }

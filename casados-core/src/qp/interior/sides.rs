@@ -6,7 +6,7 @@
 //! `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds that are hard
 //! are an equation, with a multiplier without sign.
 
-use super::scaling::Units;
+use super::units::Units;
 use crate::qp::element::set;
 use crate::qp::layout::{Places, part, take_mut};
 use crate::qp::problem::QpView;
