@@ -21,11 +21,11 @@ use alloc::vec::Vec;
 /// value_hessian           ∂²V/∂x₀²,  ∂²V/∂x₀∂p,  ∂²V/∂p²
 /// ```
 ///
-/// `p` are the parameters of all stages, which change together. [`Ocp::factorise`] fills it by one
-/// linearisation and one Riccati recursion, `O(N (NX + NU)³)`. An adjoint costs
-/// `O(N (NX + NU) (NX + NU + NP))`, however many parameters there are; the Hessian of the value one
-/// such solve for each parameter. The gradient of the value is that of the Lagrangian (envelope
-/// theorem), and costs nothing more.
+/// `p` are the parameters of all stages, which change together.
+/// [`Ocp::factorise`](crate::ocp::Ocp::factorise) fills it by one linearisation and one Riccati
+/// recursion, `O(N (NX + NU)³)`. An adjoint costs `O(N (NX + NU) (NX + NU + NP))`, however many
+/// parameters there are; the Hessian of the value one such solve for each parameter. The gradient
+/// of the value is that of the Lagrangian (envelope theorem), and costs nothing more.
 ///
 /// A free initial state, periodic states and shared controls are unknowns beside the recursion.
 /// There are no derivatives by a free initial state.
