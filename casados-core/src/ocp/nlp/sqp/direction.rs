@@ -178,15 +178,19 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
-        penalty *= PENALTY_FACTOR;
-        self.set_elastic(ocp, state, penalty);
-        // Forces are as large as penalties, and have as many digits.
-        self.qp_solver.permit(QP_ROUNDING * penalty);
-        let solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
-        if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
-            // It is, and from now on it does.
-            state.penalty = penalty.min(self.options.elastic_penalty * MAX_PENALTY_FACTOR / PENALTY_FACTOR);
-            return Ok(Direction::Step);
+        let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
+        let mut solved = true;
+        while solved && penalty < largest {
+            penalty *= PENALTY_FACTOR;
+            self.set_elastic(ocp, state, penalty);
+            // Forces are as large as penalties, and have as many digits.
+            self.qp_solver.permit(QP_ROUNDING * penalty);
+            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
+            if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+                // It is, and from now on it does.
+                state.penalty = penalty;
+                return Ok(Direction::Step);
+            }
         }
         // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
         // gaps are closed.
