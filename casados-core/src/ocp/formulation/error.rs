@@ -345,8 +345,8 @@ pub enum OcpError {
         interval: u32,
         /// The largest state at its start.
         state: &'static str,
-        /// Its value.
-        value: f64,
+        /// Its value, in single precision.
+        value: f32,
         /// Why.
         error: Error,
     },

@@ -210,6 +210,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if largest.0.is_empty() || value.abs() > largest.1.abs() { (name, value) } else { largest }
         });
         let interval = u32::try_from(interval).unwrap_or(u32::MAX);
-        OcpError::Simulation { interval, state: largest.0, value: largest.1.to_f64(), error }
+        OcpError::Simulation { interval, state: largest.0, value: largest.1.to_f64() as f32, error }
     }
 }
