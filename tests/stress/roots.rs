@@ -101,13 +101,14 @@ fn solve<const N: usize>(mut a: [[f64; N]; N], mut b: SVector<f64, N>) -> Option
         let pivot = (k..N).max_by(|i, j| a[*i][k].abs().total_cmp(&a[*j][k].abs()))?;
         a.swap(k, pivot);
         b.swap_rows(k, pivot);
-        if !(a[k][k].abs() > 0.0) {
+        let row = a[k];
+        if row[k] == 0.0 || row[k].is_nan() {
             return None;
         }
         for i in k + 1..N {
-            let factor = a[i][k] / a[k][k];
-            for j in k..N {
-                a[i][j] -= factor * a[k][j];
+            let factor = a[i][k] / row[k];
+            for (to, from) in a[i].iter_mut().zip(row).skip(k) {
+                *to -= factor * from;
             }
             b[i] -= factor * b[k];
         }
