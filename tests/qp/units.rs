@@ -125,7 +125,8 @@ fn solve(
     let (found, objective) = residuals(qp.view(), &units.back(solution)?);
     // The tolerance is in units, and sizes of what was drawn are up to a hundred. Each of some tens
     // of sides may cost the tolerance.
-    let mut wrong = (!(found.largest() <= 100.0 * TOLERANCE)).then(|| format!("{found}"));
+    let mut wrong =
+        (found.largest().is_nan() || found.largest() > 100.0 * TOLERANCE).then(|| format!("{found}"));
     let expected = statistics.objective / units.objective;
     if (expected - objective).abs() > 100.0 * TOLERANCE * (1.0 + objective.abs()) {
         wrong = Some(format!("objective {expected} is {objective}"));
