@@ -7,7 +7,7 @@
 mod plants;
 
 use super::tolerances::tell;
-use casados::{Adaptive, AdaptiveOptions, DormandPrince8, Gauss, Radau};
+use casados::{Adaptive, AdaptiveOptions, Gauss, Radau};
 use nalgebra::SVector;
 use plants::{
     Exchanger, ExchangerEliminated, LongBeam, LongBeamInRanges, Pipes, PipesEliminated, Tanks,

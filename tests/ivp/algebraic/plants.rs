@@ -5,7 +5,7 @@ use casados::dae;
 
 /// Each plant in both forms, and what they share.
 #[dae]
-pub mod plants {
+pub mod equations {
     /// The tridiagonal system of twenty pressures: pipe `e` leads from node `e − 1` to node `e`,
     /// nodes are joined by bypasses of conductance `BYPASS`, and each leaks. `flow` has 21 pipes.
     const LEAK: f64 = 0.4;
