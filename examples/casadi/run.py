@@ -12,6 +12,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 CASADI = "casadi==3.8.2"
+MATPLOTLIB = "matplotlib>=3.8"
 
 
 def has_casadi(python):
@@ -28,7 +29,7 @@ def python_with_casadi():
     python = str(home / "bin" / "python")
     if os.path.exists(python) and has_casadi(python):
         return python, ""
-    for command in [[sys.executable, "-m", "venv", home], [python, "-m", "pip", "install", "--quiet", CASADI]]:
+    for command in [[sys.executable, "-m", "venv", home], [python, "-m", "pip", "install", "--quiet", CASADI, MATPLOTLIB]]:
         try:
             done = subprocess.run(command, capture_output=True, text=True)
         except OSError as error:
