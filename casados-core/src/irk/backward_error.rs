@@ -11,7 +11,7 @@
 
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
-use super::forward::checksum::{STRANDS, total};
+use super::forward::checksum::{ACCUMULATORS, total};
 use super::forward::sweep::Sweep;
 use super::workspace::{Linearization, Work};
 use crate::irk::coefficients::Coefficients;
@@ -196,8 +196,8 @@ fn displaced<A: Arithmetic, E: Lanes, const S: usize>(
 }
 
 struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
-    start_sums: &'a [[E; STRANDS]],
-    stage_sums: &'a [[[E; STRANDS]; S]],
+    start_sums: &'a [[E; ACCUMULATORS]],
+    stage_sums: &'a [[[E; ACCUMULATORS]; S]],
     a: &'a [[E; S]; S],
     h: E,
     jacobian: &'a M::Jacobian<[E; S]>,

@@ -123,8 +123,8 @@ pub(super) struct Canvas {
 
 /// With a tenth of a pixel, not farther from the picture than what programs read as a number.
 fn number(value: f64) -> String {
-    const FAR: f64 = 1e6;
-    let value = if value.is_nan() { 0.0 } else { value.clamp(-FAR, FAR) };
+    const LARGEST_COORDINATE: f64 = 1e6;
+    let value = if value.is_nan() { 0.0 } else { value.clamp(-LARGEST_COORDINATE, LARGEST_COORDINATE) };
     let text = format!("{value:.1}");
     let short = text.strip_suffix(".0").unwrap_or(&text);
     if short == "-0" { "0".to_string() } else { short.to_string() }

@@ -8,16 +8,16 @@ use crate::model::Dae;
 use crate::scalar::Real;
 
 /// The ratio of the times between four events is the same, to this part.
-const SAME_RATIO: f64 = 0.2;
+const RATIO_TOLERANCE: f64 = 0.2;
 /// What is left until they accumulate is no more than so many roundoff errors of the time.
-const NOTHING: f64 = 1e3;
+const UNRESOLVED_ROUNDOFFS: f64 = 1e3;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
     /// [`Error::AccumulatingEvents`] where the time does not resolve what is left.
     pub(super) fn check_accumulation(&self, event: usize) -> Result<(), Error> {
         let Some((t, end)) = self.accumulation(event) else { return Ok(()) };
-        if (end - t).abs() > NOTHING * T::EPSILON * end.abs().max(t.abs()) {
+        if (end - t).abs() > UNRESOLVED_ROUNDOFFS * T::EPSILON * end.abs().max(t.abs()) {
             return Ok(());
         }
         Err(self.accumulating(event, end))
@@ -46,7 +46,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let [t, second, third, fourth] = [times.next()?, times.next()?, times.next()?, times.next()?];
         let [last, before, first] = [t - second, second - third, third - fourth];
         let [ratio, other] = [last / before, before / first];
-        let is_series = ratio > 0.0 && ratio < 1.0 && (ratio - other).abs() <= SAME_RATIO * ratio;
+        let is_series = ratio > 0.0 && ratio < 1.0 && (ratio - other).abs() <= RATIO_TOLERANCE * ratio;
         is_series.then(|| (t, t + last * ratio / (1.0 - ratio)))
     }
 }

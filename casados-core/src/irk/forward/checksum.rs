@@ -7,7 +7,7 @@ use crate::scalar::{Field, each};
 
 /// So many accumulators a sum over all columns has; of numbers that are registers themselves only
 /// the first is used.
-pub(in crate::irk) const STRANDS: usize = 4;
+pub(in crate::irk) const ACCUMULATORS: usize = 4;
 
 /// Whether sums have one accumulator: those of other rows are computed meanwhile, and its memory is
 /// written once for each row of a panel.
@@ -17,7 +17,7 @@ const fn is_one<E>() -> bool {
 
 /// The sum of all accumulators.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(in crate::irk) fn total<E: Field>(accumulators: &[E; STRANDS]) -> E {
+pub(in crate::irk) fn total<E: Field>(accumulators: &[E; ACCUMULATORS]) -> E {
     let [a, b, c, d] = *accumulators;
     if const { is_one::<E>() } { a } else { (a + b) + (c + d) }
 }
@@ -34,7 +34,7 @@ pub(in crate::irk) fn minus_weights<E: Field, const W: usize>(column: usize, sec
 
 /// Sums over all columns, of which some are shown.
 pub(in crate::irk) struct Summed<'a, E, const S: usize, const W: usize> {
-    pub sums: &'a mut [[[E; STRANDS]; S]],
+    pub sums: &'a mut [[[E; ACCUMULATORS]; S]],
     pub minus_weights: &'a [E; W],
     /// Where the next panel will be written.
     pub ahead: Ahead<'a, E>,
@@ -64,18 +64,18 @@ impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E
 
 /// A sum over no columns.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(in crate::irk) fn clear<E: Field>(accumulators: &mut [E; STRANDS]) {
+pub(in crate::irk) fn clear<E: Field>(accumulators: &mut [E; ACCUMULATORS]) {
     let [first, others @ ..] = accumulators;
     *first = E::from_f64(0.0);
     if const { !is_one::<E>() } {
-        *others = [E::from_f64(0.0); STRANDS - 1];
+        *others = [E::from_f64(0.0); ACCUMULATORS - 1];
     }
 }
 
 /// `accumulators += weights · row`, as far apart as the accumulators are.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
-    accumulators: &mut [E; STRANDS],
+    accumulators: &mut [E; ACCUMULATORS],
     minus_weights: &[E; W],
     row: &[E; W],
 ) {
@@ -87,7 +87,7 @@ pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
     // In registers: the optimiser cannot know that they do not overlap.
     let mut own = *accumulators;
-    each!(n < W / STRANDS => { A::subtract_products(&mut own, &weights[n], &row[n]); });
-    each!(n < W % STRANDS => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
+    each!(n < W / ACCUMULATORS => { A::subtract_products(&mut own, &weights[n], &row[n]); });
+    each!(n < W % ACCUMULATORS => { own[n] = A::subtract(own[n], last_weights[n], last[n]); });
     *accumulators = own;
 }

@@ -1,7 +1,7 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to
 //! `V_{n+1}`, which after the last step is a result, and to what second derivatives need of both.
 
-use super::checksum::{STRANDS, Summed, accumulate, clear, minus_weights};
+use super::checksum::{ACCUMULATORS, Summed, accumulate, clear, minus_weights};
 use super::output::{Columns, Target};
 use super::right_hand_side::{Later, Placed, Scatter, place};
 use super::stage_rows::CurvedRows;
@@ -34,8 +34,8 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     /// `d(k, z)/dw` at its stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in accumulators.
-    pub(in crate::irk) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
-    pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; STRANDS]>>,
+    pub(in crate::irk) sums: Aligned<ArrayK<M, [[T; ACCUMULATORS]; S]>>,
+    pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; ACCUMULATORS]>>,
     /// Zero if all that was written to a result after the last step is finite, else NaN.
     pub(in crate::irk) finite: [T; 1],
 }
@@ -209,8 +209,8 @@ struct Step<'a, M: Dae, E: Plain, D, G, F, const S: usize> {
     v: &'a [E],
     next: &'a mut [E],
     dy: &'a mut [E],
-    sums: &'a mut [[[E; STRANDS]; S]],
-    start_sums: &'a mut [[E; STRANDS]],
+    sums: &'a mut [[[E; ACCUMULATORS]; S]],
+    start_sums: &'a mut [[E; ACCUMULATORS]],
     curved: Option<&'a mut [E]>,
     result: Option<&'a mut G>,
     distant: bool,

@@ -131,7 +131,7 @@ fn tiles<
     R: Array<E>,
     const V: usize,
     const ROWS: usize,
-    const STRANDS: usize,
+    const ACCUMULATORS: usize,
     const W: usize,
     const P: usize,
 >(
@@ -142,8 +142,8 @@ fn tiles<
     [row, column]: [usize; 2],
 ) {
     for t in 0..V / ROWS {
-        let mut accumulators = [[[[E::from_f64(0.0); W]; P]; ROWS]; STRANDS];
-        let ((d, last_d), (g, last_g)) = (d.as_chunks::<STRANDS>(), g.as_chunks::<STRANDS>());
+        let mut accumulators = [[[[E::from_f64(0.0); W]; P]; ROWS]; ACCUMULATORS];
+        let ((d, last_d), (g, last_g)) = (d.as_chunks::<ACCUMULATORS>(), g.as_chunks::<ACCUMULATORS>());
         for (d, g) in d.iter().zip(g) {
             for ((tile, d), g) in accumulators.iter_mut().zip(d).zip(g) {
                 subtract_outer::<A, E, V, ROWS, W, P>(tile, d, g, t);

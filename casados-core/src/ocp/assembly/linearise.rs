@@ -26,11 +26,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
-        self.linearise_watched(curvature, &mut |_, _| {})
+        self.linearise_with_observer(curvature, &mut |_, _| {})
     }
 
     /// [`Ocp::linearise`], and shows every interval to `watch`.
-    pub(in crate::ocp) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
+    pub(in crate::ocp) fn linearise_with_observer<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
         watch: Sink<'_, T>,

@@ -147,7 +147,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.prepare_factors(factors)?;
         let problem = &mut factors.problem;
         problem.begin();
-        self.linearise_watched(curvature, &mut |k, step| problem.take(k, step))?;
+        self.linearise_with_observer(curvature, &mut |k, step| problem.take(k, step))?;
         self.differentiate_functions(C::EXACT, problem)?;
         factors.fill(self.qp.view(), &self.iterate, true)
     }
