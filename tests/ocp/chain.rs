@@ -94,7 +94,6 @@ fn explicit_methods_side_by_side() -> Test {
     }
     same!(gauss_newton);
     same!(exact(Exact { convexification: Convexification::Project }));
-    same!(keep_jacobians);
     Ok(())
 }
 

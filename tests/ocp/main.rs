@@ -22,13 +22,11 @@ mod deadlines;
 mod estimation;
 mod guesses;
 mod ipm;
-mod kept_jacobians;
 mod lifted;
 mod options;
 mod random;
 mod real_time;
 mod scaling;
-mod secant;
 mod second_attempt;
 mod trajectory;
 

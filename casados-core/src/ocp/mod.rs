@@ -28,9 +28,6 @@
 //! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
 //! gains; `SolutionFactors` has adjoint ones, and gradient and Hessian of the optimal value.
 //!
-//! [`Sqp::keep_jacobians`] asks integrators for adjoints while steps contract, [`Sqp::secant`]
-//! learns Hessians from first derivatives.
-//!
 //! ```
 //! use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
 //! use casados::prelude::*;
@@ -84,9 +81,7 @@ mod nlp;
 mod solution;
 
 pub use assembly::convexify::Convexification;
-pub use assembly::curvature::{Curvature, Exact, GaussNewton, Secant, Update};
-pub use assembly::kept_jacobians::KeptJacobians;
-pub use dynamics::adjoints::Adjoints;
+pub use assembly::curvature::{Curvature, Exact, GaussNewton};
 #[cfg(feature = "alloc")]
 pub use dynamics::collocation::Collocation;
 pub use dynamics::map::Map;

@@ -11,7 +11,7 @@
 mod ocps;
 mod variations;
 
-use casados::ocp::{Formulation, HeapIpm, HeapOcp, HeapSqp, Outcome, SecondOrder, Update};
+use casados::ocp::{Formulation, HeapIpm, HeapOcp, HeapSqp, Outcome, SecondOrder};
 use casados_benches::peer::Peer;
 use ocps::{Failure, Grid};
 use serde_json::{Value, json};
@@ -19,9 +19,7 @@ use std::collections::BTreeMap;
 use variations::{GIVEN, VARIATIONS, Variation};
 
 /// What solves the problems.
-const SOLVERS: [&str; 5] = ["SQP", "interior point", "damped BFGS", "rank one", "IPOPT"];
-/// Those of them that learn Hessians from differences of gradients.
-const SECANT: core::ops::Range<usize> = 2..4;
+const SOLVERS: [&str; 3] = ["SQP", "interior point", "IPOPT"];
 /// An objective that is larger by this is that of another minimum.
 const APART: f64 = 1e-4;
 
@@ -87,10 +85,6 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     let mut made = vec![Made::of(HeapSqp::new(&ocp)?.solve(&mut ocp))];
     ocp = begin()?;
     made.push(Made::of(HeapIpm::new(&ocp)?.solve(&mut ocp)));
-    for update in [Update::DampedBfgs, Update::RankOne] {
-        ocp = begin()?;
-        made.push(Made::of(HeapSqp::new(&ocp)?.secant(update)?.solve(&mut ocp)));
-    }
     if let Some(ipopt) = ipopt {
         made.push(Made::of_peer(ipopt.ask(&request)));
     }
@@ -109,7 +103,7 @@ struct Summary {
 impl Summary {
     fn count(&mut self, made: &[Made]) {
         self.problems += 1;
-        let compared = made.iter().enumerate().all(|(i, made)| SECANT.contains(&i) || made.solved);
+        let compared = made.iter().all(|made| made.solved);
         for (i, made) in made.iter().enumerate() {
             *self.solved.entry(i).or_default() += usize::from(made.solved);
             *self.iterations.entry(i).or_default() += if compared { made.iterations } else { 0 };

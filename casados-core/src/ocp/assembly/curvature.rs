@@ -5,7 +5,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, SecondOrder, Sink};
 use crate::scalar::Real;
 
-/// What the Hessian of the QP is: [`Exact`], [`GaussNewton`], [`Secant`].
+/// What the Hessian of the QP is: [`Exact`], [`GaussNewton`].
 ///
 /// ```
 /// use casados::ocp::{Curvature, Exact, GaussNewton, Map};
@@ -21,27 +21,14 @@ use crate::scalar::Real;
 pub trait Curvature<D, T: Real>: Copy {
     /// Whether second derivatives of everything are in it.
     const EXACT: bool;
-    /// Whether Jacobians may stay those that the QP has.
-    #[doc(hidden)]
-    const KEEPS: bool = false;
     /// How a stage is made convex.
     fn convexification(&self) -> Convexification;
-    /// How it learns from differences of gradients, if it does.
-    #[doc(hidden)]
-    fn update(&self) -> Option<Update> {
-        None
-    }
     /// Linearises the dynamics.
     ///
     /// # Errors
     /// [`OcpError::Integration`]
     #[doc(hidden)]
     fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
-    /// Says how long the next step is, as a part of the one before; whether Jacobians are kept.
-    #[doc(hidden)]
-    fn follow(&mut self, _ratio: f64) -> bool {
-        false
-    }
 }
 
 /// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
@@ -102,74 +89,6 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Slopes {
     const EXACT: bool = false;
     fn convexification(&self) -> Convexification {
         Convexification::None
-    }
-    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        dynamics.linearise(nodes, sink)
-    }
-}
-
-/// How a Hessian learns from a step `s` and the difference `y` of gradients.
-///
-/// ```
-/// # use casados::ocp::*;
-/// # use casados::prelude::*;
-/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
-/// # #[ode]
-/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
-/// # #[function]
-/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
-/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
-/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
-/// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
-/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
-/// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::RankOne)?;
-/// assert!(sqp.solve(&mut ocp)?.is_converged());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Update {
-    /// `B ← B − B s sᵀB / sᵀB s + r rᵀ / sᵀr`, where `r` is a mean of `y` and `B s` with `sᵀr ≥ 0.2
-    /// sᵀB s`: positive definite whatever `y` is.
-    #[default]
-    DampedBfgs,
-    /// `B ← B + r rᵀ / sᵀr` with `r = y − B s`: as indefinite as the Hessian itself is. QPs that
-    /// are not convex are regularised, as those of [`Exact`].
-    RankOne,
-}
-
-/// The Hessian of the Lagrangian, learned from its gradients
-/// ([`Sqp::secant`](crate::ocp::Sqp::secant)).
-///
-/// ```
-/// # use casados::ocp::*;
-/// # use casados::prelude::*;
-/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
-/// # #[ode]
-/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
-/// # #[function]
-/// # fn effort(_x: [f64; 2], u: f64) -> f64 { u }
-/// # let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
-/// #     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
-/// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
-/// # ocp.guess(&[0.0, 0.0], &[0.0])?;
-/// let mut sqp = HeapSqp::new(&ocp)?.secant(Update::default())?;
-/// let _: Secant = sqp.curvature; // instead of `Exact`
-/// assert!(sqp.solve(&mut ocp)?.is_converged());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Secant(pub(in crate::ocp) Update);
-
-impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Secant {
-    const EXACT: bool = false;
-    fn convexification(&self) -> Convexification {
-        Convexification::Reduced
-    }
-    fn update(&self) -> Option<Update> {
-        Some(self.0)
     }
     fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         dynamics.linearise(nodes, sink)

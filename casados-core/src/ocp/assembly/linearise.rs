@@ -38,7 +38,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let intervals = self.intervals();
         let mut left = Left { plain: !C::EXACT, adding: false };
         let sums = self.linearise_intervals(curvature, |k, step, stage, at| {
-            left.transfer::<P, C, T>(step, stage, at);
+            left.transfer::<P, T>(step, stage, at);
             watch(k, step);
         })?;
         let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
@@ -54,17 +54,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Dynamics and integral costs, all intervals in one call: each goes `to` its stage, with its
-    /// start and its multipliers. The sums of their costs, and of what lifted stages have left.
+    /// start. The sums of their costs, and of what lifted stages have left.
     pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, [&[T]; 2]),
+        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, &[T]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
-        let (intervals, nx, ld) = (self.intervals(), P::Shape::NX, ld_of::<P::Shape, T>());
+        let (intervals, ld) = (self.intervals(), ld_of::<P::Shape, T>());
         let Self { problem, qp, iterate, data, step_length, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
         let (v, multipliers) = iterate.vectors();
@@ -81,7 +81,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if P::Dynamics::LIFTED {
                 left = add_stages(left, step.stages);
             }
-            to(k, step, stage.arrays(), [part(v, k * ld, ld), part(multipliers, k * pad::<T>(nx), nx)]);
+            to(k, step, stage.arrays(), part(v, k * ld, ld));
         })?;
         Ok((objective, left))
     }

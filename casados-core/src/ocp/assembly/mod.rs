@@ -4,7 +4,6 @@
 pub(in crate::ocp) mod algebraic;
 pub(in crate::ocp) mod convexify;
 pub(in crate::ocp) mod curvature;
-pub(in crate::ocp) mod kept_jacobians;
 pub(in crate::ocp) mod kkt;
 pub(in crate::ocp) mod linearise;
 #[cfg(feature = "alloc")]

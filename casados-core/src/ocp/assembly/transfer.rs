@@ -1,10 +1,7 @@
 //! The linearised dynamics of an interval, in the layout of the QP.
 
-use crate::linalg::dot;
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::functions::dynamics::{IntegralTerms, IntervalResult};
 use crate::ocp::formulation::functions::point::{Terms, add_blocks};
-use crate::ocp::formulation::instance::data::inputs;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{Arrays, part, part_mut, splat};
 use crate::scalar::{Packed, Real, Registers, compiled};
@@ -112,19 +109,14 @@ pub(in crate::ocp) struct Left {
 
 impl Left {
     /// Writes an interval to its stage.
-    pub fn transfer<P: Formulation<T>, C: Curvature<P::Dynamics, T>, T: Real>(
+    pub fn transfer<P: Formulation<T>, T: Real>(
         &mut self,
         step: &IntervalResult<'_, T>,
         Arrays { ld, matrix, hessian, gradient, offset, .. }: Arrays<'_, T>,
-        [point, multipliers]: [&[T]; 2],
+        point: &[T],
     ) {
-        let (nx, n) = (P::Shape::NX, inputs::<P::Shape>());
-        let keeps = C::KEEPS && step.dx.is_empty();
-        if keeps {
-            shift_kept(matrix, ld, offset, step.x, part(point, 0, n));
-        } else {
-            Transfer { columns: [step.dx, step.du], next: step.x, point, matrix, ld, offset }.run();
-        }
+        let nx = P::Shape::NX;
+        Transfer { columns: [step.dx, step.du], next: step.x, point, matrix, ld, offset }.run();
         let IntegralTerms { x, u, hessian: blocks, .. } = step.cost;
         self.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
         if self.plain && x.is_empty() && u.is_empty() {
@@ -137,24 +129,6 @@ impl Left {
         x.iter().chain(u).enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
         add_blocks(&mut terms, nx, blocks);
         add_blocks(&mut terms, nx, step.hessian);
-        if keeps {
-            correct_kept(terms.gradient, matrix, ld, multipliers);
-        }
-    }
-}
-
-/// The offset of dynamics that end at `next`, with the columns that there are.
-fn shift_kept<T: Real>(matrix: &[T], ld: usize, offset: &mut [T], next: &[T], point: &[T]) {
-    let columns = matrix.chunks_exact(ld.max(1));
-    for ((offset, &x), column) in offset.iter_mut().zip(next).zip(columns) {
-        *offset = x - dot(column, point);
-    }
-}
-
-/// Takes the products of kept columns with multipliers from a gradient.
-fn correct_kept<T: Real>(gradient: &mut [T], matrix: &[T], ld: usize, multipliers: &[T]) {
-    for (column, &pi) in matrix.chunks_exact(ld.max(1)).zip(multipliers) {
-        gradient.iter_mut().zip(column).for_each(|(g, &a)| *g = *g - a * pi);
     }
 }
 

@@ -1,6 +1,5 @@
 //! The functions `φ` of intervals: integrators, batches, collocation and maps.
 
-pub(in crate::ocp) mod adjoints;
 pub(in crate::ocp) mod begin;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod collocation;

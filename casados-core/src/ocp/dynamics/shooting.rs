@@ -2,7 +2,6 @@
 
 use crate::batch::{Answer, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
-use crate::ocp::dynamics::adjoints::{Adjoints, step};
 use crate::ocp::dynamics::begin::at;
 use crate::ocp::dynamics::inside::Inside;
 use crate::ocp::dynamics::single::{names, origin};
@@ -13,7 +12,7 @@ use crate::ocp::formulation::functions::dynamics::{
 use crate::ocp::formulation::functions::pattern::Origin;
 use crate::ocp::formulation::names::Names;
 use crate::qp::room;
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
@@ -52,7 +51,6 @@ pub struct Shooting<I: Single> {
     nominal: Vec<Nominal<I::Model, I::Number>>,
     forward: Vec<Forward<I::Model, I::Number>>,
     hessian: Vec<Hessian<I::Model, I::Number>>,
-    adjoint: Vec<Adjoint<I::Model, I::Number>>,
     /// Whether the batch has the stages of all intervals that are here.
     solved: bool,
 }
@@ -86,7 +84,6 @@ impl<I: Single> Shooting<I> {
             nominal: Vec::new(),
             forward: Vec::new(),
             hessian: Vec::new(),
-            adjoint: Vec::new(),
             solved: false,
         }
     }
@@ -210,15 +207,6 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.each(nodes, [false; 2], |own| &mut own.forward, &mut |k, result: &Forward<I::Model, T>| {
             sink(k, &result.into())
-        })
-    }
-}
-
-impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
-    fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.each(nodes, [true, false], |own| &mut own.adjoint, &mut |k, result: &Adjoint<I::Model, T>| {
-            let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
-            sink(k, &step(result.x.as_slice(), gradients));
         })
     }
 }

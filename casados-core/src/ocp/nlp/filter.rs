@@ -33,9 +33,9 @@ impl Measure {
 
     /// Whether violation or objective are smaller by a margin: `γ_θ` and `γ_φ`, parts of the
     /// violation. Differences of the objective up to `noise` are none.
-    pub fn is_better(&self, other: &Self, margin: f64, noise: f64) -> bool {
+    pub fn is_better(&self, other: &Self, noise: f64) -> bool {
         self.violation <= (1.0 - GAMMA_THETA) * other.violation
-            || self.objective <= other.objective - margin * other.violation + noise
+            || self.objective <= other.objective - GAMMA_PHI * other.violation + noise
     }
 }
 
@@ -56,8 +56,11 @@ pub(in crate::ocp) fn objective_decides(length: f64, slope: f64, violation: f64)
 pub(in crate::ocp) const S_PHI: f64 = 2.3;
 /// `s_θ`
 pub(in crate::ocp) const S_THETA: f64 = 1.1;
-/// `γ_θ`
+/// `γ_θ` and `γ_φ`
 pub(in crate::ocp) const GAMMA_THETA: f64 = 1e-5;
+pub(in crate::ocp) const GAMMA_PHI: f64 = 1e-5;
+/// `η_φ`, as Armijo's constant usually is.
+pub(in crate::ocp) const ETA_PHI: f64 = 1e-4;
 /// Entries; the oldest one is forgotten when there are more.
 const ENTRIES: usize = 64;
 
@@ -66,16 +69,14 @@ const ENTRIES: usize = 64;
 pub(in crate::ocp) struct Filter {
     entries: [Measure; ENTRIES],
     count: usize,
-    /// `γ_φ`
-    margin: f64,
     /// `θ_max`: no iterate may violate more.
     largest_violation: f64,
 }
 
 impl Filter {
     /// An empty one.
-    pub fn new(margin: f64, largest_violation: f64) -> Self {
-        Self { entries: [Measure::default(); ENTRIES], count: 0, margin, largest_violation }
+    pub fn new(largest_violation: f64) -> Self {
+        Self { entries: [Measure::default(); ENTRIES], count: 0, largest_violation }
     }
 
     /// Forgets all entries: their objectives are others.
@@ -86,13 +87,12 @@ impl Filter {
     /// Whether a point is better than every entry.
     pub fn admits(&self, there: &Measure, noise: f64) -> bool {
         let mut entries = self.entries.iter().take(self.count.min(ENTRIES));
-        there.violation <= self.largest_violation
-            && entries.all(|entry| there.is_better(entry, self.margin, noise))
+        there.violation <= self.largest_violation && entries.all(|entry| there.is_better(entry, noise))
     }
 
     /// Whether a point is better than the iterate, which is an entry then.
     pub fn improves(&mut self, there: &Measure, here: &Measure, noise: f64) -> bool {
-        let improves = there.is_better(here, self.margin, noise);
+        let improves = there.is_better(here, noise);
         if improves {
             if let Some(entry) = self.entries.get_mut(self.count % ENTRIES) {
                 *entry = *here;

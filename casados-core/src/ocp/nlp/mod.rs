@@ -1,5 +1,5 @@
-//! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), and
-//! what both of them use.
+//! Solvers: sequential quadratic programming (`sqp/`), a nonlinear interior point (`ipm/`), their
+//! loop (`solver`), and what both of them use.
 
 pub(in crate::ocp) mod consistency;
 mod degenerate;
@@ -11,5 +11,6 @@ pub(in crate::ocp) mod ipm;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod multi_start;
 pub(in crate::ocp) mod simulation;
+mod solver;
 pub(in crate::ocp) mod sqp;
 pub(in crate::ocp) mod watch;

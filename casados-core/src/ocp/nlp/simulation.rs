@@ -9,6 +9,7 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, vector};
 use crate::ocp::formulation::instance::data::split;
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::nlp::degenerate::Perturbed;
 use crate::qp::{Places, Solution, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -16,16 +17,36 @@ use bytemuck::Zeroable;
 
 /// A run begins again at a simulation that violates less than this part of what its iterate does.
 pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
+/// A simulation that violates more than this multiple of it has gone astray.
+pub(in crate::ocp) const MAX_SIMULATED_VIOLATION: f64 = 1e3;
+
+/// Where a second run begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::ocp) enum SecondStart {
+    /// At a simulation with the controls of the guess.
+    Simulated,
+    /// At one with controls beside them: where violations are stationary, but not smallest, at what
+    /// follows from the guess.
+    Perturbed,
+}
 /// It asks for one after so many steps in a row that lead nowhere.
 pub(in crate::ocp) const RESTART_AFTER: usize = 16;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes a guess the iterate, moved into its bounds, with the states that follow from its
-    /// controls; what was the iterate is in `guess` then. Whether these have values: otherwise the
-    /// iterate stays.
-    pub(in crate::ocp) fn simulate_guess(&mut self, guess: &mut Solution<T, D, M>, ends: &mut [T]) -> bool {
+    /// controls, or from controls beside them; what was the iterate is in `guess` then. Whether
+    /// these have values: otherwise the iterate stays.
+    pub(in crate::ocp) fn simulate_guess(
+        &mut self,
+        guess: &mut Solution<T, D, M>,
+        ends: &mut [T],
+        start: SecondStart,
+    ) -> bool {
         core::mem::swap(&mut self.iterate, guess);
         self.clip();
+        if start == SecondStart::Perturbed {
+            self.perturb(Perturbed::Controls);
+        }
         core::mem::swap(&mut self.iterate, guess);
         let has_values = self.simulate(guess, ends, &[], f64::INFINITY);
         if has_values {

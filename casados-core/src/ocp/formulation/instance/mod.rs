@@ -317,17 +317,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Finds functions of algebraic states, where these have no derivatives.
-    ///
-    /// # Errors
-    /// [`OcpError::NotThere`]
-    pub(in crate::ocp) fn check_without_algebraic(&mut self) -> Result<(), OcpError> {
-        let Problem { stage_cost, path, .. } = self.problem.parts();
-        let there = There { z: false, u: true, stage: 0 };
-        stage_cost.check(there)?;
-        path.check(there)
-    }
-
     /// The first number of the iterate that is not finite.
     fn name_not_finite(&self) -> Result<(), OcpError> {
         let (last, part) = (self.intervals(), Part::Multipliers);

@@ -34,29 +34,27 @@ pub enum Barrier {
 const KKT_ERROR_RED_ITERS: usize = 4;
 /// `κ`: an error is to be below this part of the largest of them.
 const KKT_ERROR_RED_FACT: f64 = 0.9999;
-/// So many steps without regularisation, one after the other, end a monotone phase.
-const CONVEX_STEPS: usize = 3;
 /// A monotone phase does not begin with less than this, or the mean product if that is less.
 const MONOTONE_MU: f64 = 0.1;
 
 /// What an adaptive barrier parameter follows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Progress {
+pub(in crate::ocp::nlp) struct Progress {
     errors: [f64; KKT_ERROR_RED_ITERS],
     count: usize,
     /// Whether it may follow steps at all.
     adapts: bool,
     /// Whether it does.
     free: bool,
-    /// Steps without regularisation, one after the other.
-    convex: usize,
+    /// Whether the last step was without regularisation.
+    convex: bool,
 }
 
 impl Progress {
     /// Of a run that begins.
     pub fn new(barrier: Barrier) -> Self {
         let adapts = barrier == Barrier::Adaptive;
-        Self { errors: [0.0; KKT_ERROR_RED_ITERS], count: 0, adapts, free: adapts, convex: 0 }
+        Self { errors: [0.0; KKT_ERROR_RED_ITERS], count: 0, adapts, free: adapts, convex: false }
     }
 
     /// Whether it may follow steps.
@@ -75,7 +73,7 @@ impl Progress {
         let now = error(0.0);
         let largest = self.errors.iter().take(self.count).fold(0.0, |m: f64, &e| m.max(e));
         let shrinks = self.count < KKT_ERROR_RED_ITERS || now <= KKT_ERROR_RED_FACT * largest;
-        if shrinks && (self.free || self.adapts && self.convex >= CONVEX_STEPS) {
+        if shrinks && (self.free || self.adapts && self.convex) {
             if let Some(error) = self.errors.get_mut(self.count % KKT_ERROR_RED_ITERS) {
                 *error = now;
             }
@@ -92,7 +90,7 @@ impl Progress {
 
     /// Counts a step; `μ` if it needed a regularisation and said what `μ` is.
     pub fn count(&mut self, regularised: bool, mu: f64, mean: f64) -> Option<f64> {
-        self.convex = if regularised { 0 } else { self.convex + 1 };
+        self.convex = !regularised;
         let ends = regularised && self.free;
         self.free &= !regularised;
         ends.then(|| begin(mu, mean))
@@ -154,25 +152,6 @@ pub(super) fn shrink(mu: f64, error: impl Fn(f64) -> f64, tolerance: f64) -> f64
 /// `τ`: slacks and multipliers keep `1 − τ` of what they have.
 pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
     (1.0 - mu).max(0.99)
-}
-
-/// Slacks shorter than half of the distances from their bounds, by no more than what counts, become
-/// as long, and their multipliers less: products stay.
-///
-/// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
-/// determine does not move: that multiplier would go by steps as small as the distance. Others
-/// take over its force.
-pub(super) fn reset_small_slacks<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
-    let small = T::from_f64(small);
-    for ((slack, multiplier), residual) in
-        sides.slack.iter_mut().zip(&mut *sides.multiplier).zip(&mut *sides.residual)
-    {
-        if *residual > *slack && *residual <= small {
-            let longer = *slack + *residual;
-            (*multiplier, *slack, *residual) = (*multiplier * *slack / longer, longer, T::ZERO);
-        }
-    }
-    keep_near_centre(sides, mu);
 }
 
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.

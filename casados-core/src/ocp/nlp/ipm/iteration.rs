@@ -5,13 +5,12 @@ use super::kkt::lengths::Lengths;
 use super::kkt::measure;
 use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, resolve};
 use super::kkt::scaling::{Relative, relative};
-use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
+use super::line_search::{FilterModel, LineSearch, SearchOutcome};
 use super::predictor::{self, needs_equal_steps};
-use super::state::{GAMMA_PHI, Next, State};
+use super::state::State;
 
 use super::Ipm;
 use super::kkt::work::Work;
-use super::restoration::elastic;
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::{Exact, Slopes};
 use crate::ocp::assembly::units::of_tolerance;
@@ -20,9 +19,12 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageA
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::{Filter, Measure};
+use crate::ocp::nlp::solver::{Method, Next};
 use crate::ocp::nlp::watch::Watch;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
+#[cfg(feature = "alloc")]
+use crate::qp::room;
 use crate::qp::{QpError, StageDims, Store, larger};
 use crate::scalar::Real;
 
@@ -35,7 +37,6 @@ const EXACT: Exact = Exact { convexification: Convexification::None };
 /// A search direction, and how far it may be gone.
 struct Direction {
     expected: FilterModel,
-    tau: f64,
     primal: f64,
     dual: f64,
     /// It moves nothing but rounding errors.
@@ -45,74 +46,6 @@ struct Direction {
 }
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// One iteration; a status if it is the last one.
-    pub(super) fn iterate<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
-        state: &mut State<'_>,
-        row: &mut Iteration,
-    ) -> Result<Option<Status>, OcpError>
-    where
-        P::Dynamics: SecondOrder<T>,
-    {
-        let mut watch = Watch::start();
-        self.linearise(ocp, capacity, state)?;
-        self.assess(ocp, capacity, state, row)?;
-        row.times.linearise = watch.lap();
-        if (state.over)() {
-            return Ok(Some(Status::OutOfTime));
-        }
-        match self.next(ocp, capacity, state, row) {
-            Next::Direction => {}
-            Next::NewPenalties => return Ok(None),
-            Next::End(status) => {
-                if matches!(status, Status::Infeasible { .. }) {
-                    // That is said of the last iterate.
-                    state.best_iteration = *row;
-                }
-                return Ok(Some(status));
-            }
-        }
-        if state.is_complementarity_stalled() {
-            self.reset_small_slacks(ocp, state)?;
-        }
-        let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
-            let here = self.here(ocp, capacity, state)?;
-            self.along(ocp, capacity, state, here, is_corrected)
-        });
-        let mut direction = match direction {
-            Ok(direction) => direction,
-            Err(error @ QpError::NotConvex { .. }) => {
-                // A derivative that is not finite is another error.
-                ocp.status_of_error(error)?;
-                return Ok(self.recover(ocp, capacity, state));
-            }
-            Err(error) => return ocp.status_of_error(error).map(Some),
-        };
-        self.expand(ocp, state)?;
-        row.times.qp = watch.lap();
-        if (state.over)() {
-            return Ok(Some(Status::OutOfTime));
-        }
-        let accepted = match self.search(ocp, capacity, state, &mut direction)? {
-            SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
-            found => found.accepted(),
-        };
-        row.times.search = watch.lap();
-        let Some(accepted) = accepted else {
-            return Ok(self.recover(ocp, capacity, state));
-        };
-        (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
-        state.count_stalled(row.step);
-        state.regularisation.gone(accepted.alpha / direction.primal);
-        self.accept(ocp, capacity, state, &direction, accepted)?;
-        let least =
-            (self.options.tolerance * of_tolerance(state.lengths.sizes.force)).max(self.options.final_mu);
-        let ends = direction.tiny && state.mu <= least;
-        Ok(ends.then_some(Status::NoProgress))
-    }
-
     /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
     pub(super) fn linearise<P: Formulation<T>>(
         &mut self,
@@ -168,10 +101,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ends, capacity, self.work.as_mut());
         let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
-        let Relative { barrier, error, others } =
-            relative(&residuals, &iterate, view.dynamics, units, of_stages);
+        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
-        state.judge(error, others, &self.options);
+        state.error = error;
         state.gaps = barrier.0.dynamics;
         state.violation = larger(state.gaps, barrier.0.inequalities);
         let is_alone = state.lengths.alone;
@@ -179,11 +111,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
         }
         (row.residuals, row.objective) = (residuals, objective);
-        (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        let worst = elastic::worst(ocp, state, (work.penalties, work.units));
-        let violation = worst.map_or(0.0, |worst| worst.violation);
-        let size = larger(state.error, violation);
+        (row.elastic, row.barrier) = (state.lengths.alone, state.mu);
+        let size = state.error;
         let is_best = size < state.best_residual || state.best_residual.is_nan();
         if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
@@ -220,7 +149,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if !state.has_filter {
             state.first_violation = here.violation;
             state.small_violation = 1e-4 * here.violation.max(1.0);
-            state.filter = Filter::new(GAMMA_PHI, 1e4 * here.violation.max(1.0));
+            state.filter = Filter::new(1e4 * here.violation.max(1.0));
             state.has_filter = true;
         }
         Ok(here)
@@ -247,7 +176,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             small_violation: state.small_violation,
             most: (GROWTH * here.violation.min(first)).max(first),
             mu: state.mu,
-            delta: state.delta,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
@@ -255,7 +183,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
-        Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
+        Ok(Direction { expected, primal, dual, tiny, is_corrected })
     }
 
     /// How far the search direction is gone. A corrected one is gone as far as it may be, or
@@ -268,7 +196,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         direction: &mut Direction,
     ) -> Result<SearchOutcome, OcpError> {
         if direction.tiny {
-            return Ok(SearchOutcome::Step(Accepted { alpha: direction.primal, corrected: false }));
+            return Ok(SearchOutcome::Step(direction.primal));
         }
         let lengths = state.lengths;
         macro_rules! room {
@@ -282,7 +210,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if direction.is_corrected {
             let Direction { expected, primal, .. } = direction;
             if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
-                return Ok(SearchOutcome::Step(Accepted { alpha: *primal, corrected: false }));
+                return Ok(SearchOutcome::Step(*primal));
             }
             let here = direction.expected.here;
             let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
@@ -290,8 +218,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             *direction = self.along(ocp, capacity, state, here, false)?;
             self.expand(ocp, state)?;
         }
-        let Direction { expected, primal, tau, .. } = direction;
-        room!(work).search(ocp, state, expected, *primal, *tau)
+        let Direction { expected, primal, .. } = direction;
+        Ok(room!(work).search(ocp, state, expected, *primal))
     }
 
     /// Goes the step that was accepted.
@@ -301,16 +229,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         capacity: &Lengths,
         state: &State<'_>,
         direction: &Direction,
-        accepted: Accepted,
+        alpha: f64,
     ) -> Result<(), OcpError> {
         let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = &*core::mem::take(&mut work.units);
-        let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
-        if corrected {
-            dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
-        }
+        let mut dual = direction.dual;
         if needs_equal_steps(&iterate.sides) {
             dual = dual.min(alpha);
         }
@@ -329,6 +254,104 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         ocp.problem.parts().dynamics.move_stages(StageAction::Go(part));
         // The line search ends where it accepts a point; a tiny step has none.
         ocp.has_algebraic = !direction.tiny;
+        Ok(())
+    }
+}
+
+impl<P, T, D, M, I> Method<P, T, D, M> for Ipm<T, D, M, I>
+where
+    P: Formulation<T, Dynamics: SecondOrder<T>>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: Store<T>,
+    I: Store<u32>,
+{
+    type State<'c> = State<'c>;
+
+    fn evaluate(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+    ) -> Result<(), OcpError> {
+        row.perturbed = state.has_perturbed_start && row.iteration == 0;
+        let capacity = state.capacity;
+        self.linearise(ocp, &capacity, state)?;
+        self.assess(ocp, &capacity, state, row)
+    }
+
+    fn test(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_>, row: &Iteration) -> Next {
+        if (state.over)() {
+            return Next::End(Status::OutOfTime);
+        }
+        let capacity = state.capacity;
+        let next = self.next(ocp, &capacity, state, row);
+        if matches!(next, Next::End(Status::Infeasible { .. })) {
+            // That is said of the last iterate.
+            state.best_iteration = *row;
+        }
+        next
+    }
+
+    fn step(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_>,
+        row: &mut Iteration,
+        watch: &mut Watch,
+    ) -> Result<Option<Status>, OcpError> {
+        let capacity = &state.capacity.clone();
+        let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
+            let here = self.here(ocp, capacity, state)?;
+            self.along(ocp, capacity, state, here, is_corrected)
+        });
+        let mut direction = match direction {
+            Ok(direction) => direction,
+            Err(error @ QpError::NotConvex { .. }) => {
+                // A derivative that is not finite is another error.
+                ocp.status_of_error(error)?;
+                return Ok(self.recover(ocp, capacity, state));
+            }
+            Err(error) => return ocp.status_of_error(error).map(Some),
+        };
+        self.expand(ocp, state)?;
+        row.times.qp = watch.lap();
+        if (state.over)() {
+            return Ok(Some(Status::OutOfTime));
+        }
+        let found = self.search(ocp, capacity, state, &mut direction)?;
+        row.times.search = watch.lap();
+        row.step = match found {
+            SearchOutcome::Step(length) => length,
+            SearchOutcome::Nothing => return Ok(self.recover(ocp, capacity, state)),
+            SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
+        };
+        state.count_stalled(row.step);
+        self.accept(ocp, capacity, state, &direction, row.step)?;
+        let force = of_tolerance(state.lengths.sizes.force);
+        let least = (self.options.tolerance * force).max(self.options.final_mu);
+        let ends = direction.tiny && state.mu <= least;
+        Ok(ends.then_some(Status::NoProgress))
+    }
+
+    fn restart(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_>,
+        end: Option<Status>,
+        _: &Iteration,
+    ) -> bool {
+        let capacity = state.capacity;
+        self.begin_again(ocp, &capacity, state, end)
+    }
+
+    fn record(&mut self, row: Iteration) -> Result<(), OcpError> {
+        #[cfg(feature = "alloc")]
+        {
+            room(&mut self.log, 1)?;
+            self.log.push(row);
+        }
+        let _ = row;
         Ok(())
     }
 }

@@ -10,10 +10,9 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::solver;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
-#[cfg(feature = "alloc")]
-use crate::qp::room;
 use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -121,39 +120,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         // Bounds of constraints are in the QP once it is written.
         let perturbed = ocp.linearise_guess(Slopes, &mut self.trial)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
-        let mut state = State::new(over, lengths, is_linearised, &self.options);
-        state.first_objective = ocp.objective.to_f64();
+        let mut state = State::new(over, (lengths, capacity), is_linearised, &self.options);
+        state.has_perturbed_start = perturbed;
         state.contradiction = ocp.contradiction(self.options.tolerance);
         state.diverging_iterates = DIVERGING_ITERATES * largest_size(ocp);
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();
-        let result = loop {
-            let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
-            row.perturbed = perturbed && row.iteration == 0;
-            let end = match self.iterate(ocp, &capacity, &mut state, &mut row) {
-                Ok(end) => end,
-                Err(error) => break Err(error),
-            };
-            outcome.count(&row);
-            #[cfg(feature = "alloc")]
-            {
-                if let Err(error) = room(&mut self.log, 1) {
-                    break Err(error.into());
-                }
-                self.log.push(row);
-            }
-            let restarts = self.restart(ocp, &capacity, &mut state, end);
-            if let (Some(status), false) = (end, restarts) {
-                outcome.status = status;
-                break Ok(());
-            }
-            if observer(&row).is_break() {
-                outcome.status = Status::Stopped;
-                break Ok(());
-            }
-            outcome.iterations += 1;
-        };
+        let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.set_penalties(work.penalties, None, &[]);
         let is_last = matches!(outcome.status, Status::Converged | Status::Infeasible { .. });

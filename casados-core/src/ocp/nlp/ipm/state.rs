@@ -12,22 +12,18 @@ use crate::qp::Residuals;
 use crate::qp::interior::{Iterate, Sides};
 use crate::scalar::Real;
 
-/// `γ_φ`
-pub(super) const GAMMA_PHI: f64 = 1e-8;
-
-/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
-/// are no convergence of Newton's method.
-const COMPLEMENTARITY_STALL: usize = 3;
-const STALLED_DECREASE: f64 = 0.9;
-
 /// Steps that are no longer lead nowhere if there are many of them.
 const SHORT_STEP: f64 = 1.0 / 32.0;
 
 /// What a run remembers from one iteration to the next.
-pub(super) struct State<'c> {
+pub(in crate::ocp::nlp) struct State<'c> {
     /// Whether the time is over.
     pub over: &'c mut dyn FnMut() -> bool,
     pub lengths: Lengths,
+    /// Those of memory: of every bound soft.
+    pub capacity: Lengths,
+    /// Whether the run began beside the guess.
+    pub has_perturbed_start: bool,
     /// The barrier parameter.
     pub mu: f64,
     /// What an adaptive one follows.
@@ -40,8 +36,6 @@ pub(super) struct State<'c> {
     pub regularisation: Regularisation,
     /// `δ_w` of the step.
     pub delta: f64,
-    /// The penalty, if bounds are soft.
-    pub elastic: Option<f64>,
     /// Whether this is a second attempt.
     pub second_attempt: bool,
     /// Phases in which violations alone are made small.
@@ -52,18 +46,10 @@ pub(super) struct State<'c> {
     pub gaps: f64,
     /// The largest gap or violation of the best iterate.
     pub best_violation: f64,
-    /// The objective at the first iterate.
-    pub first_objective: f64,
-    /// The violation that the last penalty left.
-    pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
-    /// Iterations one after the other in which complementarity is all that is left, and stays.
-    pub complementarity_stall: usize,
     /// Steps one after the other that are short, or of phases for violations.
     pub stalled_iterations: usize,
-    /// Whether slacks that multipliers held were released.
-    pub has_reset_slacks: bool,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
     pub has_slacks: bool,
     /// Whether the QP is that at the iterate, with whatever multipliers.
@@ -86,7 +72,7 @@ impl<'c> State<'c> {
     /// That of a run that begins.
     pub fn new(
         over: &'c mut dyn FnMut() -> bool,
-        lengths: Lengths,
+        (lengths, capacity): (Lengths, Lengths),
         is_linearised: bool,
         options: &IpmOptions,
     ) -> Self {
@@ -95,25 +81,22 @@ impl<'c> State<'c> {
         Self {
             over,
             lengths,
+            capacity,
+            has_perturbed_start: false,
             mu: options.first_mu(lengths.sizes.force),
             progress: Progress::new(barrier),
-            filter: Filter::new(GAMMA_PHI, f64::INFINITY),
+            filter: Filter::new(f64::INFINITY),
             small_violation: f64::INFINITY,
             first_violation: f64::INFINITY,
             regularisation: Regularisation::default(),
             delta: 0.0,
-            elastic: None,
             second_attempt: false,
             phase: Phase::default(),
             violation: f64::INFINITY,
             gaps: f64::INFINITY,
             best_violation: f64::INFINITY,
-            first_objective: 0.0,
-            stationary_violation: f64::INFINITY,
             acceptable: 0,
-            complementarity_stall: 0,
             stalled_iterations: 0,
-            has_reset_slacks: false,
             has_slacks: false,
             is_linearised,
             has_filter: false,
@@ -151,25 +134,6 @@ impl<'c> State<'c> {
         }
     }
 
-    /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
-    /// that is all that is left, and stays, no smaller `μ` can make it less.
-    pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
-        let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
-        let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
-        let stays = error > tolerance.max(STALLED_DECREASE * self.error);
-        self.complementarity_stall =
-            if is_last && others <= tolerance && stays { self.complementarity_stall + 1 } else { 0 };
-        self.error = error;
-    }
-
-    /// Whether multipliers hold slacks, which is said once.
-    pub fn is_complementarity_stalled(&mut self) -> bool {
-        let is_complementarity_stalled =
-            self.complementarity_stall >= COMPLEMENTARITY_STALL && !self.has_reset_slacks;
-        self.has_reset_slacks |= is_complementarity_stalled;
-        is_complementarity_stalled
-    }
-
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.
     pub fn begin_monotone(&mut self, options: &IpmOptions) {
         self.progress = Progress::new(Barrier::Monotone);
@@ -177,14 +141,4 @@ impl<'c> State<'c> {
         self.regularisation = Regularisation::default();
         (self.has_slacks, self.has_filter) = (false, false);
     }
-}
-
-/// What follows the residuals of an iteration.
-pub(super) enum Next {
-    /// A search direction.
-    Direction,
-    /// Another iteration: bounds have other penalties.
-    NewPenalties,
-    /// The end of the run.
-    End(Status),
 }

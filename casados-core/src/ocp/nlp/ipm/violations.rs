@@ -18,7 +18,7 @@ pub(super) const MAX_RESTORATION_PHASES: usize = 4;
 
 /// What there is at an iterate, in units.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Violations {
+pub(in crate::ocp::nlp) struct Violations {
     /// Of hard bounds, which are soft in the phase.
     sum: f64,
     /// By how much a point may be better that is no farther away than variables are large, to first
@@ -30,7 +30,7 @@ pub(super) struct Violations {
 
 /// What is remembered of phases.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Phase {
+pub(in crate::ocp::nlp) struct Phase {
     /// The unit of forces of the problem, while there is a phase.
     pub force: Option<f64>,
     /// How many there were.

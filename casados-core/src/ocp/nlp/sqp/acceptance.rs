@@ -1,16 +1,11 @@
 //! Whether a point is good enough: merit function and filter.
 
 use super::options::Globalisation;
-use crate::ocp::nlp::filter::{Filter, Measure, objective_decides};
-
-/// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
-const GAMMA_PHI: f64 = 1e-5;
-/// The part of the expected decrease that is enough.
-const ETA: f64 = 1e-4;
+use crate::ocp::nlp::filter::{ETA_PHI, Filter, Measure, objective_decides};
 
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
+pub(in crate::ocp::nlp) struct Search {
     pub filter: Filter,
     /// Whether the last step was a full one: then the next full step is tried by linearising there,
     /// which is not to be done again.
@@ -43,7 +38,7 @@ impl Line {
 
 impl Search {
     pub fn new() -> Self {
-        Self { filter: Filter::new(GAMMA_PHI, f64::INFINITY), full: true, linearised: None }
+        Self { filter: Filter::new(f64::INFINITY), full: true, linearised: None }
     }
 
     /// Whether a point is good enough after a step of this length.
@@ -57,14 +52,14 @@ impl Search {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;
-                there.merit() <= here.merit() + ETA * length * slope.min(0.0) + noise
+                there.merit() <= here.merit() + ETA_PHI * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 if !self.filter.admits(there, noise) {
                     return false;
                 }
                 if objective_decides(length, *slope, here.violation) {
-                    return there.objective <= here.objective + ETA * length * slope + noise;
+                    return there.objective <= here.objective + ETA_PHI * length * slope + noise;
                 }
                 self.filter.improves(there, here, noise)
             }

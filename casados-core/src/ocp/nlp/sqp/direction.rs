@@ -11,13 +11,9 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::solution::log::Iteration;
-use crate::qp::{QpError, QpSolver, QpStart, StageDims};
+use crate::qp::{Arrays, QpError, QpSolver, QpStart, StageDims, part};
 use crate::scalar::Real;
 
-/// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
-const MOST_AT_FIRST: f64 = 1e-2;
-/// Penalties grow by this, once, to see whether the objective is what holds violations back.
-const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
@@ -29,9 +25,9 @@ const CLOSED_GAPS: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
 const STEPS_THAT_CLOSE_GAPS: usize = 4;
-/// The curvature that keeps a point near the iterate, and the digits of the QP, as parts of the
-/// penalty; then those of an easier QP.
-const PROXIMAL_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
+/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, as a part of
+/// the penalty.
+const PROXIMITY_WEIGHT: f64 = 2e-5;
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -89,7 +85,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        (state.feasibility_step, state.rewritten) = (false, false);
+        state.feasibility_step = false;
         state.residual = row.residuals.largest();
         self.scale(ocp, state, Way::Into);
         if state.sizes.is_some() {
@@ -97,8 +93,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let mut direction = self.direction_in_units(ocp, state, row);
         self.scale(ocp, state, Way::Back);
-        if state.feasibility_step || state.rewritten {
-            self.linearise(ocp)?;
+        if state.feasibility_step {
+            ocp.linearise(self.curvature)?;
         }
         if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
             *worst = self.in_problem(ocp, *worst);
@@ -119,11 +115,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
-        let part = self.options.qp_accuracy * state.residual;
-        // Without multipliers stationarity is the gradient, and says nothing of what is far away.
-        let wrong = part * state.force();
-        let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
-        let permitted = if begins || state.exact { 0.0 } else { part };
+        let permitted = self.options.qp_accuracy * state.residual;
         self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
@@ -152,7 +144,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         // What is violated and what is possible are compared: by exact solutions.
-        let mut penalty = self.options.elastic_penalty.max(state.penalty);
+        let penalty = self.options.elastic_penalty;
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
@@ -176,42 +168,19 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
             return Ok(Direction::Step);
         }
-        // The objective may be what holds it back: with larger penalties it counts less.
-        self.trial.copy_from(&self.solution);
-        let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
-        let mut solved = true;
-        while solved && penalty < largest {
-            penalty *= PENALTY_FACTOR;
-            self.set_elastic(ocp, state, penalty);
-            // Forces are as large as penalties, and have as many digits.
-            self.qp_solver.permit(QP_ROUNDING * penalty);
-            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
-            if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
-                // It is, and from now on it does.
-                state.penalty = penalty;
-                return Ok(Direction::Step);
-            }
-        }
-        // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
-        // gaps are closed.
+        // The objective or the Hessian may be what holds it back. Nearly a linear program tells,
+        // where gaps are closed.
         if gaps <= CLOSED_GAPS * bounds {
-            let is_near = self.feasibility_step(ocp, state, row, before).is_ok();
-            if is_near && self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
+            self.feasibility_step(ocp, state, row, before).map_err(|_| error)?;
+            if self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
                 return Ok(Direction::Infeasible(worst));
             }
-            if solved {
-                return if is_near { Ok(Self::take_feasibility_step(state, row)) } else { Err(error) };
-            }
-            // The QP has another objective now, and is to be written again.
-            state.rewritten = true;
+            return Ok(Self::take_feasibility_step(state, row));
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if solved && gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
+        if gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
             return Ok(Direction::Infeasible(worst));
         }
-        state.penalty = 0.0;
-        self.set_elastic(ocp, state, self.options.elastic_penalty);
-        core::mem::swap(&mut self.solution, &mut self.trial);
         Ok(Direction::Step)
     }
 
@@ -240,15 +209,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
         self.set_elastic(ocp, state, penalty);
-        let mut result = Ok(());
-        for (weight, digits) in PROXIMAL_WEIGHTS {
-            self.qp_solver.permit(digits * penalty);
-            ocp.forget_objective(T::from_f64(weight * penalty / violation));
-            result = self.solve_qp(ocp, state, QpStart::Cold, row);
-            if result.is_ok() {
-                break;
-            }
-        }
+        self.qp_solver.permit(QP_ROUNDING * penalty);
+        ocp.forget_objective(T::from_f64(PROXIMITY_WEIGHT * penalty / violation));
+        let result = self.solve_qp(ocp, state, QpStart::Cold, row);
         self.set_elastic(ocp, state, alone);
         result
     }
@@ -286,8 +249,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The QP from the iterate; from a cold start if a warm one may be to blame: that no point
-    /// satisfies all constraints is proved by multipliers, whatever the start was.
+    /// The QP from the iterate.
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -295,27 +257,34 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError> {
-        let mut start = start;
-        loop {
-            self.solution.copy_from(&ocp.iterate);
-            let mut asked = 0;
-            let over = &mut || {
-                asked += 1;
-                state.is_over()
-            };
-            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
-            // A solver that fails asks in every iteration, and says no number.
-            row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
-            let Err(error) = result else { return Ok(()) };
-            if start == QpStart::Cold
-                || matches!(
-                    error,
-                    QpError::NotConvex { .. } | QpError::OutOfTime { .. } | QpError::Infeasible { .. }
-                )
-            {
-                return Err(error);
+        self.solution.copy_from(&ocp.iterate);
+        let mut asked = 0;
+        let over = &mut || {
+            asked += 1;
+            state.is_over()
+        };
+        let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+        // A solver that fails asks in every iteration, and says no number.
+        row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
+        result.map(|_| ())
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// `½ ε ‖v − v̄‖²` as the objective of the QP at the iterate `v̄`.
+    fn forget_objective(&mut self, small: T) {
+        let (v, _) = self.iterate.vectors();
+        let mut begin = 0;
+        for mut stage in self.qp.stages_mut() {
+            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
+            let here = part(v, begin, ld);
+            begin += ld;
+            hessian.fill(T::ZERO);
+            gradient.fill(T::ZERO);
+            let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
+            for ((h, gradient), &v) in diagonal.zip(gradient).zip(here) {
+                (*h, *gradient) = (small, -(small * v));
             }
-            start = QpStart::Cold;
         }
     }
 }

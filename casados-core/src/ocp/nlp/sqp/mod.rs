@@ -6,8 +6,6 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `multipliers` | the first multipliers, where costs have no curvature |
-//! | `secant` | Hessians from differences of gradients |
 //! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `scaled` | the QP in units |
@@ -17,19 +15,16 @@
 mod acceptance;
 mod direction;
 mod measure;
-mod multipliers;
 mod options;
 mod restart;
 mod run;
 mod scaled;
 mod search;
-mod secant;
 mod state;
 
 pub use options::{Globalisation, SqpOptions};
 
 use crate::ocp::assembly::curvature::{Exact, GaussNewton};
-use crate::ocp::assembly::kept_jacobians::KeptJacobians;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic;
@@ -99,8 +94,6 @@ pub struct Sqp<S, C, T, D, M> {
     /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
     /// exchanges, then units of rows.
     work: M,
-    /// What [`Secant`](crate::ocp::Secant) remembers.
-    history: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,
 }
@@ -170,7 +163,6 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
             best: Solution::new(dims)?,
             weights: Solution::new(dims)?,
             work: crate::qp::zeros(length)?,
-            history: Vec::new(),
             log: Vec::new(),
         })
     }
@@ -198,34 +190,6 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
         self.with(GaussNewton::default())
     }
 
-    /// The same with the Hessian of Gauss and Newton, and with Jacobians of dynamics that stay
-    /// while steps contract: adjoints of integrators ([`Adjoints`](crate::ocp::Adjoints)) correct
-    /// them.
-    ///
-    /// # Example
-    /// ```
-    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
-    /// use casados::prelude::*;
-    ///
-    /// #[ode]
-    /// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] { [x[1], -x[0].sin() + u[0]] }
-    /// #[function]
-    /// fn all(x: [f64; 2], u: [f64; 1]) -> [f64; 3] { [x[0], x[1], u[0]] }
-    ///
-    /// let mut ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
-    ///     .stage_cost(LeastSquaresCost::<All>::diagonal(&[1.0, 1.0, 0.1]))
-    ///     .on(Horizon::uniform(10, 0.1))?;
-    /// ocp.fix_initial_state(&[0.5, 0.0])?.guess(&[0.5, 0.0], &[0.0])?;
-    /// let mut sqp = HeapSqp::new(&ocp)?.keep_jacobians();
-    /// assert!(sqp.solve(&mut ocp)?.is_converged());
-    /// assert!(sqp.curvature.adjoints() > 0);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn keep_jacobians(self) -> Sqp<S, KeptJacobians, T, D, M> {
-        self.with(KeptJacobians::new())
-    }
-
     fn with<N>(self, curvature: N) -> Sqp<S, N, T, D, M> {
         Sqp {
             options: self.options,
@@ -236,7 +200,6 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
             best: self.best,
             weights: self.weights,
             work: self.work,
-            history: self.history,
             #[cfg(feature = "alloc")]
             log: self.log,
         }
@@ -244,12 +207,6 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
 }
 
 impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
-    /// How many numbers [`Sqp::secant`] takes behind those of [`Sqp::memory`].
-    #[must_use]
-    pub const fn memory_of_secant(dims: &[StageDims]) -> usize {
-        secant::length::<T>(dims)
-    }
-
     /// How many numbers it takes for a problem; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
@@ -278,7 +235,7 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
         let (trial, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         let (weights, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
-        let (work, history) = rest.split_at_mut_checked(expected - 4 * length).unwrap_or_default();
+        let (work, _) = rest.split_at_mut_checked(expected - 4 * length).unwrap_or_default();
         Ok(Self {
             options: SqpOptions::new::<T>(),
             curvature: Exact::default(),
@@ -288,7 +245,6 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
             best: Solution::in_memory(dims, best)?,
             weights: Solution::in_memory(dims, weights)?,
             work,
-            history,
             #[cfg(feature = "alloc")]
             log: Vec::new(),
         })

@@ -7,7 +7,7 @@ use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::nlp::simulation::{RESTART_AFTER, RESTART_GAIN};
+use crate::ocp::nlp::simulation::{MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart};
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, larger};
@@ -15,15 +15,13 @@ use crate::scalar::Real;
 
 /// The regularisation of the first direction.
 const RESTART_DAMPING: f64 = 1.0;
-/// A simulation that violates more than this multiple of what the guess does has gone astray.
-const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Whether a run begins again, with steps that are damped as those of Gauss and Newton are:
     /// once, where it failed, or has had penalties for long and a simulation with the controls of
     /// the guess violates less than its iterate. It was long steps at first that led astray, or
     /// gaps that were to be closed over unstable dynamics.
-    pub(super) fn restart<P: Formulation<T>>(
+    pub(super) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -44,8 +42,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return false;
         }
         self.leave_elastic(ocp, state);
-        let mut found = self.simulate_guess(ocp);
-        if stalls && !found.is_some_and(|violation| violation < RESTART_GAIN * violation_of(&row.residuals)) {
+        let here = violation_of(&row.residuals);
+        let mut found = self.simulate_guess(ocp, SecondStart::Simulated);
+        let is_infeasible = matches!(end, Some(Status::Infeasible { .. }));
+        if is_infeasible && !found.is_some_and(|violation| violation < RESTART_GAIN * here) {
+            // Violations are stationary there, too, but may not be beside it.
+            found = self.simulate_guess(ocp, SecondStart::Perturbed);
+        }
+        if stalls && !found.is_some_and(|violation| violation < RESTART_GAIN * here) {
             if found.is_some() {
                 ocp.iterate.copy_from(&self.trial);
             }
@@ -68,14 +72,18 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Makes a simulation with the controls of the guess the iterate and linearises there; what was
     /// the iterate is a trial then. What it violates, if it has values.
-    fn simulate_guess<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Option<f64>
+    fn simulate_guess<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        start: SecondStart,
+    ) -> Option<f64>
     where
         C: Curvature<P::Dynamics, T>,
     {
         self.trial.copy_from(&self.weights);
         self.trial.multipliers_mut().fill(T::ZERO);
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if P::Dynamics::LIFTED || !ocp.simulate_guess(&mut self.trial, ends) {
+        if P::Dynamics::LIFTED || !ocp.simulate_guess(&mut self.trial, ends, start) {
             return None;
         }
         if ocp.linearise(self.curvature).is_err() {

@@ -5,13 +5,13 @@ use super::direction::Direction;
 use super::options::Globalisation;
 use super::restart::violation_of;
 use super::scaled::Way;
-use super::secant::Take;
 use super::state::{State, Taken};
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::solver::{self, Method, Next};
 use crate::ocp::nlp::watch::Watch;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
@@ -29,30 +29,12 @@ const ROOM: usize = 64;
 /// its curvature counts.
 const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
-/// What a step tries, where no step along the direction before is short enough.
-#[derive(Clone, Copy, PartialEq)]
-enum Attempt {
-    /// The QP to as many digits as the iterate deserves.
-    First,
-    /// To all of them: it may have been wrong by more than a step gains.
-    Exact,
-    /// With at least so much regularisation.
-    Damped(f64),
-}
-
-const ATTEMPTS: [Attempt; 5] = [
-    Attempt::First,
-    Attempt::Exact,
-    Attempt::Damped(1e-2),
-    Attempt::Damped(1e0),
-    Attempt::Damped(MOST_DAMPING),
-];
+/// Levenberg-Marquardt damping of the attempts of a step, one after the other.
+const DAMPING_OF_ATTEMPTS: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
 const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
-    /// With exact Hessians, without multipliers and without costs that curve in all controls, it
-    /// begins with the multipliers of least squares.
     ///
     /// # Errors
     /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
@@ -131,10 +113,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.qp_solver.require(self.options.tolerance);
         let contradiction = ocp.contradiction(self.options.tolerance);
         let mut state = State { over: Some(over), contradiction, ..State::new() };
-        if C::KEEPS {
-            ocp.check_without_algebraic()?;
-            self.curvature.follow(f64::INFINITY);
-        }
         // Steps are to solutions of QPs: what is one stays so.
         ocp.join_controls();
         ocp.join_states();
@@ -145,39 +123,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             room(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
         }
         let mut outcome = Outcome::new();
-        let mut result = Ok(());
-        loop {
-            let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
-            let end = match self.iterate(ocp, &mut state, &mut row) {
-                Ok(end) => end,
-                Err(error) => {
-                    result = Err(error);
-                    break;
-                }
-            };
-            outcome.count(&row);
-            #[cfg(feature = "alloc")]
-            {
-                if let Err(error) = room(&mut self.log, 1) {
-                    result = Err(error.into());
-                    break;
-                }
-                self.log.push(row);
-            }
-            let restarts = self.restart(ocp, &mut state, end, &row);
-            if let (Some(status), false) = (end, restarts) {
-                outcome.status = status;
-                if matches!(status, Status::Infeasible { .. }) {
-                    state.best_iteration = row;
-                }
-                break;
-            }
-            if observer(&row).is_break() {
-                outcome.status = Status::Stopped;
-                break;
-            }
-            outcome.iterations += 1;
-        }
+        let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);
         self.leave_elastic(ocp, &mut state);
         // What is infeasible is said of the last iterate.
         let is_last =
@@ -190,110 +136,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result.map(|()| outcome)
     }
 
-    /// One iteration; a status if it is the last one.
-    fn iterate<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-    ) -> Result<Option<Status>, OcpError>
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        let mut watch = Watch::start();
-        row.times.linearise = match state.search.linearised.take() {
-            Some(seconds) => seconds,
-            None if row.iteration == 0 => {
-                row.perturbed = ocp.linearise_guess(self.curvature, &mut self.trial)?;
-                if row.perturbed {
-                    self.weights.copy_from(&ocp.iterate);
-                }
-                watch.lap()
-            }
-            None => {
-                ocp.linearise(self.curvature)?;
-                watch.lap()
-            }
-        };
-        self.leave_elastic(ocp, state);
-        if row.iteration == 0 {
-            if self.options.scaling {
-                self.find_units(ocp, state);
-            }
-            self.forget_weights(ocp, state);
-            state.violation_of_guess = violation_of(&ocp.residuals().0);
-        }
-        if let Some(update) = self.curvature.update() {
-            let take = match (row.iteration, state.elastic_steps) {
-                (0, _) => Take::First,
-                (_, 0) => Take::Updated(update),
-                // Forces of penalties are no multipliers.
-                _ => Take::Moved,
-            };
-            self.take_hessians(ocp, take);
-        }
-        if state.begins && C::EXACT {
-            self.first_multipliers(ocp, state)?;
-        }
-        let (residuals, objective) = ocp.residuals();
-        (row.residuals, row.objective) = (residuals, objective);
-        let size = self.judge(ocp, state, &residuals);
-        if size < state.best_residual || state.begins && !state.best_residual.is_finite() {
-            (state.best_residual, state.best_iteration) = (size, *row);
-            self.best.copy_from(&ocp.iterate);
-        }
-        state.begins = false;
-        if size <= self.options.tolerance {
-            state.best_iteration = *row;
-            return Ok(Some(Status::Converged));
-        }
-        if let Some(status) = state.contradiction {
-            state.best_iteration = *row;
-            return Ok(Some(status));
-        }
-        if row.iteration >= self.options.max_iterations {
-            return Ok(Some(Status::MaxIterations));
-        }
-        if state.is_over() {
-            return Ok(Some(Status::OutOfTime));
-        }
-        let taken = match self.step(ocp, state, row, &mut watch)? {
-            ControlFlow::Continue(taken) => taken,
-            ControlFlow::Break(status) => return Ok(Some(status)),
-        };
-        (row.step, row.corrected) = (taken.length, taken.corrected);
-        let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
-        state.damp(row, curvature);
-        self.switch_to_filter(ocp, state, row);
-        state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
-        if row.elastic
-            && C::EXACT
-            && (state.feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
-        {
-            // On the way to a feasible point forces of penalties are no multipliers: curvatures
-            // would be far too large.
-            ocp.iterate.multipliers_mut().fill(T::ZERO);
-            state.search.linearised = None;
-            self.forget_weights(ocp, state);
-        }
-        Ok(None)
-    }
-
-    /// Lets the filter decide from now on where the merit function creeps.
-    fn switch_to_filter<P: Formulation<T>>(
-        &mut self,
-        ocp: &Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &Iteration,
-    ) where
-        C: Curvature<P::Dynamics, T>,
-    {
-        if C::EXACT && state.switches_to_filter(row, &self.options) {
-            state.search.filter.clear();
-            self.forget_weights(ocp, state);
-        }
-    }
-
     /// The curvature of the QP along its step, of which the iterate has gone a part.
     fn curvature_of_step<P: Formulation<T>>(
         &mut self,
@@ -304,19 +146,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let curvature = ocp.curvature(&self.solution);
         self.scale(ocp, state, Way::Back);
         curvature
-    }
-
-    /// Compares the length of the full step with that of the one before.
-    fn update_contraction<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<'_, T>)
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        if C::KEEPS {
-            let steps = ocp.iterate.vectors().0.iter().zip(self.solution.vectors().0);
-            let reach = steps.fold(0.0_f64, |reach, (&a, &b)| reach.max((b - a).abs().to_f64()));
-            // What follows new Jacobians is kept.
-            state.reach = if self.curvature.follow(reach / state.reach) { reach } else { f64::INFINITY };
-        }
     }
 
     /// The full step, or one that a line search finds.
@@ -338,7 +167,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// A step in the direction of the QP, or of one with more regularisation where none is short
     /// enough or the QP has no solution.
-    fn step<P: Formulation<T>>(
+    fn attempt_steps<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -350,31 +179,21 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
-        let damps = state.second_attempt || !C::EXACT && self.curvature.update().is_none();
-        for attempt in ATTEMPTS {
-            let (damping, skips) = match attempt {
-                Attempt::First => (0.0, false),
-                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.may_reject_short_steps),
-                Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
-            };
-            if skips {
+        let damps = state.second_attempt || !C::EXACT;
+        for damping in DAMPING_OF_ATTEMPTS {
+            let is_first = damping == 0.0;
+            if !is_first && damps && damping <= state.damping {
                 continue;
             }
-            state.exact = state.second_attempt || attempt != Attempt::First;
             state.may_reject_short_steps = damps && damping.max(state.damping) < MOST_DAMPING;
-            if attempt != Attempt::First {
+            if !is_first {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.
                     ocp.iterate.multipliers_mut().fill(T::ZERO);
                 }
-                state.reach = f64::INFINITY;
-                self.curvature.follow(f64::INFINITY);
-                self.linearise(ocp)?;
+                ocp.linearise(self.curvature)?;
                 self.leave_elastic(ocp, state);
-                row.regularisation = 0.0;
-                if damping > 0.0 {
-                    state.damping = damping;
-                }
+                (row.regularisation, state.damping) = (0.0, damping);
             }
             let direction = self.direction(ocp, state, row)?;
             row.times.qp += watch.lap();
@@ -384,7 +203,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             match direction {
                 Ok(Direction::Step) => {
-                    self.update_contraction(ocp, state);
                     let taken = self.take_step(ocp, state, row)?;
                     row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
                     if let Some(taken) = taken {
@@ -406,5 +224,121 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             Some(error) => ocp.status_of_error(error)?,
         };
         Ok(ControlFlow::Break(status))
+    }
+}
+
+impl<P, S, C, T, D, M> Method<P, T, D, M> for Sqp<S, C, T, D, M>
+where
+    P: Formulation<T>,
+    S: QpSolver<T>,
+    C: Curvature<P::Dynamics, T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+{
+    type State<'c> = State<'c, T>;
+
+    fn evaluate(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<(), OcpError> {
+        match state.search.linearised.take() {
+            // The line search has linearised here already.
+            Some(seconds) => row.times.linearise = seconds,
+            None if row.iteration == 0 => {
+                row.perturbed = ocp.linearise_guess(self.curvature, &mut self.trial)?;
+                if row.perturbed {
+                    self.weights.copy_from(&ocp.iterate);
+                }
+            }
+            None => ocp.linearise(self.curvature)?,
+        }
+        self.leave_elastic(ocp, state);
+        if row.iteration == 0 {
+            if self.options.scaling {
+                self.find_units(ocp, state);
+            }
+            self.forget_weights(ocp, state);
+            state.violation_of_guess = violation_of(&ocp.residuals().0);
+        }
+        let (residuals, objective) = ocp.residuals();
+        (row.residuals, row.objective) = (residuals, objective);
+        state.error = self.judge(ocp, state, &residuals);
+        if state.error < state.best_residual || state.begins && !state.best_residual.is_finite() {
+            (state.best_residual, state.best_iteration) = (state.error, *row);
+            self.best.copy_from(&ocp.iterate);
+        }
+        state.begins = false;
+        Ok(())
+    }
+
+    fn test(&mut self, _: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>, row: &Iteration) -> Next {
+        if state.error <= self.options.tolerance {
+            state.best_iteration = *row;
+            return Next::End(Status::Converged);
+        }
+        if let Some(status) = state.contradiction {
+            return Next::End(status);
+        }
+        if row.iteration >= self.options.max_iterations {
+            return Next::End(Status::MaxIterations);
+        }
+        if state.is_over() { Next::End(Status::OutOfTime) } else { Next::Step }
+    }
+
+    fn step(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+        watch: &mut Watch,
+    ) -> Result<Option<Status>, OcpError> {
+        let taken = match self.attempt_steps(ocp, state, row, watch)? {
+            ControlFlow::Continue(taken) => taken,
+            ControlFlow::Break(status) => {
+                if matches!(status, Status::Infeasible { .. }) {
+                    // That is said of the last iterate.
+                    state.best_iteration = *row;
+                }
+                return Ok(Some(status));
+            }
+        };
+        (row.step, row.corrected) = (taken.length, taken.corrected);
+        let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
+        state.damp(row, curvature);
+        state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
+        if row.elastic
+            && C::EXACT
+            && (state.feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
+        {
+            // On the way to a feasible point forces of penalties are no multipliers: curvatures
+            // would be far too large.
+            ocp.iterate.multipliers_mut().fill(T::ZERO);
+            state.search.linearised = None;
+            self.forget_weights(ocp, state);
+        }
+        Ok(None)
+    }
+
+    fn restart(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        end: Option<Status>,
+        row: &Iteration,
+    ) -> bool {
+        self.begin_again(ocp, state, end, row)
+    }
+
+    fn record(&mut self, row: Iteration) -> Result<(), OcpError> {
+        #[cfg(feature = "alloc")]
+        {
+            room(&mut self.log, 1)?;
+            self.log.push(row);
+        }
+        let _ = row;
+        Ok(())
     }
 }

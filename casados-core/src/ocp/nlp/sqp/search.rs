@@ -15,9 +15,6 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
 
-/// Weights are at least this part of the largest multiplier: constraints without a force, as at
-/// states that cost nothing, would be left far behind otherwise.
-const MIN_WEIGHT: f64 = 1e-2;
 /// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
@@ -42,7 +39,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let by = state.globalisation(&self.options);
+        let by = self.options.globalisation;
         let weighted = by == Globalisation::Merit;
         let line = self.merit_model(ocp, state);
         let mut written = true;
@@ -53,9 +50,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             written = false;
         }
         state.search.full = false;
-        if !written {
-            self.curvature.follow(f64::INFINITY);
-        }
         let passing = state.may_reject_short_steps && weighted && line.here.violation > line.slope.abs();
         let shortest = if passing { 2.0 * SHORTEST_UNDAMPED_STEP } else { self.options.shortest_step };
         let mut length = 1.0;
@@ -70,7 +64,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             if length == 1.0 && there.is_some_and(|there| there.is_finite()) {
                 if !written {
-                    self.linearise(ocp)?;
+                    ocp.linearise(self.curvature)?;
                     self.scale(ocp, state, Way::Into);
                     ocp.regularise(T::from_f64(row.regularisation));
                     self.scale(ocp, state, Way::Back);
@@ -87,7 +81,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Weights of violations before the first line search: those of a filter are the inverses of
     /// units and stay.
     pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
-        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
+        let weighted = self.options.globalisation == Globalisation::Merit;
         self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
         if !weighted {
             // The solution is written before it is read.
@@ -108,20 +102,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.measure(trial, weights, ends).ok().map(|there| there.over(state.force()))
     }
 
-    /// Whether a step that is good enough may be better where it is shorter. Hessians that are
-    /// learned from differences of gradients want long steps.
-    fn shortens<P: Formulation<T>>(
-        &self,
-        state: &State<'_, T>,
-        line: &Line,
-        length: f64,
-        there: &Measure,
-    ) -> bool
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
-        weighted && self.curvature.update().is_none() && line.overshoots(length, there)
+    /// Whether a step that is good enough may be better where it is shorter.
+    fn shortens(&self, line: &Line, length: f64, there: &Measure) -> bool {
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        weighted && line.overshoots(length, there)
     }
 
     /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
@@ -137,7 +121,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        while self.shortens::<P>(state, line, length, &there) && 0.5 * length >= self.options.shortest_step {
+        while self.shortens(line, length, &there) && 0.5 * length >= self.options.shortest_step {
             let half = self.measure_at(ocp, state, 0.5 * length);
             let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
                 between(&ocp.iterate, &self.solution, length, &mut self.trial);
@@ -152,32 +136,24 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
     fn merit_model<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
-        let (here, slope) = self.update_weights(ocp, state);
+        let (here, slope) = self.update_weights(ocp);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn update_weights<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
-    ) -> (Measure, f64) {
-        if state.globalisation(&self.options) != Globalisation::Merit {
+    fn update_weights<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> (Measure, f64) {
+        if self.options.globalisation != Globalisation::Merit {
             let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
             return (here, slope);
         }
-        self.scale_weights(ocp, state, Way::Into);
-        let multipliers = self.solution.multipliers_mut();
-        let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
-        let (half, least) = (T::from_f64(0.5), T::from_f64(MIN_WEIGHT) * largest);
+        let half = T::from_f64(0.5);
         // Those of this step count at least.
         self.weights.update_multipliers(&self.solution, |w, multiplier| {
             let size = multiplier.abs();
-            size.max(half * (w + size)).max(least)
+            size.max(half * (w + size))
         });
-        self.scale_weights(ocp, state, Way::Back);
         let here = ocp.measure_here(&self.weights);
         let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
         let factor = slope / ((1.0 - RHO) * here.violation);
@@ -200,13 +176,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let mut watch = Watch::start();
-        let by = state.globalisation(&self.options);
+        let by = self.options.globalisation;
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
         let there = ocp.linearise(self.curvature);
         let there = there.map(|()| ocp.measure_here(&self.weights).over(state.force()));
         let seconds = watch.lap();
         let is_good = there.is_ok_and(|there| {
-            !self.shortens::<P>(state, line, 1.0, &there) && state.search.accepts(by, 1.0, line, &there)
+            !self.shortens(line, 1.0, &there) && state.search.accepts(by, 1.0, line, &there)
         });
         if is_good {
             state.search.linearised = Some(seconds);
@@ -236,7 +212,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale(ocp, state, Way::Back);
         core::mem::swap(&mut self.solution, &mut self.trial);
         let Ok(statistics) = solved else { return false };
-        let by = state.globalisation(&self.options);
+        let by = self.options.globalisation;
         row.qp_iterations += statistics.iterations;
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         let there = ocp.measure(&self.trial, &self.weights, ends).ok().map(|there| there.over(state.force()));

@@ -1,7 +1,6 @@
 //! What a run remembers.
 
 use super::acceptance::Search;
-use super::options::{Globalisation, SqpOptions};
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
@@ -10,7 +9,7 @@ use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
 /// What a run remembers from one iteration to the next.
-pub(super) struct State<'c, T> {
+pub(in crate::ocp::nlp) struct State<'c, T> {
     /// Whether the time is over.
     pub over: Option<&'c mut dyn FnMut() -> bool>,
     /// Whether it was.
@@ -29,16 +28,10 @@ pub(super) struct State<'c, T> {
     pub failed: f64,
     /// Whether the last direction was that of the violations alone.
     pub feasibility_step: bool,
-    /// Whether the QP that the last direction comes from was overwritten.
-    pub rewritten: bool,
     /// Steps with penalties in a row.
     pub elastic_steps: usize,
-    /// The penalty that violations were found to need; zero at first.
-    pub penalty: f64,
     /// Whether a short step may be refused, because more damping can be tried.
     pub may_reject_short_steps: bool,
-    /// Whether QPs are solved to as many digits as there are.
-    pub exact: bool,
     /// The largest violation of the guess.
     pub violation_of_guess: f64,
     /// The largest residual of the best iterate, of both attempts.
@@ -47,12 +40,10 @@ pub(super) struct State<'c, T> {
     pub best_iteration: Iteration,
     /// The largest residual in units.
     pub residual: f64,
+    /// The largest residual in what the tolerance is multiplied by.
+    pub error: f64,
     /// Units, unless all of them are one.
     pub sizes: Option<Sizes>,
-    /// Short steps of the merit function, but for those with penalties, less full ones.
-    pub short_steps: usize,
-    /// The largest change of a variable by the last full step; infinite at first.
-    pub reach: f64,
     /// Infeasible, where bounds contradict each other.
     pub contradiction: Option<Status>,
     pub number: PhantomData<T>,
@@ -62,9 +53,6 @@ pub(super) struct State<'c, T> {
 /// of the step along a curvature the cube root of the part that was gone.
 const SHORT_STEP: f64 = 1.0 / 16.0;
 const DAMPING_FACTOR: f64 = 4.0;
-/// After so many short steps more than full ones the merit function gives way to the filter: where
-/// constraints bend more than its weights let pass, it creeps along them.
-const SHORT_STEPS_BEFORE_FILTER: usize = 5;
 const DAMPING_EXPONENT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
@@ -88,18 +76,14 @@ impl<T> State<'_, T> {
             damping: 0.0,
             failed: 0.0,
             may_reject_short_steps: false,
-            exact: false,
             feasibility_step: false,
-            rewritten: false,
-            penalty: 0.0,
             elastic_steps: 0,
             violation_of_guess: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
             residual: f64::INFINITY,
+            error: f64::INFINITY,
             sizes: None,
-            short_steps: 0,
-            reach: f64::INFINITY,
             contradiction: None,
             number: PhantomData,
         }
@@ -114,28 +98,6 @@ impl<T> State<'_, T> {
     /// The unit of forces.
     pub fn force(&self) -> f64 {
         self.sizes.map_or(1.0, |sizes| sizes.force)
-    }
-
-    /// How far steps go: as options say, but by the filter where the merit function creeps.
-    pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
-        match options.globalisation {
-            Globalisation::Merit if self.short_steps >= SHORT_STEPS_BEFORE_FILTER => Globalisation::Filter,
-            given => given,
-        }
-    }
-
-    /// Counts short steps, less full ones without a correction. Whether it was the short one after
-    /// which the filter decides.
-    pub fn switches_to_filter(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
-        if options.globalisation != Globalisation::Merit || self.short_steps >= SHORT_STEPS_BEFORE_FILTER {
-            return false;
-        }
-        if self.is_short(row) && !row.elastic {
-            self.short_steps += 1;
-        } else if row.step == 1.0 && !row.corrected {
-            self.short_steps = self.short_steps.saturating_sub(1);
-        }
-        self.short_steps == SHORT_STEPS_BEFORE_FILTER
     }
 
     /// Whether a step was so short that damping helps.

@@ -7,7 +7,7 @@ use crate::scalar::Real;
 
 /// What is known about the sides of a problem before any memory is touched.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp::nlp::ipm) struct Lengths {
+pub(in crate::ocp::nlp) struct Lengths {
     pub counts: Counts,
     pub fixed: bool,
     pub numbers: usize,

@@ -1,13 +1,13 @@
 //! How a run may end, from residuals of an iterate.
 
-use super::elastic;
 use super::phase;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
-use crate::ocp::nlp::ipm::state::{Next, State};
+use crate::ocp::nlp::ipm::state::State;
+use crate::ocp::nlp::solver::Next;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store, larger};
@@ -32,9 +32,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 return next;
             }
         } else if state.error <= self.options.tolerance {
-            let cost = row.objective - ocp.objective.to_f64();
-            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
-            return end.map_or(Next::NewPenalties, Next::End);
+            return Next::End(Status::Converged);
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
@@ -43,7 +41,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let is_feasible = violation <= self.options.tolerance;
         let (v, _) = ocp.iterate.vectors();
         if is_feasible
-            && state.elastic.is_none()
+            && !state.lengths.alone
             && v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates)
         {
             return Next::End(Status::Unbounded);
@@ -51,6 +49,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if row.iteration >= self.options.max_iterations {
             return Next::End(Status::MaxIterations);
         }
-        Next::Direction
+        Next::Step
     }
 }

@@ -10,7 +10,7 @@ use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::Phase;
-use crate::ocp::nlp::simulation::{RESTART_AFTER, RESTART_GAIN};
+use crate::ocp::nlp::simulation::{MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart};
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
@@ -19,8 +19,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
     /// violations, for long: once, where a simulation with the controls of the guess violates
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
-    /// astray, and violations that stay there say nothing of the problem.
-    pub(in crate::ocp::nlp::ipm) fn restart<P: Formulation<T>>(
+    /// astray, and violations that stay there say nothing of the problem. A run that found none
+    /// feasible begins again at a simulation with controls beside those of the guess otherwise.
+    pub(in crate::ocp::nlp::ipm) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
@@ -42,20 +43,26 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             Some(_) => here,
             None => state.violation.max(here),
         };
-        self.trial.copy_from(&self.guess);
-        if !ocp.simulate_guess(&mut self.trial, work.ends) {
-            return false;
-        }
-        let is_linearised = ocp.linearise(Slopes).is_ok();
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
-        if !(is_linearised && found < RESTART_GAIN * left) {
+        // What is stationary beside the guess, too, is said to be infeasible.
+        let is_infeasible = matches!(end, Some(Status::Infeasible { .. })) && state.contradiction.is_none();
+        let starts =
+            [(SecondStart::Simulated, RESTART_GAIN), (SecondStart::Perturbed, MAX_SIMULATED_VIOLATION)];
+        for (start, most) in starts.into_iter().take(1 + usize::from(is_infeasible)) {
+            self.trial.copy_from(&self.guess);
+            let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+            if !ocp.simulate_guess(&mut self.trial, work.ends, start) {
+                continue;
+            }
+            let is_linearised = ocp.linearise(Slopes).is_ok();
+            let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
+            if is_linearised && found < most * left {
+                exit(ocp, state, work.penalties, &self.options);
+                (state.phase, state.is_linearised, state.second_attempt) = (Phase::default(), true, true);
+                return true;
+            }
             core::mem::swap(&mut ocp.iterate, &mut self.trial);
             state.is_linearised = false;
-            return false;
         }
-        exit(ocp, state, work.penalties, &self.options);
-        (state.phase, state.is_linearised, state.second_attempt) = (Phase::default(), true, true);
-        true
+        false
     }
 }
