@@ -61,6 +61,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
+    /// Zero as the linear penalty of all bounds but equations.
+    pub(in crate::ocp) fn ignore_inequalities(&mut self) {
+        for mut stage in self.qp.stages_mut() {
+            for kind in 0..3 {
+                let bounds = match kind {
+                    0 => stage.x_bounds_mut(),
+                    1 => stage.u_bounds_mut(),
+                    _ => stage.g_bounds_mut(),
+                };
+                let penalties = bounds.lower_linear.iter_mut().zip(bounds.upper_linear);
+                let limits = bounds.lower.iter().zip(&*bounds.upper);
+                for ((below, above), _) in penalties.zip(limits).filter(|(_, (lower, upper))| lower < upper) {
+                    (*below, *above) = (T::ZERO, T::ZERO);
+                }
+            }
+        }
+    }
+
     /// The largest violation, in units if there are any, of a bound that is hard, by the penalties
     /// that are remembered, and the sum of all of them as they are.
     pub(in crate::ocp) fn worst(&self, memory: &[T], units: &[T]) -> (Option<Worst>, f64) {

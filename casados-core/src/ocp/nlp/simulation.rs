@@ -20,6 +20,10 @@ pub(in crate::ocp) const RESTART_GAIN: f64 = 0.5;
 /// A simulation that violates more than this multiple of it has gone astray.
 pub(in crate::ocp) const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
+/// Violations that are no smaller than that, beside those of a simulation with the controls of the
+/// guess, are those of the guess.
+pub(in crate::ocp) const VIOLATION_OF_GUESS: f64 = 1.1;
+
 /// Where a second run begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::ocp) enum SecondStart {

@@ -154,6 +154,25 @@ pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
     (1.0 - mu).max(0.99)
 }
 
+/// Slacks shorter than half of the distances from their bounds, by no more than what counts, become
+/// as long, and their multipliers less: products stay.
+///
+/// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
+/// determine does not move: that multiplier would go by steps as small as the distance. Others
+/// take over its force.
+pub(super) fn reset_small_slacks<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
+    let small = T::from_f64(small);
+    for ((slack, multiplier), residual) in
+        sides.slack.iter_mut().zip(&mut *sides.multiplier).zip(&mut *sides.residual)
+    {
+        if *residual > *slack && *residual <= small {
+            let longer = *slack + *residual;
+            (*multiplier, *slack, *residual) = (*multiplier * *slack / longer, longer, T::ZERO);
+        }
+    }
+    keep_near_centre(sides, mu);
+}
+
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.
 const KAPPA_SIGMA: f64 = 1e10;
 

@@ -101,9 +101,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ends, capacity, self.work.as_mut());
         let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
-        let Relative { barrier, error } = relative(&residuals, &iterate, view.dynamics, units, of_stages);
+        let Relative { barrier, error, others } =
+            relative(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
-        state.error = error;
+        state.judge(error, others, &self.options);
         state.gaps = barrier.0.dynamics;
         state.violation = larger(state.gaps, barrier.0.inequalities);
         let is_alone = state.lengths.alone;
@@ -301,6 +302,9 @@ where
         watch: &mut Watch,
     ) -> Result<Option<Status>, OcpError> {
         let capacity = &state.capacity.clone();
+        if state.is_complementarity_stalled() {
+            self.reset_small_slacks(ocp, state)?;
+        }
         let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
             let here = self.here(ocp, capacity, state)?;
             self.along(ocp, capacity, state, here, is_corrected)

@@ -1,8 +1,9 @@
 //! Multipliers: the first ones, those that the Hessian has, and those that hold slacks.
 
 use super::Ipm;
+use super::barrier;
 use super::kkt::lengths::Lengths;
-use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp, least_squares};
+use super::kkt::newton::{evaluate, evaluate_values, kkt_view, kkt_view_of_new_qp, least_squares};
 use super::kkt::scaling;
 use super::kkt::start::begin_sides;
 use super::kkt::work::Work;
@@ -81,6 +82,21 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.take_point(&view);
         iterate.store(&mut view);
         assign(iterate.sides.multiplier, work.slacks);
+        Ok(())
+    }
+
+    /// Lets go of multipliers that hold slacks shorter than distances from bounds.
+    pub(super) fn reset_small_slacks<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_>,
+    ) -> Result<(), OcpError> {
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        barrier::reset_small_slacks(&mut iterate.sides, state.mu, self.options.tolerance);
+        let mut view = solution.view_mut();
+        iterate.store(&mut view);
+        evaluate(&mut iterate, &mut view);
         Ok(())
     }
 }

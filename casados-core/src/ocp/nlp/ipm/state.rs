@@ -12,6 +12,11 @@ use crate::qp::Residuals;
 use crate::qp::interior::{Iterate, Sides};
 use crate::scalar::Real;
 
+/// So many iterations with nothing left but complementarity, each of which leaves this part of it,
+/// are no convergence of Newton's method.
+const COMPLEMENTARITY_STALL: usize = 3;
+const STALLED_DECREASE: f64 = 0.9;
+
 /// Steps that are no longer lead nowhere if there are many of them.
 const SHORT_STEP: f64 = 1.0 / 32.0;
 
@@ -48,6 +53,10 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub best_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
+    /// Iterations one after the other in which complementarity is all that is left, and stays.
+    pub complementarity_stall: usize,
+    /// Whether slacks that multipliers held were released.
+    pub has_reset_slacks: bool,
     /// Steps one after the other that are short, or of phases for violations.
     pub stalled_iterations: usize,
     /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
@@ -96,6 +105,8 @@ impl<'c> State<'c> {
             gaps: f64::INFINITY,
             best_violation: f64::INFINITY,
             acceptable: 0,
+            complementarity_stall: 0,
+            has_reset_slacks: false,
             stalled_iterations: 0,
             has_slacks: false,
             is_linearised,
@@ -132,6 +143,25 @@ impl<'c> State<'c> {
             self.mu = mu;
             self.filter.clear();
         }
+    }
+
+    /// Takes the residuals of an iterate, and those of them that are not complementarity. Where
+    /// that is all that is left, and stays, no smaller `μ` can make it less.
+    pub fn judge(&mut self, error: f64, others: f64, options: &IpmOptions) {
+        let (force, tolerance) = (self.lengths.sizes.force, options.tolerance);
+        let is_last = self.mu <= 2.0 * force * barrier::least(options.least_error(force));
+        let stays = error > tolerance.max(STALLED_DECREASE * self.error);
+        self.complementarity_stall =
+            if is_last && others <= tolerance && stays { self.complementarity_stall + 1 } else { 0 };
+        self.error = error;
+    }
+
+    /// Whether multipliers hold slacks, which is said once.
+    pub fn is_complementarity_stalled(&mut self) -> bool {
+        let is_complementarity_stalled =
+            self.complementarity_stall >= COMPLEMENTARITY_STALL && !self.has_reset_slacks;
+        self.has_reset_slacks |= is_complementarity_stalled;
+        is_complementarity_stalled
     }
 
     /// The barrier parameter is monotone from now on; slacks, multipliers and filter begin anew.

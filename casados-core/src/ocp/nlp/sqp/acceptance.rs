@@ -16,7 +16,7 @@ pub(in crate::ocp::nlp) struct Search {
 
 /// A line search: where it begins, and what it expects.
 #[derive(Clone, Copy)]
-pub(super) struct Line {
+pub(in crate::ocp::nlp) struct Line {
     pub here: Measure,
     /// Of the objective.
     pub slope: f64,

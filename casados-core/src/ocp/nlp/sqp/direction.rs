@@ -11,9 +11,11 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::solution::log::Iteration;
-use crate::qp::{Arrays, QpError, QpSolver, QpStart, StageDims, part};
+use crate::qp::{QpError, QpSolver, QpStart, StageDims};
 use crate::scalar::Real;
 
+/// Penalties grow by this where a step leaves violations as they are.
+const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
@@ -112,10 +114,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let reduced = self.curvature.convexification() == Convexification::Reduced;
-        let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
-        let permitted = self.options.qp_accuracy * state.residual;
+        let warm = self.options.warm_start && forces > T::ZERO;
+        // Without multipliers stationarity is the gradient, and says nothing of what is far away.
+        let permitted = self.options.qp_accuracy * state.residual.min(1.0);
         self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
@@ -144,7 +146,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         // What is violated and what is possible are compared: by exact solutions.
-        let penalty = self.options.elastic_penalty;
+        let penalty = state.penalty.max(self.options.elastic_penalty);
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
@@ -168,8 +170,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
             return Ok(Direction::Step);
         }
-        // The objective or the Hessian may be what holds it back. Nearly a linear program tells,
-        // where gaps are closed.
+        // The objective or the Hessian may be what holds it back: the next penalty is larger. Nearly
+        // a linear program tells, where gaps are closed.
+        let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
+        state.penalty = (PENALTY_FACTOR * penalty).min(largest);
         if gaps <= CLOSED_GAPS * bounds {
             self.feasibility_step(ocp, state, row, before).map_err(|_| error)?;
             if self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
@@ -267,24 +271,5 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // A solver that fails asks in every iteration, and says no number.
         row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
         result.map(|_| ())
-    }
-}
-
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// `½ ε ‖v − v̄‖²` as the objective of the QP at the iterate `v̄`.
-    fn forget_objective(&mut self, small: T) {
-        let (v, _) = self.iterate.vectors();
-        let mut begin = 0;
-        for mut stage in self.qp.stages_mut() {
-            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
-            let here = part(v, begin, ld);
-            begin += ld;
-            hessian.fill(T::ZERO);
-            gradient.fill(T::ZERO);
-            let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
-            for ((h, gradient), &v) in diagonal.zip(gradient).zip(here) {
-                (*h, *gradient) = (small, -(small * v));
-            }
-        }
     }
 }

@@ -6,6 +6,7 @@
 //!
 //! | | |
 //! | --- | --- |
+//! | `multipliers` | the first multipliers, where costs have no curvature |
 //! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `scaled` | the QP in units |
@@ -15,6 +16,7 @@
 mod acceptance;
 mod direction;
 mod measure;
+mod multipliers;
 mod options;
 mod restart;
 mod run;

@@ -7,7 +7,9 @@ use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::nlp::simulation::{MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart};
+use crate::ocp::nlp::simulation::{
+    MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
+};
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, larger};
@@ -45,8 +47,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let here = violation_of(&row.residuals);
         let mut found = self.simulate_guess(ocp, SecondStart::Simulated);
         let is_infeasible = matches!(end, Some(Status::Infeasible { .. }));
-        if is_infeasible && !found.is_some_and(|violation| violation < RESTART_GAIN * here) {
-            // Violations are stationary there, too, but may not be beside it.
+        let of_guess = RESTART_GAIN * here..=VIOLATION_OF_GUESS * here;
+        if is_infeasible && found.is_some_and(|violation| of_guess.contains(&violation)) {
+            // Where nothing was gained from the guess it may be a maximum of violations.
             found = self.simulate_guess(ocp, SecondStart::Perturbed);
         }
         if stalls && !found.is_some_and(|violation| violation < RESTART_GAIN * here) {

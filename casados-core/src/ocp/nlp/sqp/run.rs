@@ -35,6 +35,8 @@ const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
+    /// With exact Hessians, without multipliers and without costs that curve in all controls, it
+    /// begins with the multipliers of least squares.
     ///
     /// # Errors
     /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
@@ -262,6 +264,9 @@ where
             }
             self.forget_weights(ocp, state);
             state.violation_of_guess = violation_of(&ocp.residuals().0);
+        }
+        if state.begins && C::EXACT {
+            self.first_multipliers(ocp, state)?;
         }
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);

@@ -30,6 +30,8 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub feasibility_step: bool,
     /// Steps with penalties in a row.
     pub elastic_steps: usize,
+    /// The penalty that violations were found to need; zero at first.
+    pub penalty: f64,
     /// Whether a short step may be refused, because more damping can be tried.
     pub may_reject_short_steps: bool,
     /// The largest violation of the guess.
@@ -78,6 +80,7 @@ impl<T> State<'_, T> {
             may_reject_short_steps: false,
             feasibility_step: false,
             elastic_steps: 0,
+            penalty: 0.0,
             violation_of_guess: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),

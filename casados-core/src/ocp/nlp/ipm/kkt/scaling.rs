@@ -44,6 +44,8 @@ pub(in crate::ocp::nlp::ipm) struct Relative {
     pub barrier: (Residuals, f64),
     /// The largest of those that are compared with tolerances.
     pub error: f64,
+    /// The largest of them but complementarity.
+    pub others: f64,
 }
 
 /// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
@@ -88,7 +90,8 @@ pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
         complementarity: residuals.complementarity / (of_force * s_c),
         ..barrier
     };
-    Relative { barrier: (barrier, force * s_c), error: judged.largest() }
+    let others = Residuals { complementarity: 0.0, ..judged }.largest();
+    Relative { barrier: (barrier, force * s_c), error: judged.largest(), others }
 }
 
 /// The largest gap in units of states that are not above one, nor below what rounding leaves of

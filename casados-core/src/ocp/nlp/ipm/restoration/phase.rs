@@ -29,6 +29,8 @@ use crate::scalar::{Real, Scalar};
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
 /// of the objective is small.
 const PENALTY_SCALING: f64 = 1e3;
+/// Where violations are no more than this, a monotone barrier parameter is tried first.
+const MONOTONE_FIRST_BELOW: f64 = 1e-2;
 /// The first barrier parameter of the phase, in its units of forces.
 const RESTORATION_MU: f64 = 0.1;
 
@@ -49,7 +51,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.begin_monotone(&self.options);
             return None;
         }
-        let is_violated = state.violation > SMALL_VIOLATION;
+        // Near a feasible point it is not violations that hinder a first attempt.
+        let small = if state.progress.adapts() { MONOTONE_FIRST_BELOW } else { SMALL_VIOLATION };
+        let is_violated = state.violation > small;
         if self.options.elastic && is_violated && state.phase.may_enter() {
             if state.violation > state.best_violation {
                 ocp.recall(&self.best);

@@ -10,7 +10,9 @@ use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::Phase;
-use crate::ocp::nlp::simulation::{MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart};
+use crate::ocp::nlp::simulation::{
+    MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
+};
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
@@ -19,8 +21,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// Whether a run begins again that failed, or whose steps have been short, or of a phase for
     /// violations, for long: once, where a simulation with the controls of the guess violates
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
-    /// astray, and violations that stay there say nothing of the problem. A run that found none
-    /// feasible begins again at a simulation with controls beside those of the guess otherwise.
+    /// astray, and violations that stay there say nothing of the problem. A run that ended
+    /// with the violations of the guess begins again at a simulation with controls beside its.
     pub(in crate::ocp::nlp::ipm) fn begin_again<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -43,11 +45,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             Some(_) => here,
             None => state.violation.max(here),
         };
-        // What is stationary beside the guess, too, is said to be infeasible.
+        // Where nothing was gained from the guess it may be a maximum of violations.
         let is_infeasible = matches!(end, Some(Status::Infeasible { .. })) && state.contradiction.is_none();
-        let starts =
-            [(SecondStart::Simulated, RESTART_GAIN), (SecondStart::Perturbed, MAX_SIMULATED_VIOLATION)];
-        for (start, most) in starts.into_iter().take(1 + usize::from(is_infeasible)) {
+        let mut is_that_of_guess = false;
+        for start in [SecondStart::Simulated, SecondStart::Perturbed] {
+            let most = match start {
+                SecondStart::Simulated => RESTART_GAIN,
+                SecondStart::Perturbed if is_infeasible && is_that_of_guess => MAX_SIMULATED_VIOLATION,
+                SecondStart::Perturbed => break,
+            };
             self.trial.copy_from(&self.guess);
             let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
             if !ocp.simulate_guess(&mut self.trial, work.ends, start) {
@@ -60,6 +66,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 (state.phase, state.is_linearised, state.second_attempt) = (Phase::default(), true, true);
                 return true;
             }
+            is_that_of_guess = found <= VIOLATION_OF_GUESS * left;
             core::mem::swap(&mut ocp.iterate, &mut self.trial);
             state.is_linearised = false;
         }
