@@ -66,7 +66,8 @@ use units::Units;
 /// by semismooth Newton steps (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as
 /// a semismooth Newton method", SIAM J. Optim. 13, 2002): for a problem like the last one a single
 /// factorisation is enough. Where [`active_sets`](InteriorPointOptions::active_sets) of them are
-/// not, the interior point follows.
+/// not, the interior point follows. A cold start first tries the solution without bounds, unless
+/// zero violates one.
 ///
 /// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
 ///

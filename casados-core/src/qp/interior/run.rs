@@ -28,6 +28,13 @@ pub struct Attempt {
     pub iterations: usize,
 }
 
+impl Attempt {
+    /// Whether nothing was tried before.
+    fn is_first(&self) -> bool {
+        self.penalties == Penalties::Given && !self.proximal && self.statistics.iterations == 0
+    }
+}
+
 /// One run of the method.
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
@@ -55,14 +62,27 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
         if attempt.start == QpStart::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
             attempt.start = QpStart::Cold;
         }
-        let tries =
-            if attempt.start == QpStart::Warm { options.active_sets.min(attempt.iterations) } else { 0 };
+        let tries = match attempt.start {
+            QpStart::Warm => options.active_sets,
+            // Where no bound is active this is the solution.
+            QpStart::Cold if attempt.is_first() => options.active_sets.min(1),
+            QpStart::Cold => 0,
+        };
+        let tries = tries.min(attempt.iterations);
+        if attempt.start == QpStart::Cold && tries > 0 {
+            for zero in [&mut *solution.v, &mut *solution.lower, &mut *solution.upper] {
+                zero.fill(T::ZERO);
+            }
+        }
         // No closure: it would be compiled for another machine.
-        *result = match iterate.by_active_sets::<E>(tries, &limits, solution) {
+        *result = match iterate.by_active_sets::<E>((attempt.start, tries), &limits, over, solution) {
             Ok(statistics) => Ok(statistics),
             Err(statistics) => {
                 if tries > 0 {
                     attempt.statistics = statistics;
+                }
+                if attempt.start == QpStart::Cold {
+                    iterate.forget();
                 }
                 iterate.begin::<E>(options, &attempt, &limits, solution);
                 iterate.iterations::<E>(&attempt, &limits, over, solution)
@@ -96,6 +116,13 @@ impl<T: Real> Iterate<'_, T> {
         for place in Places::<T>::new(self.qp.dims) {
             assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
+    }
+
+    /// A point and multipliers of zero.
+    fn forget(&mut self) {
+        self.v.fill(T::ZERO);
+        self.sides.multiplier.fill(T::ZERO);
+        self.sides.free.fill(T::ZERO);
     }
 
     /// The state at the start, if it is given.
@@ -132,7 +159,7 @@ impl<T: Real> Iterate<'_, T> {
         };
         self.sides.begin(start, distance, self.measure, solution);
         // Only now are slacks what they are.
-        self.evaluate_values::<E>();
+        self.side_values::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
         self.regularise(attempt.proximal);
     }
