@@ -26,6 +26,8 @@ pub struct Attempt {
     pub statistics: QpStatistics,
     /// The iterations at which it ends.
     pub iterations: usize,
+    /// Whether it ends where its multipliers are nearly a proof that there is no solution.
+    pub suspects: bool,
 }
 
 impl Attempt {
@@ -193,6 +195,7 @@ impl<T: Real> Iterate<'_, T> {
         let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
         let (mut best, mut idle) = (T::from_f64(f64::INFINITY), 0);
+        let first = (statistics.iterations, self.terms.forces.max(T::ONE));
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.hold(residuals, self.terms);
@@ -230,6 +233,12 @@ impl<T: Real> Iterate<'_, T> {
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
                 break false;
+            }
+            if attempt.suspects {
+                let (done, judged) = (statistics.iterations - first.0, (residuals, limits));
+                if self.is_suspicious::<E>(done, first.1, judged, solution.dynamics) {
+                    break true;
+                }
             }
             // NaN makes no progress.
             let left = larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities));
