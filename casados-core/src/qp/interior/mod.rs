@@ -69,9 +69,9 @@ use units::Units;
 /// not, the interior point follows. A cold start first tries the solution without bounds, unless
 /// zero violates one.
 ///
-/// Multipliers of an infeasible problem grow in the direction of a proof that no point satisfies all
-/// constraints (Farkas' lemma). Where they are near it, the problem is solved once more with all
-/// bounds soft: that finds the violated bounds, and its multipliers are the proof.
+/// Multipliers of an infeasible problem grow in the direction of a proof that no point satisfies
+/// all constraints (Farkas' lemma). Where they are near it, the problem is solved once more with
+/// all bounds soft: that finds the violated bounds, and its multipliers are the proof.
 ///
 /// ```
 /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
