@@ -11,6 +11,7 @@ mod classes;
 mod coupling;
 mod errors;
 mod hard;
+mod infeasible;
 mod known;
 mod random;
 mod units;

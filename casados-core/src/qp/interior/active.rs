@@ -25,6 +25,7 @@ use super::units::Units;
 use crate::qp::element::set;
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;
+use crate::qp::solver::QpStart;
 use crate::qp::statistics::QpStatistics;
 use crate::scalar::{Packed, Real};
 
@@ -38,12 +39,14 @@ const REFINEMENTS: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
     /// The solution from a point and its multipliers, if not more than some active sets are between
-    /// them and no pivot vanishes; otherwise what it took to see that.
+    /// them and no pivot vanishes; otherwise what it took to see that. A cold start knows no
+    /// multipliers: it tries the solution without bounds, unless zero violates one.
     #[inline(always)]
     pub fn by_active_sets<E: Packed<T>>(
         &mut self,
-        tries: usize,
+        (start, tries): (QpStart, usize),
         limits: &Limits<T>,
+        over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpStatistics> {
         let mut statistics = QpStatistics::default();
@@ -55,6 +58,9 @@ impl<T: Real> Iterate<'_, T> {
         self.evaluate_values::<E>();
         self.sides.take_multipliers(solution);
         self.sides.guess();
+        if start == QpStart::Cold && (!self.sides.are_inactive() || over()) {
+            return Err(statistics);
+        }
         self.first_gradient::<E>(limits, solution.dynamics);
         self.regularise(false);
         let (mut factor, mut changes) = (true, usize::MAX);
@@ -128,6 +134,11 @@ impl<T: Real> Iterate<'_, T> {
 /// Here `slack` is the distance `d`, which may be negative, and `target` the force that the
 /// gradient knows of.
 impl<T: Real> Sides<'_, T> {
+    /// Whether there are neither active sides nor equations.
+    fn are_inactive(&self) -> bool {
+        self.equations.is_empty() && self.activity.iter().all(|&activity| activity == INACTIVE)
+    }
+
     /// `l − q d`, the force of a violated side.
     #[inline(always)]
     fn penalty(&self, j: usize, distance: T) -> T {

@@ -3,12 +3,29 @@
 //! Where pivots of either sign are allowed, `M_uu = L S Lᵀ` with signs `S`, which the reciprocals
 //! of pivots have.
 
-use super::kernels::{Columns, Part, Source, product, scale, subtract_column};
+use super::kernels::{Columns, Part, Source, product, splat, subtract, subtract_column};
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Real};
 
-/// `y = L⁻¹ g_u`, and `g − (K; L) S y` for what is left; `S` are the signs of pivots, which their
-/// reciprocals have.
+/// Columns that are taken together: their triangle is in registers.
+const GROUP: usize = 4;
+
+/// The lower triangle of `W` columns of a panel, from a row on.
+#[inline(always)]
+fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Option<[[T; W]; W]> {
+    let mut block = [[T::ZERO; W]; W];
+    let mut rest = panel.get(row..)?;
+    for (i, column) in block.iter_mut().enumerate() {
+        *column = *rest.first_chunk::<W>()?;
+        if i + 1 < W {
+            rest = rest.get(ld..)?;
+        }
+    }
+    Some(block)
+}
+
+/// `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of pivots,
+/// which their reciprocals have.
 #[inline(always)]
 pub fn eliminate<T: Real, E: Packed<T>>(
     g: &mut [T],
@@ -18,16 +35,82 @@ pub fn eliminate<T: Real, E: Packed<T>>(
     y: &mut [T],
     row: usize,
 ) {
-    for (i, ((column, &inverse), y)) in panel.chunks_exact(ld.max(1)).zip(inverse).zip(y).enumerate() {
-        let signed = g.get(row + i).map_or(T::ZERO, |&g| g * inverse);
-        *y = if inverse < T::ZERO { -signed } else { signed };
-        subtract_column::<T, E>(g, signed, column);
+    let (mut panel, mut inverse, mut y, mut row) = (panel, inverse, y, row);
+    while !inverse.is_empty() {
+        let width = inverse.len().min(GROUP);
+        let last = inverse.len() == width;
+        let size = if last { row } else { g.len() };
+        match width {
+            1 => eliminate_group::<T, E, 1>(g, panel, ld, inverse, y, (row, size)),
+            2 => eliminate_group::<T, E, 2>(g, panel, ld, inverse, y, (row, size)),
+            3 => eliminate_group::<T, E, 3>(g, panel, ld, inverse, y, (row, size)),
+            _ => eliminate_group::<T, E, GROUP>(g, panel, ld, inverse, y, (row, size)),
+        }
+        if last {
+            return;
+        }
+        panel = panel.get(width * ld..).unwrap_or_default();
+        inverse = inverse.get(width..).unwrap_or_default();
+        y = y.get_mut(width..).unwrap_or_default();
+        row += width;
+    }
+}
+
+/// The same of `W` columns, and of so many elements of `g`.
+#[inline(always)]
+fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
+    g: &mut [T],
+    panel: &[T],
+    ld: usize,
+    inverse: &[T],
+    y: &mut [T],
+    (row, size): (usize, usize),
+) {
+    let own = g.get(row..).and_then(|own| own.first_chunk::<W>());
+    let (Some(block), Some(own)) = (triangle::<T, W>(panel, ld, row), own) else { return };
+    let (Some(inverse), Some(y)) = (inverse.first_chunk::<W>(), y.first_chunk_mut::<W>()) else { return };
+    let mut signed = *own;
+    for i in 0..W {
+        for j in 0..i {
+            signed[i] = signed[i] - signed[j] * block[j][i];
+        }
+        signed[i] = signed[i] * inverse[i];
+        y[i] = if inverse[i] < T::ZERO { -signed[i] } else { signed[i] };
+    }
+    if size > 0 {
+        subtract::<T, E>(g, Columns { data: panel, ld }, &signed, size, W);
     }
 }
 
 /// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
 #[inline(always)]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
+    match u.len() {
+        1 => substitute_all::<T, 1>(u, panel, ld, row, inverse),
+        2 => substitute_all::<T, 2>(u, panel, ld, row, inverse),
+        3 => substitute_all::<T, 3>(u, panel, ld, row, inverse),
+        GROUP => substitute_all::<T, GROUP>(u, panel, ld, row, inverse),
+        _ => substitute_many(u, panel, ld, row, inverse),
+    }
+}
+
+/// The same of `W` elements.
+#[inline(always)]
+fn substitute_all<T: Real, const W: usize>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
+    let (Some(block), Some(u)) = (triangle::<T, W>(panel, ld, row), u.first_chunk_mut::<W>()) else { return };
+    let Some(inverse) = inverse.first_chunk::<W>() else { return };
+    for i in (0..W).rev() {
+        let mut sum = -u[i];
+        for j in i + 1..W {
+            sum = sum - block[i][j] * u[j];
+        }
+        u[i] = sum * inverse[i];
+    }
+}
+
+/// The same of any number of elements.
+#[inline(always)]
+fn substitute_many<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     for i in (0..u.len()).rev() {
         let column = part(panel, i * ld + row, u.len());
         let (before, after) = u.split_at_mut_checked(i + 1).unwrap_or_default();
@@ -88,7 +171,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
     let mut begin = 0;
     while begin < count {
         // Rows of a product begin at a multiple of its width.
-        let width = (count - begin).min(4 - (row + begin) % 4);
+        let width = (count - begin).min(GROUP - (row + begin) % GROUP);
         let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
         if signed {
             for (done, &inverse) in done.chunks_exact(ld.max(1)).zip(&*inverse) {
@@ -103,39 +186,110 @@ pub fn cholesky<T: Real, E: Packed<T>>(
             let y = done.below(row + begin);
             product::<T, E>(group, ld, Source::Target, done, y, (rows, 0..width, begin), Part::Full);
         }
-        for i in 0..width {
-            let (column, rest) =
-                group.get_mut(i * ld..).unwrap_or_default().split_at_mut_checked(ld).unwrap_or_default();
-            let index = begin + i;
-            let (Some(&found), Some(inverse), Some(added)) =
-                (column.get(row + index), inverse.get_mut(index), added.get_mut(index))
-            else {
-                break;
-            };
-            let mut pivot = found;
-            *added = T::ZERO;
-            // `inverse` is still what the diagonal was before elimination.
-            let is_positive = pivot > noise * *inverse;
-            let small = T::from_f64(T::EPSILON).sqrt() * inverse.abs();
-            let is_negative = indefinite && pivot < -small;
-            if !is_positive && !is_negative {
-                if (pivot < T::ZERO || indefinite) && negative.is_none() {
-                    negative = Some((index, pivot));
-                }
-                pivot = if largest > T::ZERO { largest } else { T::ONE };
-                *added = pivot - found;
-                regularised += 1;
-            }
-            let size = T::ONE / pivot.abs().sqrt();
-            *inverse = if is_negative { -size } else { size };
-            signed |= is_negative;
-            scale::<T, E>(column, size);
-            for (j, other) in rest.chunks_exact_mut(ld.max(1)).take(width - 1 - i).enumerate() {
-                let factor = column.get(row + index + 1 + j).copied().unwrap_or(T::ZERO);
-                subtract_column::<T, E>(other, if is_negative { -factor } else { factor }, column);
-            }
-        }
+        let group = (group, ld, row + begin);
+        let last = begin + width;
+        let pivots = Pivots {
+            inverse: inverse.get_mut(begin..last).unwrap_or_default(),
+            added: added.get_mut(begin..last).unwrap_or_default(),
+            largest,
+            indefinite,
+        };
+        let found = match width {
+            1 => factor_group::<T, E, 1>(group, rows, noise, pivots),
+            2 => factor_group::<T, E, 2>(group, rows, noise, pivots),
+            3 => factor_group::<T, E, 3>(group, rows, noise, pivots),
+            _ => factor_group::<T, E, GROUP>(group, rows, noise, pivots),
+        };
+        regularised += found.regularised;
+        signed |= found.signed;
+        negative = negative.or(found.negative.map(|(index, pivot)| (begin + index, pivot)));
         begin += width;
     }
     (regularised, negative)
+}
+
+/// What is said of the pivots of a group.
+struct Found<T> {
+    regularised: usize,
+    negative: Option<(usize, T)>,
+    signed: bool,
+}
+
+/// `W` columns of a panel, of which what is left of them was subtracted: their diagonal block
+/// begins at row `first`. The block is factorised by itself, then all rows are multiplied by its
+/// `L⁻ᵀ` in registers. `inverse` is what the diagonal was before elimination.
+#[inline(always)]
+fn factor_group<T: Real, E: Packed<T>, const W: usize>(
+    (group, ld, first): (&mut [T], usize, usize),
+    rows: usize,
+    noise: T,
+    Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
+) -> Found<T> {
+    let mut found = Found { regularised: 0, negative: None, signed: false };
+    let (Some(inverse), Some(added)) = (inverse.first_chunk_mut::<W>(), added.first_chunk_mut::<W>()) else {
+        return found;
+    };
+    let Some(mut block) = triangle::<T, W>(group, ld, first) else { return found };
+    for i in 0..W {
+        let mut pivot = block[i][i];
+        added[i] = T::ZERO;
+        let is_positive = pivot > noise * inverse[i];
+        let small = T::from_f64(T::EPSILON).sqrt() * inverse[i].abs();
+        let is_negative = indefinite && pivot < -small;
+        if !is_positive && !is_negative {
+            if (pivot < T::ZERO || indefinite) && found.negative.is_none() {
+                found.negative = Some((i, pivot));
+            }
+            let replaced = if largest > T::ZERO { largest } else { T::ONE };
+            added[i] = replaced - pivot;
+            pivot = replaced;
+            found.regularised += 1;
+        }
+        let size = T::ONE / pivot.abs().sqrt();
+        inverse[i] = if is_negative { -size } else { size };
+        found.signed |= is_negative;
+        for j in i + 1..W {
+            block[i][j] = block[i][j] * size;
+        }
+        for j in i + 1..W {
+            let factor = if is_negative { -block[i][j] } else { block[i][j] };
+            for k in j..W {
+                block[j][k] = block[j][k] - factor * block[i][k];
+            }
+        }
+    }
+    // What is subtracted from the rows has the signs of pivots.
+    let mut sizes = *inverse;
+    for (column, size) in block.iter_mut().zip(&mut sizes) {
+        if *size < T::ZERO {
+            *column = column.map(|l| -l);
+            *size = -*size;
+        }
+    }
+    let mut columns: [&mut [E::Cell]; W] = core::array::from_fn(|_| Default::default());
+    let mut rest = group;
+    for column in &mut columns {
+        let (here, others) = rest.split_at_mut_checked(ld).unwrap_or_default();
+        *column = E::cells_mut(here);
+        rest = others;
+    }
+    for r in 0..rows.div_ceil(E::LANES) {
+        let mut values = [E::from_f64(0.0); W];
+        for (value, column) in values.iter_mut().zip(&columns) {
+            let Some(cell) = column.get(r) else { return found };
+            *value = E::load(cell);
+        }
+        for j in 0..W {
+            for i in 0..j {
+                values[j] = values[j].minus_product(values[i], splat::<T, E>(block[i][j]));
+            }
+            values[j] = values[j] * splat::<T, E>(sizes[j]);
+        }
+        for (value, column) in values.iter().zip(&mut columns) {
+            if let Some(cell) = column.get_mut(r) {
+                value.store(cell);
+            }
+        }
+    }
+    found
 }

@@ -339,6 +339,12 @@ impl<'a, T: Real> Iterate<'a, T> {
         if let Some(coupling) = &mut self.coupling {
             coupling.evaluate(self.qp, self.v);
         }
+        self.side_values::<E>();
+    }
+
+    /// What belongs to sides, of values that are known.
+    #[inline(always)]
+    pub fn side_values<E: Packed<T>>(&mut self) {
         let sides = &mut self.sides;
         sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)

@@ -66,9 +66,12 @@ use units::Units;
 /// by semismooth Newton steps (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as
 /// a semismooth Newton method", SIAM J. Optim. 13, 2002): for a problem like the last one a single
 /// factorisation is enough. Where [`active_sets`](InteriorPointOptions::active_sets) of them are
-/// not, the interior point follows.
+/// not, the interior point follows. A cold start first tries the solution without bounds, unless
+/// zero violates one.
 ///
-/// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
+/// Multipliers of an infeasible problem grow in the direction of a proof that no point satisfies
+/// all constraints (Farkas' lemma). Where they are near it, the problem is solved once more with
+/// all bounds soft: that finds the violated bounds, and its multipliers are the proof.
 ///
 /// ```
 /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
@@ -258,6 +261,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             proximal: start == QpStart::Cold,
             statistics: QpStatistics::default(),
             iterations: most,
+            suspects: false,
         };
         let mut located = false;
         loop {
@@ -316,6 +320,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
             proximal: false,
             statistics: QpStatistics::default(),
             iterations: self.options.max_iterations,
+            suspects: self.options.locate,
         };
         match self.run(qp, attempt, over, &mut solution).0 {
             // A number that is not finite is found here, not in every call.

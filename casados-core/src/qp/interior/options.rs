@@ -43,7 +43,8 @@ pub struct InteriorPointOptions {
     pub start_mu: f64,
     /// How many sets of active bounds a warm start tries before slacks and multipliers are moved
     /// away from zero and the interior point begins. Each costs less than one of its iterations,
-    /// and counts as one. Default 4.
+    /// and counts as one. A cold start tries the solution without bounds, unless zero violates one.
+    /// Default 4.
     pub active_sets: usize,
     /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
     pub warm_distance: f64,

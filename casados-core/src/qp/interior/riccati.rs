@@ -10,7 +10,7 @@
 //! stage are few, so that this classical form needs less than the one with the square root of `P`.
 
 use super::cholesky::{eliminate, substitute};
-use super::kernels::{Columns, PADDING_COLUMNS, add_transposed, subtract};
+use super::kernels::{Columns, PADDING_COLUMNS, add, add_transposed, copy, copy_negative, subtract};
 use super::shared::Shared;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Places, StageDims, StageOffsets, assign, end, pad, part, part_mut, take_mut};
@@ -217,9 +217,7 @@ impl<T: Real> Riccati<'_, T> {
                 let p = Columns { data: &*self.p, ld: ld_next };
                 subtract::<T, E>(offset, p, part(dynamics, place.dynamics, next), next, next);
             }
-            for (minus, &offset) in self.minus.iter_mut().zip(part(offset, 0, next)) {
-                *minus = *minus + offset;
-            }
+            add::<T, E>(self.minus, offset);
             let general = part(gradient, place.row + ld, ng);
             for (minus, &general) in part_mut(self.minus, next, ng).iter_mut().zip(general) {
                 *minus = -general;
@@ -228,7 +226,7 @@ impl<T: Real> Riccati<'_, T> {
                 self.factor_stage::<E>(&place, equations, scratch, shared)?;
             }
             let g = part_mut(self.g, 0, ld);
-            assign(g, part(gradient, place.row, ld));
+            copy::<T, E>(g, part(gradient, place.row, ld));
             subtract::<T, E>(g, matrix, self.minus, n, next + ng);
             let panel = part(self.panels, place.factor, ld * place.pivots);
             let inverse = part(self.inverse, place.v, ld);
@@ -241,9 +239,7 @@ impl<T: Real> Riccati<'_, T> {
                 }
                 break;
             }
-            for (minus, &g) in part_mut(self.minus, 0, nx).iter_mut().zip(&*g) {
-                *minus = -g;
-            }
+            copy_negative::<T, E>(part_mut(self.minus, 0, pad::<T>(nx)), g);
         }
         Ok(())
     }

@@ -26,6 +26,15 @@ pub struct Attempt {
     pub statistics: QpStatistics,
     /// The iterations at which it ends.
     pub iterations: usize,
+    /// Whether it ends where its multipliers are nearly a proof that there is no solution.
+    pub suspects: bool,
+}
+
+impl Attempt {
+    /// Whether nothing was tried before.
+    fn is_first(&self) -> bool {
+        self.penalties == Penalties::Given && !self.proximal && self.statistics.iterations == 0
+    }
 }
 
 /// One run of the method.
@@ -55,14 +64,27 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
         if attempt.start == QpStart::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
             attempt.start = QpStart::Cold;
         }
-        let tries =
-            if attempt.start == QpStart::Warm { options.active_sets.min(attempt.iterations) } else { 0 };
+        let tries = match attempt.start {
+            QpStart::Warm => options.active_sets,
+            // Where no bound is active this is the solution.
+            QpStart::Cold if attempt.is_first() => options.active_sets.min(1),
+            QpStart::Cold => 0,
+        };
+        let tries = tries.min(attempt.iterations);
+        if attempt.start == QpStart::Cold && tries > 0 {
+            for zero in [&mut *solution.v, &mut *solution.lower, &mut *solution.upper] {
+                zero.fill(T::ZERO);
+            }
+        }
         // No closure: it would be compiled for another machine.
-        *result = match iterate.by_active_sets::<E>(tries, &limits, solution) {
+        *result = match iterate.by_active_sets::<E>((attempt.start, tries), &limits, over, solution) {
             Ok(statistics) => Ok(statistics),
             Err(statistics) => {
                 if tries > 0 {
                     attempt.statistics = statistics;
+                }
+                if attempt.start == QpStart::Cold {
+                    iterate.forget();
                 }
                 iterate.begin::<E>(options, &attempt, &limits, solution);
                 iterate.iterations::<E>(&attempt, &limits, over, solution)
@@ -96,6 +118,13 @@ impl<T: Real> Iterate<'_, T> {
         for place in Places::<T>::new(self.qp.dims) {
             assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
+    }
+
+    /// A point and multipliers of zero.
+    fn forget(&mut self) {
+        self.v.fill(T::ZERO);
+        self.sides.multiplier.fill(T::ZERO);
+        self.sides.free.fill(T::ZERO);
     }
 
     /// The state at the start, if it is given.
@@ -132,7 +161,7 @@ impl<T: Real> Iterate<'_, T> {
         };
         self.sides.begin(start, distance, self.measure, solution);
         // Only now are slacks what they are.
-        self.evaluate_values::<E>();
+        self.side_values::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
         self.regularise(attempt.proximal);
     }
@@ -166,6 +195,7 @@ impl<T: Real> Iterate<'_, T> {
         let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
         let (mut best, mut idle) = (T::from_f64(f64::INFINITY), 0);
+        let first = (statistics.iterations, self.terms.forces.max(T::ONE));
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.hold(residuals, self.terms);
@@ -203,6 +233,12 @@ impl<T: Real> Iterate<'_, T> {
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
                 break false;
+            }
+            if attempt.suspects {
+                let (done, judged) = (statistics.iterations - first.0, (residuals, limits));
+                if self.is_suspicious::<E>(done, first.1, judged, solution.dynamics) {
+                    break true;
+                }
             }
             // NaN makes no progress.
             let left = larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities));

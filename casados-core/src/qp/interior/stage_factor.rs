@@ -1,11 +1,12 @@
 //! The factors of a stage.
 
 use super::cholesky::{Pivots, cholesky};
-use super::kernels::{Columns, Part, Source, mirror, product};
+use super::kernels::{Columns, Part, Source, copy, mirror, product};
 use super::riccati::{Equations, First, Riccati};
 use super::shared::Shared;
+use crate::qp::element::add;
 use crate::qp::error::QpError;
-use crate::qp::layout::{StageOffsets, assign, pad, part, part_mut};
+use crate::qp::layout::{StageOffsets, pad, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Riccati<'_, T> {
@@ -31,7 +32,7 @@ impl<T: Real> Riccati<'_, T> {
         let (regularised, negative) = cholesky::<T, E>(panel, ld, nx, n, pivots);
         self.regularised += regularised;
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
-        assign(part_mut(kept, 0, nu * ld), panel);
+        copy::<T, E>(part_mut(kept, 0, nu * ld), panel);
         match negative {
             Some((index, pivot)) if indefinite => {
                 return Err(QpError::NotConvex { stage, index, pivot: pivot.to_f64() });
@@ -63,7 +64,7 @@ impl<T: Real> Riccati<'_, T> {
             }
         }
         if stage > 0 || first == First::Coupled {
-            mirror(self.p, ld_x, nx);
+            mirror::<T, E>(self.p, ld_x, nx);
             return Ok(());
         }
         let start = part_mut(kept, nu * ld, nx * ld);
@@ -110,17 +111,21 @@ impl<T: Real> Riccati<'_, T> {
         }
         product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);
         // Of the Hessian only the lower triangle is there: above are controls times states.
-        let mixed = part_mut(self.m, nx * ld, nu * ld).chunks_exact_mut(ld.max(1));
-        for (j, column) in mixed.enumerate() {
-            let row = hessian.get(nx + j..).unwrap_or_default();
-            for (m, &s) in column.iter_mut().zip(row.iter().step_by(ld.max(1))).take(nx) {
-                *m = *m + s;
+        let mixed = part_mut(self.m, nx * ld, nu * ld);
+        for (i, row) in hessian.chunks(ld.max(1)).take(nx).enumerate() {
+            let mut index = i;
+            for &s in part(row, nx, nu) {
+                add(mixed, index, s);
+                index += ld;
             }
         }
-        let mut largest = self.largest;
-        for (diagonal, &weight) in self.m.iter_mut().step_by((ld + 1).max(1)).zip(weights).take(n) {
-            *diagonal = *diagonal + weight;
-            largest = diagonal.abs().max(largest);
+        let (mut largest, mut rest) = (self.largest, &mut *self.m);
+        for &weight in part(weights, 0, n) {
+            if let Some(diagonal) = rest.first_mut() {
+                *diagonal = *diagonal + weight;
+                largest = diagonal.abs().max(largest);
+            }
+            rest = rest.get_mut(ld + 1..).unwrap_or_default();
         }
         self.largest = largest;
     }

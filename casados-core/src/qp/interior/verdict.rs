@@ -1,15 +1,69 @@
 //! What is said of a problem that has no solution, and why that is true.
 
 use super::iterate::Iterate;
+use super::limits::Limits;
+use super::residuals::Largest;
 use super::vector::dot;
-use crate::qp::layout::part;
+use crate::qp::element::set;
+use crate::qp::layout::{assign, part};
 use crate::qp::statistics::larger;
 use crate::scalar::{Packed, Real};
 
 /// Of double precision `ε` is below.
 const FINE: f64 = 1e-10;
 
+/// Multipliers that have grown so much, where violations stay, may be a certificate.
+const GROWTH: f64 = 10.0;
+/// Numbers of feasible points that are not ruled out, over those of the iterate: enough for a
+/// suspicion.
+const SUSPECTED: f64 = 1e2;
+/// The iterations before the first test.
+const FIRST: usize = 3;
+
 impl<T: Real> Iterate<'_, T> {
+    /// Whether multipliers of the run with the objective are nearly a certificate: where no point
+    /// satisfies all constraints they grow without bound in its direction, since what the objective
+    /// adds to the gradient is bounded. `known` is how large forces were at first.
+    #[inline(always)]
+    pub fn is_suspicious<E: Packed<T>>(
+        &mut self,
+        iterations: usize,
+        known: T,
+        (residuals, limits): (Largest<T>, &Limits<T>),
+        multipliers: &mut [T],
+    ) -> bool {
+        let values = limits.of(self.terms).values;
+        let violates = residuals.inequalities > values || residuals.dynamics > values;
+        if iterations < FIRST || !violates || self.force() < T::from_f64(GROWTH) * known {
+            return false;
+        }
+        // Soft bounds contradict nothing: their forces belong to the objective.
+        let sides = &mut self.sides;
+        assign(sides.multiplier_step, sides.multiplier);
+        for &side in &*sides.soft {
+            set(sides.multiplier, side as usize, T::ZERO);
+        }
+        let objective = core::mem::replace(&mut self.objective, false);
+        let suspicious = self.is_certificate::<E>(T::from_f64(SUSPECTED), multipliers);
+        self.objective = objective;
+        assign(self.sides.multiplier, self.sides.multiplier_step);
+        if !suspicious {
+            let _ = self.evaluate::<E>(multipliers);
+        }
+        suspicious
+    }
+
+    /// The largest multiplier of a side or an equation in units.
+    fn force(&self) -> T {
+        let sides = &self.sides;
+        let of_sides = sides.multiplier.iter().zip(&*sides.rows);
+        let of_equations = sides.free.iter().zip(&*sides.equations);
+        let forces = of_sides.chain(of_equations);
+        let unit = |row: u32| self.measure.of(row as usize);
+        let most = forces.fold(T::ZERO, |most, (force, &row)| (force.abs() * unit(row)).max(most));
+        most / self.measure.objective
+    }
+
     /// Whether the multipliers are a certificate (Farkas' lemma). Without objective the Lagrangian
     /// `L(v) = Σ π (A v + b − v₊) − Σ λ d(v)` is not positive at any point that satisfies all
     /// constraints, and differs from what it is here by its gradient `g` times the distance: where
@@ -17,16 +71,24 @@ impl<T: Real> Iterate<'_, T> {
     /// where numbers are 1e5 times (of single precision a hundred times) as large as here.
     #[inline(always)]
     pub fn is_infeasible<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
+        self.is_certificate::<E>(T::from_f64(if T::EPSILON < FINE { 1e5 } else { 1e2 }), multipliers)
+    }
+
+    /// The same, where numbers may be `far` times as large.
+    #[inline(always)]
+    fn is_certificate<E: Packed<T>>(&mut self, far: T, multipliers: &mut [T]) -> bool {
         let _ = self.evaluate::<E>(multipliers);
         let count = self.sides.counts.sides();
         let (forces, distances) = (part(self.sides.multiplier, 0, count), part(self.sides.scratch, 0, count));
-        let mut lagrangian = dot::<T, E>(multipliers, self.dynamics) - dot::<T, E>(forces, distances);
+        let mut lagrangian = dot::<T, E>(multipliers, self.dynamics)
+            - dot::<T, E>(forces, distances)
+            - dot::<T, E>(self.sides.free, self.sides.equation_residual);
         if let Some(coupling) = &self.coupling {
             lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
         }
         let gradient = self.gradient_size::<E>(self.measure);
         let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
-        let gradient = larger(gradient * T::from_f64(if T::EPSILON < FINE { 1e5 } else { 1e2 }), rounding);
+        let gradient = larger(gradient * far, rounding);
         lagrangian > gradient * (T::ONE + self.terms.values)
     }
 }

@@ -7,7 +7,9 @@ mod product;
 mod vectors;
 
 pub use product::{PADDING_COLUMNS, Part, Source, product, subtract};
-pub use vectors::{add_symmetric, add_transposed, mirror, scale, subtract_column, symmetric};
+pub use vectors::{
+    add, add_symmetric, add_transposed, copy, copy_negative, mirror, scale, subtract_column, symmetric,
+};
 
 use crate::scalar::{Packed, Real};
 

@@ -11,7 +11,9 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 /// Columns of tiles, which are even: what begins at an even column and is no longer than columns,
-/// whose length is even, does not end behind them.
+/// whose length is even, does not end behind them. There are twice as many registers of AVX-512 as
+/// of AVX2.
+const WIDEST: usize = 8;
 const WIDE: usize = 6;
 const NARROW: usize = 4;
 const PAIR: usize = 2;
@@ -214,6 +216,10 @@ fn tiles<T: Real, E: Packed<T>>(
                 strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
                 NARROW
             }
+            7.. if size_of::<E>() == 64 => {
+                strip::<T, E, WIDEST>(target, target_ld, source, x, y, rows, depth);
+                WIDEST
+            }
             _ => {
                 strip::<T, E, WIDE>(target, target_ld, source, x, y, rows, depth);
                 WIDE
@@ -233,45 +239,44 @@ pub fn subtract<T: Real, E: Packed<T>>(
 ) {
     let mut left = rows.div_ceil(E::LANES);
     let mut cells = E::cells_mut(target);
-    let mut x_cells = E::cells(x.data);
-    let ld = x.ld / E::LANES;
-    while left > 0 {
-        let done = if left >= 6 {
-            subtract_rows::<T, E, 6>(cells, x_cells, ld, y, depth);
-            6
-        } else if left >= 3 {
-            subtract_rows::<T, E, 3>(cells, x_cells, ld, y, depth);
-            3
-        } else {
-            subtract_rows::<T, E, 1>(cells, x_cells, ld, y, depth);
-            1
-        };
-        left -= done;
-        cells = cells.get_mut(done..).unwrap_or_default();
-        x_cells = x_cells.get(done..).unwrap_or_default();
+    let mut x = x;
+    loop {
+        match left {
+            0 => return,
+            1 => return subtract_rows::<T, E, 1>(cells, x, y, depth),
+            2 => return subtract_rows::<T, E, 2>(cells, x, y, depth),
+            3 => return subtract_rows::<T, E, 3>(cells, x, y, depth),
+            _ => subtract_rows::<T, E, 4>(cells, x, y, depth),
+        }
+        left -= 4;
+        cells = cells.get_mut(4..).unwrap_or_default();
+        x = x.below(4 * E::LANES);
     }
 }
 
 #[inline(always)]
 fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
     target: &mut [E::Cell],
-    x: &[E::Cell],
-    ld: usize,
+    x: Columns<'_, T>,
     y: &[T],
     depth: usize,
 ) {
     let Some(target) = target.first_chunk_mut::<R>() else { return };
-    let mut sums = [[E::from_f64(0.0); R]];
-    for sums in &mut sums {
-        for (sum, cell) in sums.iter_mut().zip(&*target) {
-            *sum = E::load(cell);
-        }
+    let mut sums = [E::from_f64(0.0); R];
+    for (sum, cell) in sums.iter_mut().zip(&*target) {
+        *sum = E::load(cell);
     }
-    tile::<T, E, R, 1>(&mut sums, x, ld, y, 1, depth);
-    for sums in &sums {
-        for (sum, cell) in sums.iter().zip(&mut *target) {
-            sum.store(cell);
+    let mut data = x.data;
+    for &factor in y.get(..depth).unwrap_or_default() {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { break };
+        let factor = splat::<T, E>(factor);
+        for (sum, cell) in sums.iter_mut().zip(column) {
+            *sum = sum.minus_product(E::load(cell), factor);
         }
+        data = data.get(x.ld..).unwrap_or_default();
+    }
+    for (sum, cell) in sums.iter().zip(target) {
+        sum.store(cell);
     }
 }
 

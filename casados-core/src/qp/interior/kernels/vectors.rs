@@ -1,11 +1,11 @@
 //! Products with vectors, in registers.
 
 use super::{Columns, splat};
-use crate::qp::layout::part;
+use crate::qp::element::get;
 use crate::scalar::{Packed, Real, Registers};
 
-/// Columns whose products with a vector are summed side by side.
-const SIDE: usize = 4;
+/// Registers that a vector is held in at a time.
+const HELD: usize = 4;
 
 /// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
 /// be zero in one of them.
@@ -17,21 +17,39 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
     rows: usize,
     columns: usize,
 ) {
-    let registers = rows.div_ceil(E::LANES);
-    let v = E::cells(v).get(..registers).unwrap_or_default();
-    let (fours, rest) = target.get_mut(..columns).unwrap_or_default().as_chunks_mut::<SIDE>();
-    let mut x = x;
-    for target in fours {
-        let dots = dots::<T, E, SIDE>(x, v);
-        for (target, dot) in target.iter_mut().zip(dots) {
-            *target = *target + dot;
+    let target = target.get_mut(..columns).unwrap_or_default();
+    let (mut left, mut x, mut v) = (rows.div_ceil(E::LANES), x, E::cells(v));
+    loop {
+        match left {
+            0 => return,
+            1 => return add_dots::<T, E, 1>(target, x, v),
+            2 => return add_dots::<T, E, 2>(target, x, v),
+            3 => return add_dots::<T, E, 3>(target, x, v),
+            _ => add_dots::<T, E, HELD>(target, x, v),
         }
-        x = x.skip(SIDE);
+        left -= HELD;
+        x = x.below(HELD * E::LANES);
+        v = v.get(HELD..).unwrap_or_default();
     }
-    for target in rest {
-        let [dot] = dots::<T, E, 1>(x, v);
-        *target = *target + dot;
-        x = x.skip(1);
+}
+
+/// The same over `R` registers.
+#[inline(always)]
+fn add_dots<T: Real, E: Packed<T>, const R: usize>(target: &mut [T], x: Columns<'_, T>, v: &[E::Cell]) {
+    let Some(cells) = v.first_chunk::<R>() else { return };
+    let mut negative = [E::from_f64(0.0); R];
+    for (negative, cell) in negative.iter_mut().zip(cells) {
+        *negative = -E::load(cell);
+    }
+    let mut data = x.data;
+    for target in target {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { return };
+        let mut sum = E::from_f64(0.0);
+        for (&negative, cell) in negative.iter().zip(column) {
+            sum = sum.minus_product(E::load(cell), negative);
+        }
+        *target = *target + sum.total();
+        data = data.get(x.ld..).unwrap_or_default();
     }
 }
 
@@ -39,44 +57,59 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
 /// Target and `v` are padded, `v` with zeros.
 #[inline(always)]
 pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
-    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
-    for lane in 0..E::LANES {
-        E::set_lane(&mut index, lane, lane as f64);
+    let (last, mut begin) = (n.div_ceil(E::LANES), 0);
+    while begin < last {
+        let rows = (begin, n);
+        match last - begin {
+            1 => symmetric_rows::<T, E, 1>(target, h, ld, v, rows),
+            2 => symmetric_rows::<T, E, 2>(target, h, ld, v, rows),
+            3 => symmetric_rows::<T, E, 3>(target, h, ld, v, rows),
+            _ => symmetric_rows::<T, E, HELD>(target, h, ld, v, rows),
+        }
+        begin += HELD;
     }
-    let index = E::load(&index);
-    let below = |column: usize| splat::<T, E>(T::from_f64((column % E::LANES) as f64));
-    let strict = |cell: &E::Cell, column: usize| {
-        E::select(below(column).is_smaller(index), E::load(cell), E::from_f64(0.0))
-    };
-    // What is below the diagonal, row by row of registers.
-    for (i, target) in E::cells_mut(target).iter_mut().take(n.div_ceil(E::LANES)).enumerate() {
-        let mut sum = E::load(target);
-        let columns = h.chunks_exact(ld.max(1)).zip(v);
-        for (column, &v) in columns.clone().take(i * E::LANES) {
-            if let Some(cell) = E::cells(column).get(i) {
-                sum = sum.minus_product(E::load(cell), splat::<T, E>(-v));
-            }
-        }
-        for (j, (column, &v)) in columns.enumerate().take(n).skip(i * E::LANES).take(E::LANES) {
-            if let Some(cell) = E::cells(column).get(i) {
-                sum = sum.minus_product(strict(cell, j), splat::<T, E>(-v));
-            }
-        }
-        sum.store(target);
+}
+
+/// What `R` registers of rows below the diagonal add to their own rows, and their transpose to the
+/// rows of their columns; with the diagonal.
+#[inline(always)]
+fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
+    target: &mut [T],
+    h: &[T],
+    ld: usize,
+    v: &[T],
+    (begin, n): (usize, usize),
+) {
+    let Some(cells) = E::cells(v).get(begin..).and_then(|v| v.first_chunk::<R>()) else { return };
+    let mut factors = [E::from_f64(0.0); R];
+    for (factor, cell) in factors.iter_mut().zip(cells) {
+        *factor = E::load(cell);
     }
-    // And its transpose, with the diagonal.
-    let v_cells = E::cells(v).get(..n.div_ceil(E::LANES)).unwrap_or_default();
-    for (j, (column, target)) in h.chunks_exact(ld.max(1)).zip(target).take(n).enumerate() {
-        let first = j / E::LANES;
-        let (cells, factors) = (E::cells(column).get(first..), v_cells.get(first..));
-        let mut products = cells.unwrap_or_default().iter().zip(factors.unwrap_or_default());
-        let Some((cell, factor)) = products.next() else { return };
-        let mut sum = E::from_f64(0.0).minus_product(strict(cell, j), E::load(factor));
-        for (cell, factor) in products {
-            sum = sum.minus_product(E::load(cell), E::load(factor));
+    let (index, zero) = (index::<T, E>(), E::from_f64(0.0));
+    let mut sums = [zero; R];
+    let mut data = h.get(begin * E::LANES..).unwrap_or_default();
+    let columns = n.min((begin + R) * E::LANES);
+    for (j, (&factor, target)) in v.iter().zip(&mut *target).enumerate().take(columns) {
+        let Some(column) = E::cells(data).first_chunk::<R>() else { break };
+        let (first, lane) = (j / E::LANES, splat::<T, E>(T::from_f64((j % E::LANES) as f64)));
+        let negative = splat::<T, E>(-factor);
+        let mut dot = zero;
+        for (r, ((sum, cell), &v)) in sums.iter_mut().zip(column).zip(&factors).enumerate() {
+            if begin + r < first {
+                continue;
+            }
+            let own = E::load(cell);
+            let value = if begin + r == first { E::select(lane.is_smaller(index), own, zero) } else { own };
+            *sum = sum.minus_product(value, negative);
+            dot = dot.minus_product(value, v);
         }
-        let diagonal = column.get(j).zip(v.get(j)).map_or(T::ZERO, |(&h, &v)| h * v);
-        *target = *target + (diagonal - sum.total());
+        let diagonal = if j < begin * E::LANES { T::ZERO } else { get(data, j - begin * E::LANES) };
+        *target = *target + (diagonal * factor - dot.total());
+        data = data.get(ld..).unwrap_or_default();
+    }
+    let rows = E::cells_mut(target).get_mut(begin..).unwrap_or_default();
+    for (cell, &sum) in rows.iter_mut().zip(&sums) {
+        (E::load(cell) + sum).store(cell);
     }
 }
 
@@ -100,31 +133,6 @@ impl<T: Real> Registers<T> for AddSymmetric<'_, T> {
     }
 }
 
-/// Products of the first `C` columns with `v`.
-#[inline(always)]
-fn dots<T: Real, E: Packed<T>, const C: usize>(x: Columns<'_, T>, v: &[E::Cell]) -> [T; C] {
-    let mut columns = [&[][..]; C];
-    let mut rest = x.data;
-    for column in &mut columns {
-        *column = E::cells(rest).get(..v.len()).unwrap_or_default();
-        rest = rest.get(x.ld..).unwrap_or_default();
-    }
-    let mut sums = [E::from_f64(0.0); C];
-    for (i, v) in v.iter().enumerate() {
-        let v = E::load(v);
-        for (sum, column) in sums.iter_mut().zip(&columns) {
-            if let Some(cell) = column.get(i) {
-                *sum = sum.minus_product(E::load(cell), v);
-            }
-        }
-    }
-    let mut dots = [T::ZERO; C];
-    for (dot, sum) in dots.iter_mut().zip(sums) {
-        *dot = -sum.total();
-    }
-    dots
-}
-
 /// `target − factor · column`
 #[inline(always)]
 pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, column: &[T]) {
@@ -143,16 +151,85 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     }
 }
 
+/// The most lanes there are.
+const MOST: usize = 8;
+
+/// `0, 1, 2, …` in the lanes of a register.
+#[inline(always)]
+fn index<T: Real, E: Packed<T>>() -> E {
+    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
+    for lane in 0..E::LANES {
+        E::set_lane(&mut index, lane, lane as f64);
+    }
+    E::load(&index)
+}
+
 /// The upper triangle from the lower one.
 #[inline(always)]
-pub fn mirror<T: Real>(matrix: &mut [T], ld: usize, n: usize) {
+pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
+    if E::LANES > 1 && n <= E::LANES {
+        return mirror_register::<T, E>(matrix, ld, n);
+    }
     for column in 0..n {
-        for row in column + 1..n {
-            let below = part(matrix, column * ld + row, 1).first().copied().unwrap_or(T::ZERO);
-            if let Some(above) = matrix.get_mut(row * ld + column) {
-                *above = below;
+        let (mut below, mut above) = (column * ld + column, column * ld + column);
+        for _ in column + 1..n {
+            (below, above) = (below + 1, above + ld);
+            if let Some(&value) = matrix.get(below)
+                && let Some(to) = matrix.get_mut(above)
+            {
+                *to = value;
             }
         }
+    }
+}
+
+/// The same of a matrix whose columns are one register each.
+#[inline(always)]
+fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
+    let mut own = [E::from_f64(0.0); MOST];
+    let mut columns = &*matrix;
+    for own in own.iter_mut().take(n) {
+        if let Some(cell) = E::cells(columns).first() {
+            *own = E::load(cell);
+        }
+        columns = columns.get(ld..).unwrap_or_default();
+    }
+    let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MOST];
+    let (Some(from), Some(to)) = (own.get(..E::LANES), turned.get_mut(..E::LANES)) else { return };
+    E::transpose(from, to);
+    let (index, one) = (index::<T, E>(), E::from_f64(1.0));
+    let (mut columns, mut column) = (matrix, E::from_f64(0.0));
+    for (own, turned) in own.iter().zip(&turned).take(n) {
+        let value = E::select(index.is_smaller(column), E::load(turned), *own);
+        if let Some(cell) = E::cells_mut(columns).first_mut() {
+            value.store(cell);
+        }
+        columns = columns.get_mut(ld..).unwrap_or_default();
+        column = column + one;
+    }
+}
+
+/// Copies whole registers.
+#[inline(always)]
+pub fn copy<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
+    for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
+        *target = *source;
+    }
+}
+
+/// Copies whole registers of `−source`.
+#[inline(always)]
+pub fn copy_negative<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
+    for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
+        (-E::load(source)).store(target);
+    }
+}
+
+/// Adds whole registers.
+#[inline(always)]
+pub fn add<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
+    for (target, source) in E::cells_mut(target).iter_mut().zip(E::cells(source)) {
+        (E::load(target) + E::load(source)).store(target);
     }
 }
 

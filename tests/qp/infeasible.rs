@@ -1,0 +1,103 @@
+//! Problems with and without feasible points, told apart by clarabel: no verdict is false, and how
+//! many iterations it takes is printed.
+
+use crate::Test;
+use crate::known::{Hessian, Kind, Numbers, PLAIN, problem};
+use crate::runs::{shows, times};
+use casados::qp::{Clarabel, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, residuals};
+
+const TOLERANCE: f64 = 1e-8;
+
+/// Moves one or two bounds by 0.01 to 100, which other bounds may forbid.
+fn move_bounds(random: &mut Numbers, qp: &mut HeapQp<f64>) -> Test {
+    for _ in 0..1 + random.below(2) {
+        let k = random.below(qp.dims().len());
+        let (dims, up, distance) = (qp.dims()[k], random.chance(0.5), random.power(2.0));
+        let mut stage = qp.stage_mut(k).ok_or("no stage")?;
+        let (mut bounds, count) = if dims.ng > 0 && random.chance(0.5) {
+            (stage.g_bounds_mut(), dims.ng)
+        } else if k > 0 && random.chance(0.7) {
+            (stage.x_bounds_mut(), dims.nx)
+        } else {
+            (stage.u_bounds_mut(), dims.nu)
+        };
+        if count == 0 {
+            continue;
+        }
+        let i = random.below(count);
+        let now = [bounds.lower[i], bounds.upper[i]].into_iter().find(|bound| bound.is_finite());
+        let moved = now.unwrap_or(0.0) + if up { distance } else { -distance };
+        if random.chance(0.3) {
+            bounds.set(i, moved, moved);
+        } else if up {
+            bounds.set(i, moved, f64::INFINITY);
+        } else {
+            bounds.set(i, f64::NEG_INFINITY, moved);
+        }
+    }
+    Ok(())
+}
+
+/// The median, the ninth tenth and the largest.
+fn spread(mut iterations: Vec<usize>) -> String {
+    iterations.sort_unstable();
+    let at = |part: f64| iterations[(part * (iterations.len() - 1) as f64) as usize];
+    format!("{} | {} | {} | {}", iterations.len(), at(0.5), at(0.9), at(1.0))
+}
+
+/// Iterations are what the solver asks the clock for: errors have no number of them.
+fn told_apart(name: &str, kind: &Kind) -> Test {
+    let (mut feasible, mut infeasible, mut given_up) = (Vec::new(), Vec::new(), 0);
+    let count = 500 * times() as usize;
+    let mut seed = 0;
+    while feasible.len() < count || infeasible.len() < count {
+        seed += 1;
+        let mut random = Numbers::new(seed);
+        let mut qp = problem(&mut random, kind)?.qp;
+        if feasible.len() >= count || random.chance(0.6) {
+            move_bounds(&mut random, &mut qp)?;
+        }
+        let mut solution = HeapSolution::new(qp.dims())?;
+        let oracle = Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
+        let mut asked = 0;
+        let mut over = || {
+            asked += 1;
+            false
+        };
+        let found =
+            HeapInteriorPoint::new().solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over);
+        if shows() {
+            println!("{name}, {seed}: {asked} {oracle:?} {found:?}");
+        }
+        match (oracle, found) {
+            (Ok(_), Ok(_)) => {
+                let (r, _) = residuals(qp.view(), &solution);
+                assert!(r.largest() < 1e2 * TOLERANCE, "{name}, {seed}: {r}");
+                feasible.push(asked);
+            }
+            (Err(QpError::Infeasible { .. }), Err(QpError::Infeasible { violation, .. })) => {
+                assert!(violation > TOLERANCE, "{name}, {seed}: {violation:e}");
+                infeasible.push(asked);
+            }
+            (Ok(_) | Err(QpError::Infeasible { .. }), Err(QpError::MaxIterations { .. })) => given_up += 1,
+            (Ok(_) | Err(QpError::Infeasible { .. }), Err(QpError::Stalled { .. })) => given_up += 1,
+            // Crossed bounds are refused, and what clarabel gives up says nothing.
+            (_, Err(QpError::CrossedBounds { .. })) | (Err(_), _) => {}
+            (oracle, found) => return Err(format!("{name}, {seed}: {oracle:?}, {found:?}").into()),
+        }
+    }
+    println!("| {name} | feasible | {} |", spread(feasible));
+    println!("| {name} | infeasible | {} |", spread(infeasible));
+    assert!(given_up <= 2 * times(), "{given_up}");
+    Ok(())
+}
+
+#[test]
+fn strictly_convex() -> Test {
+    told_apart("strictly convex", &PLAIN)
+}
+
+#[test]
+fn low_rank_and_degenerate() -> Test {
+    told_apart("low rank, degenerate", &Kind { hessian: Hessian::LowRank, degenerate: true, ..PLAIN })
+}
