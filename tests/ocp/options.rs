@@ -17,12 +17,13 @@ fn both(x: f64, u: f64) -> [f64; 2] {
 #[test]
 fn nonlinear_interior_point() -> Test {
     type Change = fn(&mut IpmOptions, f64);
-    let cases: [(&str, Change, &[f64]); 5] = [
+    let cases: [(&str, Change, &[f64]); 6] = [
         ("tolerance", |o, v| o.tolerance = v, &[f64::NAN, -1.0, 0.0, f64::INFINITY]),
         ("acceptable_tolerance", |o, v| o.acceptable_tolerance = v, &[f64::NAN, 0.0]),
         ("start_mu", |o, v| o.start_mu = v, &[f64::NAN, 0.0, 1e11, f64::MAX, f64::INFINITY]),
         ("bound_push", |o, v| o.bound_push = v, &[f64::NAN, 0.0, 2.0]),
         ("warm_push", |o, v| o.warm_push = v, &[f64::NAN, -1e-3, 0.6]),
+        ("elastic_penalty", |o, v| o.elastic_penalty = v, &[f64::NAN, -1.0, f64::MAX, f64::INFINITY]),
     ];
     let mut ocp = Problem::new(Map::<Push, f64>::new())
         .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
@@ -43,7 +44,7 @@ fn nonlinear_interior_point() -> Test {
     // The largest ones end too, with every barrier: what is left of them follows from the iterate.
     for barrier in [Barrier::Monotone, Barrier::Adaptive] {
         let mut ipm = HeapIpm::new(&ocp)?;
-        (ipm.options.start_mu, ipm.options.barrier) = (1e10, barrier);
+        (ipm.options.start_mu, ipm.options.elastic_penalty, ipm.options.barrier) = (1e10, 1e10, barrier);
         assert!(ipm.solve(ocp.guess(&[0.0], &[0.0])?)?.is_converged());
     }
     let mut ipm = HeapIpm::new(&ocp)?;

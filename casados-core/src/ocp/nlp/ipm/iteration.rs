@@ -11,6 +11,7 @@ use super::state::State;
 
 use super::Ipm;
 use super::kkt::work::Work;
+use super::restoration::elastic;
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::{Exact, Slopes};
 use crate::ocp::assembly::units::of_tolerance;
@@ -112,8 +113,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
         }
         (row.residuals, row.objective) = (residuals, objective);
-        (row.elastic, row.barrier) = (state.lengths.alone, state.mu);
-        let size = state.error;
+        (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
+        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let worst = elastic::worst(ocp, state, (work.penalties, work.units));
+        let size = larger(state.error, worst.map_or(0.0, |worst| worst.violation));
         let is_best = size < state.best_residual || state.best_residual.is_nan();
         if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
@@ -286,12 +289,7 @@ where
             return Next::End(Status::OutOfTime);
         }
         let capacity = state.capacity;
-        let next = self.next(ocp, &capacity, state, row);
-        if matches!(next, Next::End(Status::Infeasible { .. })) {
-            // That is said of the last iterate.
-            state.best_iteration = *row;
-        }
-        next
+        self.next(ocp, &capacity, state, row)
     }
 
     fn step(
@@ -331,6 +329,7 @@ where
             SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
         };
         state.count_stalled(row.step);
+        state.regularisation.gone(row.step / direction.primal);
         self.accept(ocp, capacity, state, &direction, row.step)?;
         let force = of_tolerance(state.lengths.sizes.force);
         let least = (self.options.tolerance * force).max(self.options.final_mu);
@@ -343,10 +342,15 @@ where
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
         end: Option<Status>,
-        _: &Iteration,
+        row: &Iteration,
     ) -> bool {
         let capacity = state.capacity;
-        self.begin_again(ocp, &capacity, state, end)
+        let begins = self.begin_again(ocp, &capacity, state, end);
+        if !begins && matches!(end, Some(Status::Infeasible { .. })) {
+            // That is said of the last iterate.
+            state.best_iteration = *row;
+        }
+        begins
     }
 
     fn record(&mut self, row: Iteration) -> Result<(), OcpError> {

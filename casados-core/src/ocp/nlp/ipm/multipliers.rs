@@ -27,7 +27,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state: &mut State<'_>,
     ) -> Result<(), OcpError> {
         // Multipliers of hard bounds say nothing about penalties.
-        let warm = self.options.warm_start && !state.lengths.alone;
+        let warm = self.options.warm_start && state.elastic.is_none();
         // Other penalties have their numbers at other places.
         self.numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();

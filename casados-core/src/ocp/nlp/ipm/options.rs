@@ -64,9 +64,12 @@ pub struct IpmOptions {
     /// As [`bound_push`](Self::bound_push), where the start is warm
     /// ([`warm_start`](Self::warm_start)). Default 1e-6.
     pub warm_push: f64,
-    /// Whether a restoration phase minimises the violations of bounds of states and constraints where
-    /// the line search fails. Default true.
+    /// Whether violations of bounds of states and constraints alone are made small where no step
+    /// makes progress, and then get penalties beside the objective. Default true.
     pub elastic: bool,
+    /// The first of these penalties, linear, in units of forces over those of what is bounded; they
+    /// grow by factors of ten up to ten thousand times that. At most 1e10. Default 1e2.
+    pub elastic_penalty: f64,
 }
 
 impl IpmOptions {
@@ -87,6 +90,7 @@ impl IpmOptions {
             warm_start: false,
             warm_push: 1e-6,
             elastic: true,
+            elastic_penalty: 1e2,
         }
     }
 
@@ -109,9 +113,10 @@ impl IpmOptions {
             }
         }
         // Products with units of the problem are finite.
-        let (name, value) = ("start_mu", self.start_mu);
-        if !(value > 0.0 && value <= 1e10) {
-            return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 1e10" });
+        for (name, value) in [("start_mu", self.start_mu), ("elastic_penalty", self.elastic_penalty)] {
+            if !(value > 0.0 && value <= 1e10) {
+                return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 1e10" });
+            }
         }
         let last = self.final_mu;
         if !(last >= 0.0 && last <= self.start_mu) {

@@ -122,6 +122,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State::new(over, (lengths, capacity), is_linearised, &self.options);
         state.has_perturbed_start = perturbed;
+        state.first_objective = ocp.objective.to_f64();
         state.contradiction = ocp.contradiction(self.options.tolerance);
         state.diverging_iterates = DIVERGING_ITERATES * largest_size(ocp);
         #[cfg(feature = "alloc")]

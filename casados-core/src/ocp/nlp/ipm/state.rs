@@ -41,6 +41,8 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub regularisation: Regularisation,
     /// `δ_w` of the step.
     pub delta: f64,
+    /// The penalty, if bounds are soft.
+    pub elastic: Option<f64>,
     /// Whether this is a second attempt.
     pub second_attempt: bool,
     /// Phases in which violations alone are made small.
@@ -51,6 +53,10 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub gaps: f64,
     /// The largest gap or violation of the best iterate.
     pub best_violation: f64,
+    /// The objective at the first iterate.
+    pub first_objective: f64,
+    /// The violation that the last penalty left.
+    pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
     /// Iterations one after the other in which complementarity is all that is left, and stays.
@@ -99,11 +105,14 @@ impl<'c> State<'c> {
             first_violation: f64::INFINITY,
             regularisation: Regularisation::default(),
             delta: 0.0,
+            elastic: None,
             second_attempt: false,
             phase: Phase::default(),
             violation: f64::INFINITY,
             gaps: f64::INFINITY,
             best_violation: f64::INFINITY,
+            first_objective: 0.0,
+            stationary_violation: f64::INFINITY,
             acceptable: 0,
             complementarity_stall: 0,
             has_reset_slacks: false,

@@ -14,7 +14,9 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, StageDims};
 use crate::scalar::Real;
 
-/// Penalties grow by this where a step leaves violations as they are.
+/// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
+const MOST_AT_FIRST: f64 = 1e-2;
+/// Penalties grow by this to see whether the objective is what holds violations back.
 const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
@@ -87,7 +89,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        state.feasibility_step = false;
+        (state.feasibility_step, state.rewritten) = (false, false);
         state.residual = row.residuals.largest();
         self.scale(ocp, state, Way::Into);
         if state.sizes.is_some() {
@@ -95,7 +97,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let mut direction = self.direction_in_units(ocp, state, row);
         self.scale(ocp, state, Way::Back);
-        if state.feasibility_step {
+        if state.feasibility_step || state.rewritten {
             ocp.linearise(self.curvature)?;
         }
         if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
@@ -115,9 +117,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
-        let warm = self.options.warm_start && forces > T::ZERO;
+        let reduced = self.curvature.convexification() == Convexification::Reduced;
+        let warm = self.options.warm_start && (row.iteration > 0 || reduced);
+        let part = self.options.qp_accuracy * state.residual;
         // Without multipliers stationarity is the gradient, and says nothing of what is far away.
-        let permitted = self.options.qp_accuracy * state.residual.min(1.0);
+        let wrong = part * state.force();
+        let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
+        let permitted = if begins || state.exact { 0.0 } else { part };
         self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
@@ -146,7 +152,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         // What is violated and what is possible are compared: by exact solutions.
-        let penalty = state.penalty.max(self.options.elastic_penalty);
+        let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
@@ -170,21 +176,42 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
             return Ok(Direction::Step);
         }
-        // The objective or the Hessian may be what holds it back: the next penalty is larger. Nearly
-        // a linear program tells, where gaps are closed.
+        // The objective may be what holds it back: with larger penalties it counts less.
+        self.trial.copy_from(&self.solution);
         let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
-        state.penalty = (PENALTY_FACTOR * penalty).min(largest);
+        let mut solved = true;
+        while solved && penalty < largest {
+            penalty *= PENALTY_FACTOR;
+            self.set_elastic(ocp, state, penalty);
+            // Forces are as large as penalties, and have as many digits.
+            self.qp_solver.permit(QP_ROUNDING * penalty);
+            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
+            if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+                // It is, and from now on it does.
+                state.penalty = penalty;
+                return Ok(Direction::Step);
+            }
+        }
+        // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
+        // gaps are closed.
         if gaps <= CLOSED_GAPS * bounds {
-            self.feasibility_step(ocp, state, row, before).map_err(|_| error)?;
-            if self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
+            let is_near = self.feasibility_step(ocp, state, row, before).is_ok();
+            if is_near && self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
                 return Ok(Direction::Infeasible(worst));
             }
-            return Ok(Self::take_feasibility_step(state, row));
+            if solved {
+                return if is_near { Ok(Self::take_feasibility_step(state, row)) } else { Err(error) };
+            }
+            // The QP has another objective now, and is to be written again.
+            state.rewritten = true;
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
-        if gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
+        if solved && gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
             return Ok(Direction::Infeasible(worst));
         }
+        state.penalty = 0.0;
+        self.set_elastic(ocp, state, self.options.elastic_penalty);
+        core::mem::swap(&mut self.solution, &mut self.trial);
         Ok(Direction::Step)
     }
 
@@ -253,7 +280,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The QP from the iterate.
+    /// The QP from the iterate; from a cold start if a warm one may be to blame: that no point
+    /// satisfies all constraints is proved by multipliers, whatever the start was.
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -261,15 +289,27 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError> {
-        self.solution.copy_from(&ocp.iterate);
-        let mut asked = 0;
-        let over = &mut || {
-            asked += 1;
-            state.is_over()
-        };
-        let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
-        // A solver that fails asks in every iteration, and says no number.
-        row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
-        result.map(|_| ())
+        let mut start = start;
+        loop {
+            self.solution.copy_from(&ocp.iterate);
+            let mut asked = 0;
+            let over = &mut || {
+                asked += 1;
+                state.is_over()
+            };
+            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+            // A solver that fails asks in every iteration, and says no number.
+            row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
+            let Err(error) = result else { return Ok(()) };
+            if start == QpStart::Cold
+                || matches!(
+                    error,
+                    QpError::NotConvex { .. } | QpError::OutOfTime { .. } | QpError::Infeasible { .. }
+                )
+            {
+                return Err(error);
+            }
+            start = QpStart::Cold;
+        }
     }
 }

@@ -29,8 +29,24 @@ const ROOM: usize = 64;
 /// its curvature counts.
 const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
-/// Levenberg-Marquardt damping of the attempts of a step, one after the other.
-const DAMPING_OF_ATTEMPTS: [f64; 4] = [0.0, 1e-2, 1e0, MOST_DAMPING];
+/// What a step tries, where no step along the direction before is short enough.
+#[derive(Clone, Copy, PartialEq)]
+enum Attempt {
+    /// The QP to as many digits as the iterate deserves.
+    First,
+    /// To all of them: it may have been wrong by more than a step gains.
+    Exact,
+    /// With at least so much regularisation.
+    Damped(f64),
+}
+
+const ATTEMPTS: [Attempt; 5] = [
+    Attempt::First,
+    Attempt::Exact,
+    Attempt::Damped(1e-2),
+    Attempt::Damped(1e0),
+    Attempt::Damped(MOST_DAMPING),
+];
 const MOST_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
@@ -182,20 +198,28 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut failure = None;
         // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
         let damps = state.second_attempt || !C::EXACT;
-        for damping in DAMPING_OF_ATTEMPTS {
-            let is_first = damping == 0.0;
-            if !is_first && damps && damping <= state.damping {
+        for attempt in ATTEMPTS {
+            let (damping, skips) = match attempt {
+                Attempt::First => (0.0, false),
+                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.may_reject_short_steps),
+                Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
+            };
+            if skips {
                 continue;
             }
+            state.exact = state.second_attempt || attempt != Attempt::First;
             state.may_reject_short_steps = damps && damping.max(state.damping) < MOST_DAMPING;
-            if !is_first {
+            if attempt != Attempt::First {
                 if failure.is_some() {
                     // The curvature that multipliers have is no help.
                     ocp.iterate.multipliers_mut().fill(T::ZERO);
                 }
                 ocp.linearise(self.curvature)?;
                 self.leave_elastic(ocp, state);
-                (row.regularisation, state.damping) = (0.0, damping);
+                row.regularisation = 0.0;
+                if damping > 0.0 {
+                    state.damping = damping;
+                }
             }
             let direction = self.direction(ocp, state, row)?;
             row.times.qp += watch.lap();
@@ -303,10 +327,6 @@ where
         let taken = match self.attempt_steps(ocp, state, row, watch)? {
             ControlFlow::Continue(taken) => taken,
             ControlFlow::Break(status) => {
-                if matches!(status, Status::Infeasible { .. }) {
-                    // That is said of the last iterate.
-                    state.best_iteration = *row;
-                }
                 return Ok(Some(status));
             }
         };
@@ -334,7 +354,12 @@ where
         end: Option<Status>,
         row: &Iteration,
     ) -> bool {
-        self.begin_again(ocp, state, end, row)
+        let begins = self.begin_again(ocp, state, end, row);
+        if !begins && matches!(end, Some(Status::Infeasible { .. })) {
+            // That is said of the last iterate.
+            state.best_iteration = *row;
+        }
+        begins
     }
 
     fn record(&mut self, row: Iteration) -> Result<(), OcpError> {

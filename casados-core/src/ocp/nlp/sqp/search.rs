@@ -15,6 +15,9 @@ use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
 
+/// Weights are at least this part of the largest multiplier: constraints without a force, as at
+/// states that cost nothing, would be left far behind otherwise.
+const MIN_WEIGHT: f64 = 1e-2;
 /// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
@@ -136,24 +139,32 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
     fn merit_model<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
-        let (here, slope) = self.update_weights(ocp);
+        let (here, slope) = self.update_weights(ocp, state);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn update_weights<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> (Measure, f64) {
+    fn update_weights<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &State<'_, T>,
+    ) -> (Measure, f64) {
         if self.options.globalisation != Globalisation::Merit {
             let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
             return (here, slope);
         }
-        let half = T::from_f64(0.5);
+        self.scale_weights(ocp, state, Way::Into);
+        let multipliers = self.solution.multipliers_mut();
+        let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
+        let (half, least) = (T::from_f64(0.5), T::from_f64(MIN_WEIGHT) * largest);
         // Those of this step count at least.
         self.weights.update_multipliers(&self.solution, |w, multiplier| {
             let size = multiplier.abs();
-            size.max(half * (w + size))
+            size.max(half * (w + size)).max(least)
         });
+        self.scale_weights(ocp, state, Way::Back);
         let here = ocp.measure_here(&self.weights);
         let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
         let factor = slope / ((1.0 - RHO) * here.violation);

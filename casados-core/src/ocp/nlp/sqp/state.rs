@@ -28,6 +28,10 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub failed: f64,
     /// Whether the last direction was that of the violations alone.
     pub feasibility_step: bool,
+    /// Whether QPs are solved to as many digits as there are.
+    pub exact: bool,
+    /// Whether the QP that the last direction comes from was overwritten.
+    pub rewritten: bool,
     /// Steps with penalties in a row.
     pub elastic_steps: usize,
     /// The penalty that violations were found to need; zero at first.
@@ -81,6 +85,8 @@ impl<T> State<'_, T> {
             feasibility_step: false,
             elastic_steps: 0,
             penalty: 0.0,
+            exact: false,
+            rewritten: false,
             violation_of_guess: f64::INFINITY,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),

@@ -20,14 +20,49 @@ const PERTURB_INC_FACT: f64 = 8.0;
 /// The first `δ_w` of an iteration is this part of the last one. IPOPT's third costs iterations
 /// where one more factorisation is cheap beside second derivatives.
 const PERTURB_DEC_FACT: f64 = 0.1;
+/// A step that goes no farther than this part of what bounds leave of it is short,
+const SHORT: f64 = 0.1;
+/// and after so many in sequence the next ones are damped,
+const SHORT_STEPS_BEFORE_DAMPING: usize = 8;
+/// at first by this, as `δ_w` is,
+const FIRST_DAMPING: f64 = 1e-3;
+/// and not at all any more where this does not help.
+const MOST_DAMPING: f64 = 1e2;
+
 /// What is remembered of `δ_w`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp::nlp) struct Regularisation {
     /// The last one that curvature asked for.
     last: f64,
+    /// No less is taken while steps are short.
+    damping: f64,
+    /// So many steps in sequence were short.
+    short: usize,
 }
 
 impl Regularisation {
+    /// A step was accepted that goes so far of what bounds leave of it. Where constraints are
+    /// curved and the reduced Hessian is nearly singular, full steps leave the constraints at once,
+    /// and what the line search leaves of them is nothing: as in a trust region shorter steps in
+    /// another direction go farther.
+    pub fn gone(&mut self, part: f64) {
+        if part >= SHORT {
+            self.short = 0;
+            if part >= 1.0 {
+                let less = self.damping / 3.0;
+                self.damping = if less > 1e-2 * FIRST_DAMPING { less } else { 0.0 };
+            }
+            return;
+        }
+        self.short += 1;
+        if self.short >= SHORT_STEPS_BEFORE_DAMPING || self.damping > 0.0 {
+            self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last);
+            if self.damping > MOST_DAMPING {
+                (self.damping, self.short) = (0.0, 0);
+            }
+        }
+    }
+
     /// Newton's step towards `μ`, and the `δ_w` that it took (Wächter and Biegler, algorithm IC).
     ///
     /// # Errors
@@ -38,8 +73,8 @@ impl Regularisation {
         mu: T,
         force: f64,
     ) -> Result<f64, QpError> {
-        let mut failed = match attempt(iterate, mu, 0.0, force) {
-            Ok(()) => return Ok(0.0),
+        let mut failed = match self.attempt(iterate, mu, self.damping, force) {
+            Ok(()) => return Ok(self.damping * force),
             Err(failed) => failed,
         };
         let mut delta = if self.last > 0.0 {
@@ -47,8 +82,9 @@ impl Regularisation {
         } else {
             FIRST_HESSIAN_PERTURBATION
         };
+        delta = delta.max(8.0 * self.damping);
         while delta < MAX_HESSIAN_PERTURBATION {
-            match attempt(iterate, mu, delta, force) {
+            match self.attempt(iterate, mu, delta, force) {
                 Ok(()) => {
                     self.last = delta;
                     return Ok(delta * force);
@@ -59,18 +95,24 @@ impl Regularisation {
         }
         Err(failed)
     }
-}
 
-/// One factorisation; a step that is not finite is no step.
-fn attempt<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: f64, force: f64) -> Result<(), QpError> {
-    match step(iterate, mu, T::from_f64(delta * force)) {
-        Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
-            Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
+    /// One factorisation; a step that is not finite is no step.
+    fn attempt<T: Real>(
+        &self,
+        iterate: &mut Iterate<'_, T>,
+        mu: T,
+        delta: f64,
+        force: f64,
+    ) -> Result<(), QpError> {
+        match step(iterate, mu, T::from_f64(delta * force)) {
+            Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
+            }
+            // Directions in which pivots vanished would not move at all.
+            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
+            }
+            result => result,
         }
-        // Directions in which pivots vanished would not move at all.
-        Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
-            Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
-        }
-        result => result,
     }
 }

@@ -1,5 +1,6 @@
 //! How a run may end, from residuals of an iterate.
 
+use super::elastic;
 use super::phase;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
@@ -32,7 +33,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 return next;
             }
         } else if state.error <= self.options.tolerance {
-            return Next::End(Status::Converged);
+            let cost = row.objective - ocp.objective.to_f64();
+            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
+            return end.map_or(Next::Evaluate, Next::End);
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
@@ -41,7 +44,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let is_feasible = violation <= self.options.tolerance;
         let (v, _) = ocp.iterate.vectors();
         if is_feasible
-            && !state.lengths.alone
+            && state.elastic.is_none()
             && v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates)
         {
             return Next::End(Status::Unbounded);

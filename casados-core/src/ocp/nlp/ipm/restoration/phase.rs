@@ -10,15 +10,15 @@
 //! where violations do not say how far to go. J. Nocedal, S. J. Wright, "Numerical Optimization",
 //! sections 18.6 and 19.5; A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.3.
 
+use super::elastic::{self, soften};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
-use crate::ocp::nlp::ipm::kkt::regularisation::Regularisation;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
-use crate::ocp::nlp::ipm::violations::SMALL_VIOLATION;
+use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::nlp::solver::Next;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
@@ -29,44 +29,53 @@ use crate::scalar::{Real, Scalar};
 /// The unit of forces of the phase, as a multiple of that of the problem: beside it the curvature
 /// of the objective is small.
 const PENALTY_SCALING: f64 = 1e3;
-/// Where violations are no more than this, a monotone barrier parameter is tried first.
+/// Where violations are no more than this, a run begins with a monotone barrier parameter first.
 const MONOTONE_FIRST_BELOW: f64 = 1e-2;
-/// The first barrier parameter of the phase, in its units of forces.
-const RESTORATION_MU: f64 = 0.1;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
-    /// Goes on where the line search fails: by a restoration phase, with a monotone barrier parameter
-    /// from the best iterate; nothing if it has been tried. The status then.
+    /// Goes on where no step makes progress: violations alone, then with a monotone barrier
+    /// parameter, then with penalties. The status if all of that has been tried.
     pub(in crate::ocp::nlp::ipm) fn recover<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Option<Status> {
-        let Work { penalties, units, .. } = Work::new(ocp.ends(), capacity, self.work.as_mut());
-        if state.lengths.alone {
-            if !state.progress.adapts() {
-                return Some(Status::NoProgress);
+        let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let (penalties, units) = (&*given.penalties, &*given.units);
+        if state.phase.force.is_some() {
+            if state.progress.adapts() {
+                state.begin_monotone(&self.options);
+                return None;
             }
-            state.begin_monotone(&self.options);
+            state.phase.count = MAX_RESTORATION_PHASES;
+            exit(ocp, state, penalties, &self.options);
+            ocp.recall(&self.best);
+            soften(ocp, state, (penalties, units), self.options.elastic_penalty);
             return None;
         }
         // Near a feasible point it is not violations that hinder a first attempt.
-        let small = if state.progress.adapts() { MONOTONE_FIRST_BELOW } else { SMALL_VIOLATION };
-        let is_violated = state.violation > small;
-        if self.options.elastic && is_violated && state.phase.may_enter() {
+        let is_violated =
+            state.violation > if state.progress.adapts() { MONOTONE_FIRST_BELOW } else { SMALL_VIOLATION };
+        if self.options.elastic && state.elastic.is_none() && is_violated && state.phase.may_enter() {
             if state.violation > state.best_violation {
                 ocp.recall(&self.best);
             }
             enter(ocp, state, (penalties, units));
             return None;
         }
-        if !state.progress.adapts() {
+        if state.progress.adapts() {
+            // From the best point on, as carefully as may be.
+            ocp.recall(&self.best);
+            state.begin_monotone(&self.options);
+            return None;
+        }
+        if state.elastic.is_some() || !self.options.elastic {
             return Some(Status::NoProgress);
         }
-        // From the best point on, as carefully as may be.
+        // Where no step made progress is no place to begin.
         ocp.recall(&self.best);
-        state.begin_monotone(&self.options);
+        soften(ocp, state, (penalties, units), self.options.elastic_penalty);
         None
     }
 }
@@ -75,17 +84,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
-    (given, units): (&[T], &[T]),
+    given: (&[T], &[T]),
 ) {
     state.phase.force = Some(state.lengths.sizes.force);
     state.phase.count += 1;
     state.lengths.sizes.force *= PENALTY_SCALING;
-    let sizes = state.lengths.sizes;
-    ocp.set_penalties(given, Some(T::from_f64(sizes.force)), units);
-    state.lengths = Lengths { sizes, alone: true, ..Lengths::of(ocp.qp()) };
-    state.mu = RESTORATION_MU * sizes.force;
-    state.regularisation = Regularisation::default();
-    (state.has_slacks, state.has_filter) = (false, false);
+    soften(ocp, state, given, 1.0);
+    state.lengths.alone = true;
 }
 
 /// Ends it: bounds are as hard as they were.
@@ -104,6 +109,7 @@ pub(in crate::ocp::nlp::ipm) fn exit<
     let mut sizes = state.lengths.sizes;
     sizes.force = state.phase.force.take().unwrap_or(sizes.force);
     state.lengths = Lengths { sizes, ..Lengths::of(ocp.qp()) };
+    state.elastic = None;
     state.begin_monotone(options);
 }
 
@@ -121,7 +127,7 @@ pub(in crate::ocp::nlp::ipm) fn check_convergence<
 ) -> Option<Next> {
     let violations = state.phase.violations;
     if violations.is_stationary()
-        && let Some(worst) = ocp.worst(penalties, units).0
+        && let Some(worst) = elastic::worst(ocp, state, (penalties, units))
     {
         return Some(Next::End(ocp.status_of_worst(&worst)));
     }
