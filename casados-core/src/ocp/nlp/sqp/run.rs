@@ -154,6 +154,21 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result.map(|()| outcome)
     }
 
+    /// Lets the filter decide from now on where the merit function creeps.
+    fn switch_to_filter<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &Iteration,
+    ) where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if C::EXACT && state.switches_to_filter(row, &self.options) {
+            state.search.filter.clear();
+            self.forget_weights(ocp, state);
+        }
+    }
+
     /// The curvature of the QP along its step, of which the iterate has gone a part.
     fn curvature_of_step<P: Formulation<T>>(
         &mut self,
@@ -333,6 +348,7 @@ where
         (row.step, row.corrected) = (taken.length, taken.corrected);
         let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
         state.damp(row, curvature);
+        self.switch_to_filter(ocp, state, row);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
         if row.elastic
             && C::EXACT

@@ -42,7 +42,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let by = self.options.globalisation;
+        let by = state.globalisation(&self.options);
         let weighted = by == Globalisation::Merit;
         let line = self.merit_model(ocp, state);
         let mut written = true;
@@ -84,7 +84,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Weights of violations before the first line search: those of a filter are the inverses of
     /// units and stay.
     pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
-        let weighted = self.options.globalisation == Globalisation::Merit;
+        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
         self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
         if !weighted {
             // The solution is written before it is read.
@@ -106,8 +106,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Whether a step that is good enough may be better where it is shorter.
-    fn shortens(&self, line: &Line, length: f64, there: &Measure) -> bool {
-        let weighted = self.options.globalisation == Globalisation::Merit;
+    fn shortens(&self, state: &State<'_, T>, line: &Line, length: f64, there: &Measure) -> bool {
+        let weighted = state.globalisation(&self.options) == Globalisation::Merit;
         weighted && line.overshoots(length, there)
     }
 
@@ -124,7 +124,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        while self.shortens(line, length, &there) && 0.5 * length >= self.options.shortest_step {
+        while self.shortens(state, line, length, &there) && 0.5 * length >= self.options.shortest_step {
             let half = self.measure_at(ocp, state, 0.5 * length);
             let Some(half) = half.filter(|half| half.is_finite() && half.merit() < there.merit()) else {
                 between(&ocp.iterate, &self.solution, length, &mut self.trial);
@@ -150,7 +150,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
     ) -> (Measure, f64) {
-        if self.options.globalisation != Globalisation::Merit {
+        if state.globalisation(&self.options) != Globalisation::Merit {
             let here = ocp.measure_here(&self.weights);
             let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
             return (here, slope);
@@ -187,13 +187,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let mut watch = Watch::start();
-        let by = self.options.globalisation;
+        let by = state.globalisation(&self.options);
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
         let there = ocp.linearise(self.curvature);
         let there = there.map(|()| ocp.measure_here(&self.weights).over(state.force()));
         let seconds = watch.lap();
         let is_good = there.is_ok_and(|there| {
-            !self.shortens(line, 1.0, &there) && state.search.accepts(by, 1.0, line, &there)
+            !self.shortens(state, line, 1.0, &there) && state.search.accepts(by, 1.0, line, &there)
         });
         if is_good {
             state.search.linearised = Some(seconds);
@@ -223,7 +223,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.scale(ocp, state, Way::Back);
         core::mem::swap(&mut self.solution, &mut self.trial);
         let Ok(statistics) = solved else { return false };
-        let by = self.options.globalisation;
+        let by = state.globalisation(&self.options);
         row.qp_iterations += statistics.iterations;
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         let there = ocp.measure(&self.trial, &self.weights, ends).ok().map(|there| there.over(state.force()));

@@ -1,6 +1,7 @@
 //! What a run remembers.
 
 use super::acceptance::Search;
+use super::options::{Globalisation, SqpOptions};
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
@@ -50,6 +51,8 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub error: f64,
     /// Units, unless all of them are one.
     pub sizes: Option<Sizes>,
+    /// Short steps of the merit function, but for those with penalties, less full ones.
+    pub short_steps: usize,
     /// Infeasible, where bounds contradict each other.
     pub contradiction: Option<Status>,
     pub number: PhantomData<T>,
@@ -59,6 +62,9 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
 /// of the step along a curvature the cube root of the part that was gone.
 const SHORT_STEP: f64 = 1.0 / 16.0;
 const DAMPING_FACTOR: f64 = 4.0;
+/// After so many short steps more than full ones the merit function gives way to the filter: where
+/// constraints bend more than its weights let pass, it creeps along them.
+const SHORT_STEPS_BEFORE_FILTER: usize = 5;
 const DAMPING_EXPONENT: f64 = -1.0 / 3.0;
 /// Other steps are followed by less damping, but not by less than the geometric mean of what there
 /// was and of what was too little the last time; that is forgotten by a factor.
@@ -93,6 +99,7 @@ impl<T> State<'_, T> {
             residual: f64::INFINITY,
             error: f64::INFINITY,
             sizes: None,
+            short_steps: 0,
             contradiction: None,
             number: PhantomData,
         }
@@ -107,6 +114,28 @@ impl<T> State<'_, T> {
     /// The unit of forces.
     pub fn force(&self) -> f64 {
         self.sizes.map_or(1.0, |sizes| sizes.force)
+    }
+
+    /// How far steps go: as options say, but by the filter where the merit function creeps.
+    pub fn globalisation(&self, options: &SqpOptions) -> Globalisation {
+        match options.globalisation {
+            Globalisation::Merit if self.short_steps >= SHORT_STEPS_BEFORE_FILTER => Globalisation::Filter,
+            given => given,
+        }
+    }
+
+    /// Counts short steps, less full ones without a correction. Whether it was the short one after
+    /// which the filter decides.
+    pub fn switches_to_filter(&mut self, row: &Iteration, options: &SqpOptions) -> bool {
+        if options.globalisation != Globalisation::Merit || self.short_steps >= SHORT_STEPS_BEFORE_FILTER {
+            return false;
+        }
+        if self.is_short(row) && !row.elastic {
+            self.short_steps += 1;
+        } else if row.step == 1.0 && !row.corrected {
+            self.short_steps = self.short_steps.saturating_sub(1);
+        }
+        self.short_steps == SHORT_STEPS_BEFORE_FILTER
     }
 
     /// Whether a step was so short that damping helps.
