@@ -76,16 +76,6 @@ fn terrain_that_bends() -> Test {
     is_optimal(&mut ocp)
 }
 
-/// Without damping steps are 1e-4 for hundreds of iterations.
-#[test]
-fn terrain_by_the_interior_point() -> Test {
-    let mut ocp = ride!();
-    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
-    assert!(outcome.is_converged(), "{outcome}");
-    assert!((outcome.objective - 2651.8576).abs() <= 1e-6 * 2651.8576, "{outcome}");
-    is_optimal(&mut ocp)
-}
-
 /// Cells of the immune system and viruses per cubic millimetre over fifty days; two treatments.
 /// H. R. Joshi, "Optimal control of an HIV immunology model", Optimal Control Applications and
 /// Methods 23 (2002).
