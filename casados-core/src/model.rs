@@ -504,6 +504,25 @@ impl Range {
 
 /// A model whose code is generic over every scalar: duals and complex numbers included, which is
 /// what independent checks of its derivatives need. Graph models are; dual models are not.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::GraphDae;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u - x[0].sin()] }
+///
+/// // v = (ẋ, x, u, t): six numbers; f = ẋ − (x₁, u − sin x₀).
+/// let v = [0.0, 0.0, 0.3, 2.0, 1.0, 0.0];
+/// let mut f = [0.0; 2];
+/// Pendulum::residual_of::<f64>(&v, &mut f);
+/// assert_eq!(f, [-2.0, 0.3_f64.sin() - 1.0]);
+///
+/// // The gradient of f₁.
+/// let mut gradient = [0.0; 6];
+/// Pendulum::adjoint_of::<f64>(&v, &[0.0, 1.0], &mut gradient);
+/// assert_eq!(gradient, [0.0, 1.0, 0.3_f64.cos(), 0.0, -1.0, 0.0]);
+/// ```
 pub trait GraphDae: Dae {
     /// The residual `f(v)`; `v` has `NV` elements and `f` has `NK`.
     fn residual_of<S: Scalar<Cell = S>>(v: &[S], f: &mut [S]);
