@@ -14,7 +14,7 @@
 
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Outputs, Plain, Shape};
-use crate::structure::{Operations, Pattern};
+use crate::structure::{Operations, Pattern, Units};
 #[doc(no_inline)]
 pub use crate::structure::{begins, by_row};
 
@@ -193,6 +193,11 @@ pub trait Function: 'static {
     type Hessian<T: Plain>: Array<T>;
     /// What is known about the function before it runs.
     const STRUCTURE: FunctionStructure;
+    /// The units of the variables, as [`Dae::UNITS`](crate::Dae::UNITS).
+    const UNITS: Units = Units::NONE;
+    /// The unit of all outputs: what stands behind a comma in the first paragraph of the doc
+    /// comment, as `/// Tension of the tether, N.`
+    const UNIT: &'static str = "";
 
     /// The value `y(v)`.
     fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);

@@ -9,7 +9,7 @@ use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
     Assembly, Cost, Dependent, DiagonalControl, Elimination, Kinematic, Left, NO_COLUMN, Operations, Pattern,
-    Pivot, Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Pivot, Reduction, Structure, Supernode, Term, Units, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 
@@ -404,6 +404,8 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
+    /// The units of the variables, which pictures show. The attributes take them from doc comments.
+    const UNITS: Units = Units::NONE;
     /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 

@@ -24,7 +24,14 @@ use core::fmt;
 /// The names that a model gives.
 pub(in crate::ocp) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
-    Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
+    Names {
+        model: structure.name,
+        x: structure.x,
+        z: structure.z,
+        u: structure.u,
+        p: structure.p,
+        units: M::UNITS,
+    }
 }
 
 /// The equations of a model.
