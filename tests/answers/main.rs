@@ -9,6 +9,7 @@ mod failing_intervals;
 mod infeasible;
 mod mass;
 mod messages;
+mod outcomes;
 mod print;
 mod return_map;
 mod sensitivities;

@@ -96,7 +96,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Algebraic states of the iterate.
-    pub(super) fn find_algebraic(&mut self) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn find_algebraic(&mut self) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, .. } = self.problem.parts();
