@@ -16,6 +16,7 @@ mod sensitivities;
 mod smoothing;
 mod solution_derivatives;
 mod verdicts;
+mod ways_out;
 mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;
