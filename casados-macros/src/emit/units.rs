@@ -11,14 +11,13 @@ pub fn write(krate: &syn::Path, units: &Units) -> TokenStream {
         let list = if list.iter().all(String::is_empty) { &[][..] } else { list };
         quote!(&[#(#list),*])
     });
-    let all = [&units.x, &units.z, &units.u, &units.p];
-    (all.into_iter().flatten().chain([t]).any(|unit| !unit.is_empty()))
-        .then(|| {
-            quote! {
-                const UNITS: #krate::__private::Units = #krate::__private::Units { x: #x, z: #z, u: #u, p: #p, t: #t };
-            }
-        })
-        .unwrap_or_default()
+    let mut all = [&units.x, &units.z, &units.u, &units.p].into_iter().flatten().chain([t]);
+    if all.all(String::is_empty) {
+        return TokenStream::new();
+    }
+    quote! {
+        const UNITS: #krate::__private::Units = #krate::__private::Units { x: #x, z: #z, u: #u, p: #p, t: #t };
+    }
 }
 
 /// Of the outputs of a function, if there is one.
