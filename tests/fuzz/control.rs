@@ -106,6 +106,9 @@ fn problems() {
         match found {
             Ok((Outcome { status: Status::Converged | Status::Acceptable, .. }, _)) => counts.count("Ok"),
             Ok((outcome, _)) => {
+                if shows() {
+                    println!("seed {seed}: {outcome}");
+                }
                 let text = format!("{:?}", outcome.status);
                 counts.count(text.split([' ', '(', '{']).next().unwrap_or_default());
             }
