@@ -142,8 +142,8 @@ pub mod error {
 pub mod model {
     pub use casados_core::model::{
         Cost, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX,
-        MatrixZC, MatrixZP, MatrixZU, MatrixZX, Operations, Pattern, Range, Structure, VectorP, VectorU,
-        VectorX, VectorZ,
+        MatrixZC, MatrixZP, MatrixZU, MatrixZX, Operations, Pattern, Range, Structure, Units, VectorP,
+        VectorU, VectorX, VectorZ,
     };
 }
 

@@ -14,7 +14,7 @@
 
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Outputs, Plain, Shape};
-use crate::structure::{Operations, Pattern};
+use crate::structure::{Operations, Pattern, Units};
 #[doc(no_inline)]
 pub use crate::structure::{begins, by_row};
 
@@ -85,6 +85,18 @@ pub type MatrixYY<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYY<T>;
 /// ```
 pub type MatrixYX<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYX<<F as Function>::Shape, T>;
 /// `SMatrix<T, NY, NZ>` of a function.
+///
+/// ```
+/// use casados::function::MatrixYZ;
+/// use casados::prelude::*;
+///
+/// /// Two outputs of a function of two states and one algebraic state.
+/// #[function]
+/// fn loads(x: [f64; 2], z: f64) -> [f64; 2] { [z * x[0], z * x[1]] }
+///
+/// let by_algebraic_state = MatrixYZ::<Loads, f64>::new(1.0, 2.0);
+/// assert_eq!(by_algebraic_state.shape(), (2, 1));
+/// ```
 pub type MatrixYZ<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYZ<<F as Function>::Shape, T>;
 /// `SMatrix<T, NY, NU>` of a function.
 ///
@@ -181,6 +193,11 @@ pub trait Function: 'static {
     type Hessian<T: Plain>: Array<T>;
     /// What is known about the function before it runs.
     const STRUCTURE: FunctionStructure;
+    /// The units of the variables, as [`Dae::UNITS`](crate::Dae::UNITS).
+    const UNITS: Units = Units::NONE;
+    /// The unit of all outputs: what stands behind a comma in the first paragraph of the doc
+    /// comment, as `/// Tension of the tether, N.`
+    const UNIT: &'static str = "";
 
     /// The value `y(v)`.
     fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);
@@ -217,6 +234,22 @@ pub trait Function: 'static {
 
 /// A function whose code is generic over every scalar: duals and complex numbers included, which is
 /// what independent checks of its derivatives need.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::GraphFunction;
+///
+/// /// A distance from the origin.
+/// #[function]
+/// fn distance(x: [f64; 2]) -> f64 { x[0].hypot(x[1]) }
+///
+/// // v = (ẋ, x, t): five numbers.
+/// let (v, mut y, mut gradient) = ([0.0, 0.0, 3.0, 4.0, 0.0], [0.0], [0.0; 5]);
+/// Distance::value_of::<f64>(&v, &mut y);
+/// Distance::adjoint_of::<f64>(&v, &[1.0], &mut gradient);
+/// assert_eq!(y, [5.0]);
+/// assert!((gradient[2] - 0.6).abs() < 1e-15 && (gradient[3] - 0.8).abs() < 1e-15);
+/// ```
 pub trait GraphFunction: Function {
     /// The value `y(v)`; `v` has `NV` elements and `y` has `NY`.
     fn value_of<S: Scalar<Cell = S>>(v: &[S], y: &mut [S]);

@@ -123,7 +123,8 @@ pub mod __private {
     pub use crate::shape::{Aligned, Array, Count, Matrix, Outputs, Plain};
     pub use crate::structure::{
         Assembly, Cost, Dependent, DiagonalControl, Elimination, Kinematic, Left, NO_COLUMN, Operations,
-        Pattern, Pivot, Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+        Pattern, Pivot, Reduction, Structure, Supernode, Term, Units, Update, all, by_column, columns,
+        symmetric,
     };
     pub use crate::tables;
     pub use crate::{

@@ -9,7 +9,7 @@ use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
     Assembly, Cost, Dependent, DiagonalControl, Elimination, Kinematic, Left, NO_COLUMN, Operations, Pattern,
-    Pivot, Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Pivot, Reduction, Structure, Supernode, Term, Units, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 
@@ -404,6 +404,8 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
+    /// The units of the variables, which pictures show. The attributes take them from doc comments.
+    const UNITS: Units = Units::NONE;
     /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 
@@ -504,6 +506,25 @@ impl Range {
 
 /// A model whose code is generic over every scalar: duals and complex numbers included, which is
 /// what independent checks of its derivatives need. Graph models are; dual models are not.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::GraphDae;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u - x[0].sin()] }
+///
+/// // v = (ẋ, x, u, t): six numbers; f = ẋ − (x₁, u − sin x₀).
+/// let v = [0.0, 0.0, 0.3, 2.0, 1.0, 0.0];
+/// let mut f = [0.0; 2];
+/// Pendulum::residual_of::<f64>(&v, &mut f);
+/// assert_eq!(f, [-2.0, 0.3_f64.sin() - 1.0]);
+///
+/// // The gradient of f₁.
+/// let mut gradient = [0.0; 6];
+/// Pendulum::adjoint_of::<f64>(&v, &[0.0, 1.0], &mut gradient);
+/// assert_eq!(gradient, [0.0, 1.0, 0.3_f64.cos(), 0.0, -1.0, 0.0]);
+/// ```
 pub trait GraphDae: Dae {
     /// The residual `f(v)`; `v` has `NV` elements and `f` has `NK`.
     fn residual_of<S: Scalar<Cell = S>>(v: &[S], f: &mut [S]);

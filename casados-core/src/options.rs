@@ -109,7 +109,8 @@ pub enum Jacobian {
     /// The mean of the stages' Jacobians, in the eigenbasis of the tableau; renewed as with `Auto`.
     /// Tableaux of one or two stages, or without such a basis, take `Auto`.
     Simplified,
-    /// Evaluated and factorised in every iteration.
+    /// Evaluated and factorised in every iteration. No increment is rejected for its growth, as
+    /// those of older Jacobians are: the iterates are those of Newton's method.
     Full,
     /// Evaluated and factorised once in each step, at the start values; once more only where
     /// increments do not shrink to half of the last one. (With a fixed number of iterations this is

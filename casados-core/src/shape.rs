@@ -307,6 +307,23 @@ pub trait Shape: 'static {
 
 /// The dimensions of a model. `NK`, `NV` and `NW` follow from the first four (see [`Shape`]); they
 /// are written out because stable Rust cannot add in a type.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::{Dims, Shape};
+///
+/// #[dae]
+/// fn tank(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: f64) -> [f64; 3] {
+///     [xdot[0] + z, xdot[1] - z, z - u * p * x[0]]
+/// }
+///
+/// // nx, nz, nu, np; nk = nx + nz, nv = 2 nx + nz + nu + np + 1, nw = nx + nu + np; and the columns
+/// // of derivatives in memory: nw, in whole panels.
+/// fn has_dimensions<M: Dae<Shape = Dims<2, 1, 1, 1, 3, 8, 4, 8>>>() -> [usize; 3] {
+///     [M::Shape::NK, M::Shape::NV, M::Shape::NW]
+/// }
+/// assert_eq!(has_dimensions::<Tank>(), [3, 8, 4]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Dims<
     const NX: usize,

@@ -9,12 +9,14 @@ mod failing_intervals;
 mod infeasible;
 mod mass;
 mod messages;
+mod outcomes;
 mod print;
 mod return_map;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;
 mod verdicts;
+mod ways_out;
 mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

@@ -12,8 +12,13 @@ mod runs;
 
 mod adaptive;
 mod batches;
+mod control;
+mod events;
+mod exported;
+mod files;
 mod fixed;
 mod source;
+mod tables;
 
 use casados::Error;
 use casados::{Real, dae, ode};

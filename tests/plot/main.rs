@@ -1,6 +1,7 @@
 //! Pictures: they are parsed, and what they show is held against what was to be drawn.
 
 mod reader;
+mod units;
 
 use casados::ocp::{
     Constraint, HeapOcp, HeapSqp, Horizon, Iteration, LeastSquaresCost, Log, Problem, TrajectoryError,

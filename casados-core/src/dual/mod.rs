@@ -25,6 +25,31 @@ use structure::{hessian_entry, jacobian_entry};
 
 /// A model over dual numbers: written by `#[dae]` and `#[ode]` on a function that is generic over
 /// `DualNum`.
+///
+/// ```
+/// use casados::dual::{DualModel, DualNum};
+/// use casados::prelude::*;
+///
+/// /// The rate is a series that stops where its terms are small: more than the attributes read.
+/// #[ode]
+/// fn decay<T: DualNum<Primitive = f64> + Copy>(x: [T; 1]) -> [T; 1] {
+///     let (mut sum, mut term, mut k) = (T::zero(), T::one(), 1.0);
+///     while term.re().abs() > 1e-17 {
+///         sum += term;
+///         term *= x[0] / k;
+///         k += 1.0;
+///     }
+///     [-sum]
+/// }
+///
+/// fn is_dual<M: DualModel>() {}
+/// is_dual::<Decay>();
+/// // ẋ = −exp(x) from zero: x = −ln(1 + t), and its derivative by the start is 1 / (1 + t).
+/// let mut irk = Irk::<Decay, Gauss<4>>::new(Options { steps: 4, ..Options::default() })?;
+/// let end = irk.forward(&nalgebra::vector![0.0], &nalgebra::vector![], 1.0)?;
+/// assert!((end.x[0] + 2.0_f64.ln()).abs() < 1e-9 && (end.dx_dx0[0] - 0.5).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub trait DualModel: Dae {
     /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and hands
     /// over the equations.

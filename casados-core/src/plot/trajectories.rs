@@ -44,7 +44,9 @@ impl Panel {
     /// constraints. `x` are all states, `Corner[2]` is an output of a constraint.
     ///
     /// Controls are stairs. Bounds are dashed, where they are not far from the values; where one is
-    /// active the line is wide.
+    /// active the line is wide. Axes have the units that doc comments of the model say
+    /// ([`Units`](crate::structure::Units)) or [`Trajectory::set_unit`] did; where the units of
+    /// several lines differ, each name has its own.
     ///
     /// # Errors
     /// [`TrajectoryError::Unknown`]
@@ -54,11 +56,23 @@ impl Panel {
             // The error that lists the names.
             solution.get(name)?;
         }
-        let panel = Self::new(format!("{}: {name}", solution.model())).x("time");
+        let panel = Self::new(format!("{}: {name}", solution.model()));
+        let mut panel = panel.x(with_unit("time", solution.time_unit()));
+        let unit = found.first().map_or("", |series| series.unit.as_str());
+        let is_common = found.iter().all(|series| series.unit == unit);
+        if is_common && !unit.is_empty() {
+            panel = panel.y(with_unit(name, unit));
+        }
         Ok(found.into_iter().enumerate().fold(panel, |panel, (i, series)| {
-            drawn(solution, series, Colour::of(i)).into_iter().fold(panel, Self::with)
+            let name = with_unit(&series.name, if is_common { "" } else { &series.unit });
+            drawn(solution, series, name, Colour::of(i)).into_iter().fold(panel, Self::with)
         }))
     }
+}
+
+/// A name with its unit, if there is one: `speed, m/s`.
+fn with_unit(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.into() } else { format!("{name}, {unit}") }
 }
 
 fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> Vec<Point> {
@@ -88,7 +102,12 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
 }
 
 /// A line with its bounds, and where they are active.
-fn drawn<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>, colour: Colour) -> Vec<Curve> {
+fn drawn<T: Real>(
+    solution: &Trajectory<T>,
+    series: &crate::ocp::Series<T>,
+    name: String,
+    colour: Colour,
+) -> Vec<Curve> {
     let points = points(solution, series);
     let over = |name: String, value: &dyn Fn(&Point) -> f64| {
         let line = points.iter().map(|point| (point.time, value(point)));
@@ -114,6 +133,6 @@ fn drawn<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>, colo
         let wide = over(String::new(), &active).width(6.0);
         drawn.push(if series.kind == Kind::Control { wide } else { wide.marked() });
     }
-    drawn.push(over(series.name.clone(), &|point| point.value));
+    drawn.push(over(name, &|point| point.value));
     drawn
 }

@@ -62,6 +62,31 @@ pub struct Solution<T, D, M> {
 pub type HeapSolution<T = f64> = Solution<T, Vec<StageDims>, Vec<T>>;
 
 /// A solution, for solvers.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// /// A function over any solver of QPs: the first control.
+/// fn first_control(solver: &mut impl QpSolver<f64>, qp: &HeapQp) -> Result<f64, QpError> {
+///     let mut solution = HeapSolution::new(qp.dims())?;
+///     let view: SolutionView<'_, f64> = solution.view_mut();
+///     solver.solve(qp.view(), QpStart::Cold, view)?;
+///     Ok(solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]))
+/// }
+/// assert!((first_control(&mut HeapInteriorPoint::new(), &qp)? + 0.4).abs() < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Debug)]
 pub struct SolutionView<'a, T> {
     pub(crate) dims: &'a [StageDims],

@@ -30,6 +30,31 @@ pub enum Origin {
 /// Rows `first .. first + count` of the general constraints of a stage, less their lower bounds,
 /// lie in the second-order cone: the first of them is at least the length of the others. Their
 /// upper bounds have no meaning.
+///
+/// ```
+/// use casados::qp::*;
+///
+/// // The point of the disc ‖u‖ ≤ 1 that is nearest to (3, 4): rows 0 + 1, u₀, u₁ in the cone.
+/// let dims = [StageDims::new(0, 2, 3), StageDims::new(0, 0, 0)];
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// let mut stage = qp.stage_mut(0).ok_or(QpError::OutOfMemory { bytes: 0 })?;
+/// for i in 0..2 {
+///     stage.r_mut().set(i, i, 1.0);
+///     stage.d_mut().set(1 + i, i, 1.0);
+/// }
+/// stage.gradient_u_mut().copy_from_slice(&[-3.0, -4.0]);
+/// // Row less lower bound: the first one is 0 − (−1) = 1.
+/// for (row, lower) in [-1.0, 0.0, 0.0].into_iter().enumerate() {
+///     stage.g_bounds_mut().set(row, lower, f64::INFINITY);
+/// }
+/// let mut clarabel = Clarabel::new();
+/// clarabel.cones.push(SecondOrderCone { stage: 0, first: 0, count: 3 });
+/// let mut solution = HeapSolution::new(&dims)?;
+/// clarabel.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let u = solution.stages().next().map_or(vec![], |stage| stage.u.to_vec());
+/// assert!((u[0] - 0.6).abs() < 1e-6 && (u[1] - 0.8).abs() < 1e-6);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SecondOrderCone {
     /// The stage.

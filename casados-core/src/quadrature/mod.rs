@@ -45,6 +45,34 @@ pub(crate) mod sealed {
 ///
 /// Its methods are for integrators. Those with a body are called on what a user has given alone,
 /// not on what stands for it in one step of many.
+///
+/// ```
+/// use casados::integrator::Integrand;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// A cart on a rail: position, m; velocity, m/s.
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn position(x: [f64; 2], _u: f64) -> f64 { x[0] }
+///
+/// /// An interval of one second from rest, whatever is integrated beside it.
+/// fn accelerate<Q: Integrand<Cart, f64>>(integrand: &mut Q) -> Result<(), Error> {
+///     let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+///     irk.with(integrand).solve(&vector![0.0, 0.0], &vector![2.0], 1.0)?;
+///     Ok(())
+/// }
+///
+/// // x₀ = t²: the integral is 1/3, that of half its square 1/10, which Gauss with two stages misses.
+/// let mut mean = Quadrature::<Position>::new();
+/// accelerate(&mut mean)?;
+/// assert!((mean.q[0] - 1.0 / 3.0).abs() < 1e-14);
+/// let mut square = LeastSquares::<Position>::new(&nalgebra::matrix![1.0]);
+/// accelerate(&mut square)?;
+/// assert!((square.value - 0.1).abs() < 0.01);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an integrand for the model `{M}` with numbers `{T}`",
     note = "`Quadrature<F, T>` and `LeastSquares<F, T>` are, of a `#[function]` `F` whose arguments have the dimensions of those \

@@ -7,6 +7,7 @@ mod describe;
 mod elimination;
 mod explicit;
 mod reduction;
+mod units;
 
 pub use cost::Cost;
 pub use curvature::{
@@ -14,6 +15,7 @@ pub use curvature::{
 };
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 pub use reduction::Reduction;
+pub use units::Units;
 
 /// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
 pub(crate) fn means(name: &str, variable: &str) -> bool {

@@ -1,7 +1,7 @@
 //! Dual models: `Dae` by the arithmetic of dual numbers at run time.
 
 use super::code::panel_columns;
-use super::domain;
+use super::{domain, units};
 use crate::language::dual::{Argument, Model};
 use crate::language::signature::Role;
 use crate::language::{Form, Variables};
@@ -126,6 +126,7 @@ fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
     let [lk, lv, lj, lh] = [nk, nv, nj, nh].map(Literal::usize_unsuffixed);
     let shape = sizes.shape(krate);
     let domain = domain::write(krate, variables, &model.samplings, |_| true);
+    let units = units::write(krate, &model.units);
     let structure = structure(model, sizes);
     quote! {
         #[automatically_derived]
@@ -135,6 +136,7 @@ fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
             type Factors<B: #krate::__private::Plain> = [B; 0];
             #domain
+            #units
             const STRUCTURE: #krate::__private::Structure = {
                     const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::__private::dual::jacobian_pattern::<
                         #shape,

@@ -2,7 +2,7 @@
 
 use super::code::{self, FUNCTION, dimensions, ty};
 use super::routine::Routine;
-use super::structure;
+use super::{structure, units};
 use crate::language::{Model, Variables};
 use crate::structure::{Derivatives, FunctionAnalysis};
 use proc_macro2::{Literal, TokenStream};
@@ -35,6 +35,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let numbers = [nx, nz, nu, np, nk, nv, nw, nc, residual.len(), jacobian.len(), hessian.len(), nv - 1];
     let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::of_function(analysis));
+    let (units, unit) = (units::write(krate, &model.units), units::of_outputs(&model.units));
     quote! {
         #[automatically_derived]
         impl #krate::__private::Function for #ty {
@@ -43,6 +44,8 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
             type Jacobian<T: #krate::__private::Plain> = [T; #lj];
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
             const STRUCTURE: #krate::__private::FunctionStructure = #structure;
+            #units
+            #unit
 
             #[inline]
             fn value<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {

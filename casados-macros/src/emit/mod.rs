@@ -16,6 +16,7 @@ mod structure;
 mod tests;
 mod text;
 mod together;
+mod units;
 
 use crate::language::{self, Instance, Model, Place};
 use crate::structure::{Analysis, FunctionAnalysis};

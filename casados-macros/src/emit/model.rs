@@ -2,7 +2,7 @@
 
 use super::code::{self, MODEL, dimensions, ty};
 use super::routine::Routine;
-use super::{domain, structure};
+use super::{domain, structure, units};
 use crate::language::{Model, Variables};
 use crate::structure::{Analysis, Derivatives, FunctionAnalysis};
 use proc_macro2::{Literal, TokenStream};
@@ -48,6 +48,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
         }
     });
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
+    let units = units::write(krate, &model.units);
     quote! {
         #[automatically_derived]
         impl #krate::__private::Dae for #ty {
@@ -57,6 +58,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             type Factors<B: #krate::__private::Plain> = [B; #lb];
             const STRUCTURE: #krate::__private::Structure = #structure;
             #domain
+            #units
             #branches
 
             #[inline]

@@ -2,6 +2,7 @@
 
 use super::expand;
 use crate::graph::{Binary, Compare, Graph, Node, Unary};
+use crate::language::units::Units;
 use crate::language::{Instance, Model, Place, Variables};
 use crate::structure::{Analysis, analyse};
 use proc_macro2::{Span, TokenStream};
@@ -19,6 +20,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         documentation: vec![syn::parse_quote!(#[doc = " A model."])],
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
+        units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
         graph,

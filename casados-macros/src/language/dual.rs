@@ -3,6 +3,7 @@
 
 use super::attribute::Arguments;
 use super::signature::{self, Role};
+use super::units::Units;
 use super::{Form, Instance, Place, Sampling, Variables, module};
 use proc_macro2::{Ident, TokenStream};
 use quote::ToTokens;
@@ -36,6 +37,8 @@ pub struct Model {
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
+    /// Their units, as far as the documentation says.
+    pub units: Units,
     /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
     pub samplings: Vec<Sampling>,
     /// The arguments of the function, in its order.
@@ -107,12 +110,14 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
                 &function,
                 &Lengths { instance: &instance, items: &items, known: RefCell::default() },
             )?;
+            let documentation = super::documentation(&attributes);
             Ok(Model {
                 form,
+                units: Units::default().with_documentation(&documentation, &signature.variables),
                 name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&name)),
                 function: function.sig.ident.clone(),
                 visibility: visibility.clone(),
-                documentation: super::documentation(&attributes),
+                documentation,
                 generics: generics(&function, &instance)?,
                 instance,
                 samplings: arguments.samplings(&signature.variables)?,

@@ -5,7 +5,7 @@ use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluator, Flow, error};
 use super::items::Symbol;
 use super::types::Type;
-use super::value::{Definition, Generic, Integer, IntegerType, Struct, Value};
+use super::value::{Definition, Generic, Integer, IntegerType, Struct, Value, Variant};
 use crate::graph::Node;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -259,11 +259,11 @@ impl Evaluator {
     pub fn instantiate(
         &mut self,
         ty: &Type,
-        name: String,
-        leaf: &mut dyn FnMut(&mut Evaluator, String) -> Result<Node>,
+        label: Label,
+        leaf: &mut dyn FnMut(&mut Evaluator, Label) -> Result<Node>,
         at: At,
     ) -> Result<Value> {
-        self.deeper(at, |evaluator| evaluator.instantiate_within(ty, name, leaf, at).map_err(Flow::from))
+        self.deeper(at, |evaluator| evaluator.instantiate_within(ty, label, leaf, at).map_err(Flow::from))
             .map_err(|flow| match flow {
                 Flow::Error(error) => error,
                 _ => error(at, "this type has no end"),
@@ -273,16 +273,16 @@ impl Evaluator {
     fn instantiate_within(
         &mut self,
         ty: &Type,
-        name: String,
-        leaf: &mut dyn FnMut(&mut Evaluator, String) -> Result<Node>,
+        label: Label,
+        leaf: &mut dyn FnMut(&mut Evaluator, Label) -> Result<Node>,
         at: At,
     ) -> Result<Value> {
         match ty {
-            Type::Real => Ok(Value::Real(leaf(self, name)?)),
+            Type::Real => Ok(Value::Real(leaf(self, label)?)),
             Type::Array(element, Some(length)) => {
                 let mut elements = Vec::new();
                 for index in 0..*length {
-                    elements.push(self.instantiate(element, format!("{name}[{index}]"), leaf, at)?);
+                    elements.push(self.instantiate(element, label.part(&format!("[{index}]")), leaf, at)?);
                 }
                 Ok(Value::array(elements))
             }
@@ -290,13 +290,10 @@ impl Evaluator {
                 let mut elements = Vec::new();
                 for column in 0..*columns {
                     for row in 0..*rows {
-                        let name = if *columns == 1 {
-                            format!("{name}[{row}]")
-                        } else {
-                            format!("{name}[({row}, {column})]")
-                        };
+                        let part =
+                            if *columns == 1 { format!("[{row}]") } else { format!("[({row}, {column})]") };
                         self.tick(1, at)?;
-                        elements.push(Value::Real(leaf(self, name)?));
+                        elements.push(Value::Real(leaf(self, label.part(&part))?));
                     }
                 }
                 Ok(Value::matrix(*rows, *columns, elements))
@@ -304,27 +301,54 @@ impl Evaluator {
             Type::Tuple(parts) => {
                 let mut elements = Vec::new();
                 for (index, part) in parts.iter().enumerate() {
-                    elements.push(self.instantiate(part, format!("{name}.{index}"), leaf, at)?);
+                    elements.push(self.instantiate(part, label.part(&format!(".{index}")), leaf, at)?);
                 }
                 Ok(Value::tuple(elements))
             }
             Type::Struct(definition, arguments) if !definition.is_enum => {
                 let types = self.field_types(definition, 0, arguments)?;
                 let mut fields = Vec::new();
-                for ((field, _), ty) in definition.variants[0].fields.iter().zip(&types) {
-                    fields.push(self.instantiate(ty, format!("{name}.{field}"), leaf, at)?);
+                let Variant { fields: declared, units, .. } = &definition.variants[0];
+                for (((field, _), unit), ty) in declared.iter().zip(units).zip(&types) {
+                    let label = label.part(&format!(".{field}")).with_unit(unit);
+                    fields.push(self.instantiate(ty, label, leaf, at)?);
                 }
                 Ok(Value::Struct(Rc::new(Struct { definition: definition.clone(), variant: 0, fields })))
             }
             Type::Unknown | Type::Array(_, None) | Type::Matrix(..) => Err(error(
                 at,
                 format!(
-                    "the type of `{name}` is not visible to the macro: use `f64`, arrays, tuples, nalgebra vectors \
-                     and matrices, or structs that are defined in the same `#[dae] mod`"
+                    "the type of `{}` is not visible to the macro: use `f64`, arrays, tuples, nalgebra vectors \
+                     and matrices, or structs that are defined in the same `#[dae] mod`",
+                    label.name
                 ),
             )),
-            _ => Err(error(at, format!("`{name}` must consist of `f64` values"))),
+            _ => Err(error(at, format!("`{}` must consist of `f64` values", label.name))),
         }
+    }
+}
+
+/// What a number of an argument is called, and its unit.
+#[derive(Clone, Debug)]
+pub struct Label {
+    /// Its name: `x.cart.place[1]`.
+    pub name: String,
+    /// Its unit, if the documentation of a field says it.
+    pub unit: String,
+}
+
+impl Label {
+    /// Of an argument.
+    pub fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), unit: String::new() }
+    }
+    /// Of a part, which has the unit of the whole.
+    fn part(&self, part: &str) -> Self {
+        Self { name: format!("{}{part}", self.name), unit: self.unit.clone() }
+    }
+    /// With the unit of a field, if that has one.
+    fn with_unit(self, unit: &str) -> Self {
+        if unit.is_empty() { self } else { Self { unit: unit.to_owned(), ..self } }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
 use super::modules::{Module, module_of, names_of};
+use super::units;
 use super::value::{Definition, Style, Value, Variant};
 use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
@@ -324,9 +325,10 @@ fn variant(name: String, fields: &syn::Fields, discriminant: Option<syn::Expr>) 
         syn::Fields::Unnamed(_) => Style::Tuple,
         syn::Fields::Unit => Style::Unit,
     };
+    let units = fields.iter().map(|field| units::of_attributes(&field.attrs)).collect();
     let fields = fields.iter().enumerate().map(|(index, field)| {
         let name = field.ident.as_ref().map_or_else(|| index.to_string(), ToString::to_string);
         (name, field.ty.clone())
     });
-    Variant { name, fields: fields.collect(), style, discriminant }
+    Variant { name, fields: fields.collect(), units, style, discriminant }
 }

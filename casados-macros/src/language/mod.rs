@@ -39,6 +39,7 @@ mod statement;
 mod tests;
 pub mod tokens;
 mod types;
+pub mod units;
 mod user;
 mod value;
 
@@ -48,6 +49,7 @@ use model::Template;
 use proc_macro2::{Span, TokenStream};
 pub use reduction::{Rates, Reduction};
 pub use sampling::Sampling;
+use units::Units;
 
 /// Which attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,6 +125,8 @@ pub struct Model {
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
+    /// Their units, as far as the documentation says.
+    pub units: Units,
     /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
     pub samplings: Vec<Sampling>,
     /// How its index is reduced, if the attribute asks for that.

@@ -4,11 +4,13 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
 use super::flatten;
+use super::generics::Label;
 use super::mistakes::Mistakes;
 use super::modules::Module;
 use super::place::Place;
 use super::signature::{self, Argument, Role};
 use super::types::Type;
+use super::units::Units;
 use super::value::{Function, Generic, Integer, IntegerType, Value};
 use super::{Form, Instance, Model, Variables};
 use crate::graph::{Binary, Node};
@@ -48,7 +50,7 @@ impl Template<'_> {
             })
             .collect();
         let scope = Scope::inside(&items, Names::Variables(parameters));
-        let (variables, values) = self.variables(&arguments, &mut evaluator, &scope)?;
+        let (variables, units, values) = self.variables(&arguments, &mut evaluator, &scope)?;
         let function = Value::Function(Rc::new(Function {
             item: Rc::new(self.function.clone()),
             scope: items,
@@ -75,6 +77,7 @@ impl Template<'_> {
             documentation: self.documentation.clone(),
             instance,
             variables,
+            units,
             samplings: Vec::new(),
             reduction: None,
             graph: evaluator.graph,
@@ -93,15 +96,17 @@ impl Template<'_> {
         arguments: &[Argument],
         evaluator: &mut Evaluator,
         scope: &Rc<Scope>,
-    ) -> Result<(Variables, Vec<Value>)> {
-        let (types, names) = types_and_names(arguments, evaluator, scope)?;
+    ) -> Result<(Variables, Units, Vec<Value>)> {
+        let (types, labels) = types_and_labels(arguments, evaluator, scope)?;
+        let names: Vec<Vec<String>> = labels.iter().map(|list| each(list, |label| &label.name)).collect();
         let variables = self.named(arguments, &names)?;
+        let units = units(arguments, &labels).with_documentation(&self.documentation, &variables);
         let mut values = Vec::new();
         for (argument, ty) in arguments.iter().zip(&types) {
             let mut next = offset(&variables, argument.role);
             values.push(evaluator.instantiate(
                 ty,
-                argument.role.name().to_owned(),
+                Label::new(argument.role.name()),
                 &mut |evaluator, _| {
                     let node = evaluator.graph.variable(next);
                     next += 1;
@@ -110,7 +115,7 @@ impl Template<'_> {
                 &argument.ty,
             )?);
         }
-        Ok((variables, values))
+        Ok((variables, units, values))
     }
 
     /// The variables by their names in each argument.
@@ -188,15 +193,30 @@ impl Template<'_> {
     }
 }
 
-/// Types of arguments and names of their numbers: a dry run, since the position of a variable
+fn each(labels: &[Label], text: impl Fn(&Label) -> &String) -> Vec<String> {
+    labels.iter().map(text).cloned().collect()
+}
+
+/// The units that fields of the arguments have.
+fn units(arguments: &[Argument], labels: &[Vec<Label>]) -> Units {
+    let of = |role: Role| {
+        let position = arguments.iter().position(|argument| argument.role == role)?;
+        Some(each(labels.get(position)?, |label| &label.unit))
+    };
+    let all = |role: Role| of(role).unwrap_or_default();
+    let x = of(Role::X).unwrap_or_else(|| all(Role::Xdot));
+    Units { x, z: all(Role::Z), u: all(Role::U), p: all(Role::P), ..Units::default() }
+}
+
+/// Types of arguments and labels of their numbers: a dry run, since the position of a variable
 /// depends on all dimensions.
-fn types_and_names(
+fn types_and_labels(
     arguments: &[Argument],
     evaluator: &mut Evaluator,
     scope: &Rc<Scope>,
-) -> Result<(Vec<Type>, Vec<Vec<String>>)> {
+) -> Result<(Vec<Type>, Vec<Vec<Label>>)> {
     let mut types = Vec::new();
-    let mut names = Vec::new();
+    let mut labels = Vec::new();
     let mut mistakes = Mistakes::default();
     for argument in arguments {
         let ty = match evaluator.resolve(&argument.ty, scope) {
@@ -209,9 +229,9 @@ fn types_and_names(
         let mut list = Vec::new();
         let instance = evaluator.instantiate(
             &ty,
-            argument.role.name().to_owned(),
-            &mut |evaluator, name| {
-                list.push(name);
+            Label::new(argument.role.name()),
+            &mut |evaluator, label| {
+                list.push(label);
                 Ok(evaluator.graph.variable(0))
             },
             &argument.ty,
@@ -220,10 +240,10 @@ fn types_and_names(
             mistakes.note(error);
         }
         types.push(ty);
-        names.push(list);
+        labels.push(list);
     }
     mistakes.none()?;
-    Ok((types, names))
+    Ok((types, labels))
 }
 
 /// So many numbers, in words.

@@ -255,6 +255,8 @@ pub struct Variant {
     pub name: String,
     /// Names (`0`, `1` for tuple structs) and types.
     pub fields: Vec<(String, syn::Type)>,
+    /// The unit of each field that its documentation says, or an empty text.
+    pub units: Vec<String>,
     /// What the constructor looks like.
     pub style: Style,
     /// `= 3` of an enum.

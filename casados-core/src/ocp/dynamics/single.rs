@@ -24,7 +24,14 @@ use core::fmt;
 /// The names that a model gives.
 pub(in crate::ocp) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
-    Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
+    Names {
+        model: structure.name,
+        x: structure.x,
+        z: structure.z,
+        u: structure.u,
+        p: structure.p,
+        units: M::UNITS,
+    }
 }
 
 /// The equations of a model.
@@ -70,6 +77,27 @@ impl<I, Q> WithIntegral<I, Q> {
 }
 
 /// What is an integral cost.
+///
+/// ```
+/// use casados::ocp::{HeapSqp, Horizon, IntegralCost, OcpError, Problem, WithIntegral};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn speed(x: [f64; 2], _u: f64) -> f64 { x[1] }
+///
+/// /// The cost of a second at a constant speed of 2, by any integral.
+/// fn cost<Q: IntegralCost<Cart, f64>>(integral: Q) -> Result<f64, OcpError> {
+///     let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+///     let mut ocp = Problem::new(WithIntegral::new(irk, integral)).on(Horizon::uniform(4, 0.25))?;
+///     ocp.fix_initial_state(&[0.0, 2.0])?.bound("u", .., 0.0, 0.0)?.guess(&[0.0, 2.0], &[0.0])?;
+///     Ok(HeapSqp::new(&ocp)?.solve(&mut ocp)?.objective)
+/// }
+/// assert!((cost(Quadrature::<Speed>::new())? - 2.0).abs() < 1e-6);
+/// assert!((cost(LeastSquares::<Speed>::new(&nalgebra::matrix![1.0]))? - 2.0).abs() < 1e-6);
+/// # Ok::<(), OcpError>(())
+/// ```
 pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
     /// Whether its weights make sense.
     ///

@@ -1,5 +1,7 @@
 //! What the variables of a model are called.
 
+use crate::structure::Units;
+
 /// Names of the variables of a model.
 ///
 /// ```
@@ -30,4 +32,6 @@ pub struct Names {
     pub u: &'static [&'static str],
     /// Parameters.
     pub p: &'static [&'static str],
+    /// Their units, as far as the model says.
+    pub units: Units,
 }

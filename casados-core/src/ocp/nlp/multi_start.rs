@@ -11,6 +11,35 @@ use core::cmp::Ordering;
 
 /// The outcomes of all starts, the best one first; see
 /// [`Ocp::multi_start`](crate::ocp::Ocp::multi_start).
+///
+/// ```
+/// # use casados::ocp::{GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn constant(x: f64) -> f64 { x }
+/// # /// Two minima: 0.23 at −0.97, and −0.23 at 1.03.
+/// # #[function]
+/// # fn valleys(x: f64) -> f64 { (x * x - 1.0) * (x * x - 1.0) - 0.23 * x }
+/// # let mut ocp = Problem::new(Map::<Constant, f64>::new())
+/// #     .terminal_cost(GeneralCost::<Valleys>::new())
+/// #     .on(Horizon::uniform(1, 1.0))?;
+/// # ocp.free_initial_state();
+/// # let starts = [-1.5, -0.8, 1.2];
+/// let found = ocp.multi_start(
+///     starts.len(),
+///     |ocp, start| ocp.guess(&[starts[start]], &[]).map(|_| ()),
+///     |ocp| {
+///         let mut sqp = HeapSqp::new(ocp)?;
+///         Ok(move |ocp: &mut HeapOcp<_>| sqp.solve(ocp))
+///     },
+/// )?;
+/// let best = found.best().ok_or("no start ends at a solution")?;
+/// assert!((best.objective + 0.23).abs() < 0.01);
+/// // Of the other valley both starts know.
+/// assert_eq!(found.ranked.len(), 3);
+/// assert!(found.ranked[1..].iter().all(|start| start.solution.stages().all(|stage| stage.x[0] < 0.0)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct MultiStart<T> {
@@ -19,6 +48,39 @@ pub struct MultiStart<T> {
 }
 
 /// What came of one start.
+///
+/// ```
+/// # use casados::ocp::{GeneralCost, HeapOcp, HeapSqp, Horizon, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn constant(x: f64) -> f64 { x }
+/// # /// Two minima: 0.23 at −0.97, and −0.23 at 1.03.
+/// # #[function]
+/// # fn valleys(x: f64) -> f64 { (x * x - 1.0) * (x * x - 1.0) - 0.23 * x }
+/// # let mut ocp = Problem::new(Map::<Constant, f64>::new())
+/// #     .terminal_cost(GeneralCost::<Valleys>::new())
+/// #     .on(Horizon::uniform(1, 1.0))?;
+/// # ocp.free_initial_state();
+/// # let starts = [-1.5, -0.8, 1.2];
+/// let found = ocp.multi_start(
+///     starts.len(),
+///     |ocp, start| ocp.guess(&[starts[start]], &[]).map(|_| ()),
+///     |ocp| {
+///         let mut sqp = HeapSqp::new(ocp)?;
+///         Ok(move |ocp: &mut HeapOcp<_>| sqp.solve(ocp))
+///     },
+/// )?;
+/// for start in &found.ranked {
+///     match &start.outcome {
+///         Ok(outcome) => println!("start {}: {outcome}", start.start),
+///         Err(error) => println!("start {}: {error}", start.start),
+///     }
+/// }
+/// // Another local solution as the iterate: the second best one.
+/// ocp.iterate_mut().clone_from(&found.ranked[1].solution);
+/// assert!(ocp.stage(0)?.x[0] < 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct StartOutcome<T> {

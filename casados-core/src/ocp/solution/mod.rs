@@ -7,3 +7,6 @@ pub(in crate::ocp) mod outcome;
 pub(in crate::ocp) mod sensitivities;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod trajectory;
+pub(in crate::ocp) mod verdict;
+#[cfg(feature = "alloc")]
+mod violated;

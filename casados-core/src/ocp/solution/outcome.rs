@@ -39,7 +39,8 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Status {
-    /// The conditions of optimality hold.
+    /// The conditions of optimality hold: the iterate is a local solution, of a convex problem a
+    /// global one ([`Outcome::is_convex`]).
     Converged,
     /// The conditions of optimality hold to the acceptable tolerance, and no better point was
     /// found.
@@ -135,6 +136,16 @@ pub struct Outcome {
     pub qp_iterations: usize,
     /// How long all of it took.
     pub times: Times,
+    /// Whether the problem is known to be convex: its dynamics and constraints are linear, its
+    /// costs convex functions of linear ones. Then a solution is a global one; else it is a local
+    /// one, and another guess may lead to a better one
+    /// ([`Ocp::multi_start`](crate::ocp::Ocp::multi_start)).
+    pub is_convex: bool,
+    /// Of a run that ends without a solution, and whose status names no constraint: the hard bound
+    /// that the iterate violates most, and by how much (feature `alloc`). Iterates of
+    /// [`Ipm`](crate::ocp::Ipm) are inside of the bounds of states and controls: there what is left
+    /// is in `residuals.dynamics`.
+    pub violated: Option<(ConstraintName, f64)>,
 }
 
 impl Outcome {
@@ -147,6 +158,8 @@ impl Outcome {
             residuals: Residuals::default(),
             qp_iterations: 0,
             times: Times::default(),
+            is_convex: false,
+            violated: None,
         }
     }
 
@@ -192,6 +205,12 @@ impl Outcome {
 }
 
 impl Status {
+    /// Whether it says itself which constraint is violated.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn names_a_constraint(&self) -> bool {
+        matches!(self, Self::Infeasible { .. } | Self::InfeasibleQp { .. })
+    }
+
     /// What it is.
     fn what(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -217,7 +236,7 @@ impl Status {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
             Self::MaxIterations => {
-                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; a larger \
+                "; `Trajectory::violations` of `Ocp::solution` lists all violated bounds; a larger \
                  `options.max_iterations` or another guess may help, for `Sqp` also another `options.globalisation`, as \
                  `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
             }
@@ -231,7 +250,7 @@ impl Status {
             }
             Self::QpFailed(_) => "; another guess may help",
             Self::NoProgress => {
-                "; `Trajectory::violations` of `Ocp::solution` names the bounds that are violated; another \
+                "; `Trajectory::violations` of `Ocp::solution` lists all violated bounds; another \
                  guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
                  a smaller `options.shortest_step`, and exact Hessians (`Sqp::exact`) where it has others"
             }
@@ -249,12 +268,15 @@ impl fmt::Display for Status {
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { status, iterations, objective, residuals, .. } = self;
-        status.what(f)?;
-        write!(
-            f,
-            " after {iterations} iterations: objective {objective:.8e}, {residuals}{}",
-            status.way_out()
-        )
+        match status {
+            Status::Converged if !self.is_convex => f.write_str("converged to a local solution")?,
+            _ => status.what(f)?,
+        }
+        write!(f, " after {iterations} iterations: objective {objective:.8e}, {residuals}")?;
+        if let Some((constraint, violation)) = &self.violated {
+            write!(f, "; {constraint} is violated most, by {violation:.2e}")?;
+        }
+        f.write_str(status.way_out())
     }
 }
 

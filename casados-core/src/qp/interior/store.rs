@@ -4,6 +4,39 @@ use crate::qp::error::{QpError, QpField};
 
 /// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that
 /// grows when a larger problem comes and never shrinks.
+///
+/// ```
+/// # use casados::qp::*;
+/// # // x₊ = x + u from x₀ = 1, with |u| ≤ 0.4, three intervals of ½ (x² + 0.1 u²).
+/// # let mut dims = [StageDims::new(1, 1, 0); 4];
+/// # dims[3].nu = 0;
+/// # let mut qp = HeapQp::<f64>::new(&dims)?;
+/// # for mut stage in qp.stages_mut() {
+/// #     stage.a_mut().set(0, 0, 1.0);
+/// #     stage.b_mut().set(0, 0, 1.0);
+/// #     stage.q_mut().set(0, 0, 1.0);
+/// #     stage.r_mut().set(0, 0, 0.1);
+/// #     stage.u_bounds_mut().set(0, -0.4, 0.4);
+/// # }
+/// # qp.fix_initial_state(&[1.0])?;
+/// // Two sides of three controls are bounded; nothing is soft, and nothing is an equation.
+/// const DIMS: [StageDims; 4] = {
+///     let mut dims = [StageDims::new(1, 1, 0); 4];
+///     dims[3].nu = 0;
+///     dims
+/// };
+/// const MEMORY: (usize, usize) = InteriorPoint::<f64, (), ()>::memory(&DIMS, 6, 0, 0);
+/// let mut solver = InteriorPoint::in_memory([0.0; MEMORY.0], [0u32; MEMORY.1]);
+/// let mut solution = HeapSolution::new(&dims)?;
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+///
+/// // A slice that is too short is an error.
+/// let (mut short, mut indices) = ([0.0; 3], [0u32; MEMORY.1]);
+/// let mut solver = InteriorPoint::in_memory(&mut short[..], &mut indices[..]);
+/// let found = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
+/// assert!(matches!(found, Err(QpError::Dimension { found: 3, .. })));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 pub trait Store<T>: AsRef<[T]> + AsMut<[T]> {
     /// At least so many elements.
     ///

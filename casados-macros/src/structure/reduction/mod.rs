@@ -157,6 +157,7 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
         documentation: vec![syn::parse_quote!(#[doc = #text])],
         instance: model.instance.clone(),
         variables: model.variables.clone(),
+        units: model.units.clone(),
         samplings: Vec::new(),
         reduction: None,
         graph: model.graph.clone(),

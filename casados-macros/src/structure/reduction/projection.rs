@@ -4,6 +4,7 @@
 //! of `z` and `x̂` that of `u`.
 
 use crate::graph::{Binary, Node, gradient};
+use crate::language::units::Units;
 use crate::language::{Model, Variables};
 use quote::format_ident;
 use std::collections::BTreeMap;
@@ -47,6 +48,7 @@ pub fn of(invariants: &Model) -> Model {
             u: x.iter().map(|name| format!("given {name}")).collect(),
             p: p.clone(),
         },
+        units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
         graph,

@@ -7,6 +7,7 @@ mod reduction;
 
 use super::{Analysis, Facts, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
+use crate::language::units::Units;
 use crate::language::{Model, Sampling, Variables};
 use proc_macro2::Span;
 
@@ -22,6 +23,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         documentation: Vec::new(),
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
+        units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
         spans: vec![Span::call_site(); residual.len()],

@@ -86,6 +86,11 @@ pub trait Constraints<S: Shape, T: Real> {
     /// The function of a row, and which of its outputs it is.
     #[doc(hidden)]
     fn name(row: usize) -> (&'static str, usize);
+    /// The unit of a row, if its function says one.
+    #[doc(hidden)]
+    fn unit(_row: usize) -> &'static str {
+        ""
+    }
 }
 
 impl<S: Shape, T: Real> Constraints<S, T> for () {
@@ -170,6 +175,9 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
             None => A::name(row),
             Some(row) => B::name(row),
         }
+    }
+    fn unit(row: usize) -> &'static str {
+        row.checked_sub(A::ROWS).map_or_else(|| A::unit(row), B::unit)
     }
 }
 
@@ -311,6 +319,9 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
     }
     fn name(row: usize) -> (&'static str, usize) {
         (F::STRUCTURE.name, row)
+    }
+    fn unit(_row: usize) -> &'static str {
+        F::UNIT
     }
 }
 

@@ -298,6 +298,7 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
 impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for ConvexCost<F, C, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
+    const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
     const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {

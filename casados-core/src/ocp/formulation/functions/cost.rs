@@ -48,6 +48,10 @@ pub trait Cost<S: Shape, T: Real> {
     /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is
     /// not asked for.
     const CONVEX: bool;
+    /// Whether it is known to be a convex function of the variables: one of outputs that are
+    /// linear.
+    #[doc(hidden)]
+    const CONVEX_IN_VARIABLES: bool = false;
     /// Whether it depends on algebraic states.
     const ALGEBRAIC: bool;
 
@@ -139,6 +143,7 @@ pub struct At<'a, T> {
 impl<S: Shape, T: Real> Cost<S, T> for () {
     const REFERENCES: usize = 0;
     const CONVEX: bool = true;
+    const CONVEX_IN_VARIABLES: bool = true;
     const ALGEBRAIC: bool = false;
     fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
@@ -170,6 +175,7 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
 impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     const REFERENCES: usize = A::REFERENCES + B::REFERENCES;
     const CONVEX: bool = A::CONVEX && B::CONVEX;
+    const CONVEX_IN_VARIABLES: bool = A::CONVEX_IN_VARIABLES && B::CONVEX_IN_VARIABLES;
     const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
@@ -269,6 +275,7 @@ impl<F: Function, T: Plain> Default for GeneralCost<F, T> {
 impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T> {
     const REFERENCES: usize = 0;
     const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
+    const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
     const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {

@@ -122,6 +122,7 @@ fn weigh<F: Function, T: Real>(
 impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<F, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
+    const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
     const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {

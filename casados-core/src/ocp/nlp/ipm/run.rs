@@ -141,6 +141,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if stuck && state.best_residual <= self.options.acceptable_tolerance {
             outcome.status = Status::Acceptable;
         }
+        ocp.complete(&mut outcome);
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)

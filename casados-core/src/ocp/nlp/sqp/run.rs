@@ -149,6 +149,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !is_last && state.best_residual.is_finite() {
             ocp.iterate.copy_from(&self.best);
         }
+        ocp.complete(&mut outcome);
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)

@@ -27,6 +27,27 @@ use core::fmt;
 /// [`Ocp::covariance`](crate::ocp::Ocp::covariance).
 ///
 /// Parameters that are estimated are states that do not change, or shared controls.
+///
+/// ```
+/// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn constant(x: [f64; 3]) -> [f64; 3] { x }
+/// # /// With a standard deviation of 0.1 each: of two parameters only the product is seen.
+/// # #[function]
+/// # fn seen(x: [f64; 3]) -> [f64; 2] { [10.0 * (x[0] - 1.0), 10.0 * (x[1] * x[2] - 2.0)] }
+/// # let cost = || LeastSquaresCost::<Seen>::diagonal(&[1.0; 2]);
+/// # let mut ocp = Problem::new(Map::<Constant, f64>::new())
+/// #     .stage_cost(cost())
+/// #     .terminal_cost(cost())
+/// #     .on(Horizon::uniform(3, 1.0))?;
+/// # ocp.free_initial_state().guess(&[1.0, 2.0, 1.0], &[])?;
+/// let covariance = ocp.covariance(GaussNewton::default())?;
+/// // The mean of four samples.
+/// let deviation = covariance.standard_deviation("x[0]", 0)?;
+/// assert!((deviation - 0.05).abs() < 1e-12 && !covariance.is_identifiable());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Covariance<T> {
     names: &'static Names,
@@ -44,6 +65,30 @@ pub struct Covariance<T> {
 
 /// A combination of variables that data say nothing of: the estimate may be moved along it, and the
 /// cost stays.
+///
+/// ```
+/// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn constant(x: [f64; 3]) -> [f64; 3] { x }
+/// # /// With a standard deviation of 0.1 each: of two parameters only the product is seen.
+/// # #[function]
+/// # fn seen(x: [f64; 3]) -> [f64; 2] { [10.0 * (x[0] - 1.0), 10.0 * (x[1] * x[2] - 2.0)] }
+/// # let cost = || LeastSquaresCost::<Seen>::diagonal(&[1.0; 2]);
+/// # let mut ocp = Problem::new(Map::<Constant, f64>::new())
+/// #     .stage_cost(cost())
+/// #     .terminal_cost(cost())
+/// #     .on(Horizon::uniform(3, 1.0))?;
+/// # ocp.free_initial_state().guess(&[1.0, 2.0, 1.0], &[])?;
+/// let covariance = ocp.covariance(GaussNewton::default())?;
+/// for direction in covariance.unidentifiable() {
+///     println!("data say nothing of {direction}");
+///     let [(first, _, one), (second, _, half)] = direction.parts[..] else { panic!("two variables") };
+///     assert_eq!([first, second], ["x[1]", "x[2]"]);
+///     assert!((one - 1.0).abs() < 1e-9 && (half + 0.5).abs() < 1e-9);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Unidentifiable<T> {

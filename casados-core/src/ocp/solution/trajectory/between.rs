@@ -60,7 +60,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let count = T::from_whole(points + 1);
         let parts: Vec<T> = (1..=points).map(|part| T::from_whole(part) / count).collect();
         let Some(inside) = self.inside(&parts, values)? else { return Ok(solution) };
-        let Trajectory { model, times, series } = solution;
+        let Trajectory { model, times, time_unit, series } = solution;
         let mut dense = inside.spread(&times, |k, j| {
             let [start, end] = [k, k + 1].map(|node| get(&times, node));
             start + get(&parts, j) * (end - start)
@@ -72,7 +72,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let indices: Vec<Option<usize>> = series.iter().map(own).collect();
         let pairs = series.iter().zip(indices);
         let series = pairs.map(|(series, index)| inside.series(series, index)).collect();
-        Ok(Trajectory { model, times: dense, series })
+        Ok(Trajectory { model, times: dense, time_unit, series })
     }
 
     /// What is inside of the intervals, in these places; nothing of maps.
@@ -117,8 +117,9 @@ impl<T: Real> Inside<T> {
 
     /// A series with points inside, where that is what has this index there.
     fn series(&self, series: &Series<T>, index: Option<usize>) -> Series<T> {
-        let Series { kind, name, first, values, lower, upper, .. } = series;
-        let dense = Series::new(*kind, name.as_str(), first * (self.points + 1), Vec::new());
+        let Series { kind, name, unit, first, values, lower, upper, .. } = series;
+        let dense =
+            Series::new(*kind, name.as_str(), first * (self.points + 1), Vec::new()).with_unit(unit.as_str());
         if *kind == Kind::Terminal {
             return Series { values: values.clone(), lower: lower.clone(), upper: upper.clone(), ..dense };
         }

@@ -22,6 +22,11 @@ pub(super) fn names<C: Constraints<S, T>, S: Shape, T: Real>() -> impl Iterator<
     (0..C::ROWS).map(|row| output::<C, S, T>(row).to_string())
 }
 
+/// The unit of a variable, if one is known.
+fn unit(units: &'static [&'static str], index: usize) -> &'static str {
+    units.get(index).copied().unwrap_or_default()
+}
+
 /// Where bounds and multipliers of one kind are in a stage.
 struct Places<T> {
     bounds: for<'a> fn(&Stage<'a, T>) -> Bounds<'a, T>,
@@ -54,7 +59,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             Places { bounds: |stage| stage.u_bounds(), multipliers: |stage| [stage.u_lower, stage.u_upper] };
         for (i, &name) in known.x.iter().enumerate() {
             let values = self.iterate.stages().map(|stage| get(stage.x, i)).collect();
-            let mut state = self.bounded(Series::new(Kind::State, name, 0, values), i, &states);
+            let state = Series::new(Kind::State, name, 0, values).with_unit(unit(known.units.x, i));
+            let mut state = self.bounded(state, i, &states);
             state.costates =
                 self.iterate.stages().take(intervals).map(|stage| get(stage.dynamics, i)).collect();
             series.push(state);
@@ -63,29 +69,34 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let all = split::<P, T>(self.data.as_mut(), intervals).algebraic;
             for (i, &name) in known.z.iter().enumerate() {
                 let values = (0..intervals).map(|k| get(algebraic::at::<P::Shape, T>(all, k).0, i)).collect();
-                series.push(Series::new(Kind::Algebraic, name, 0, values));
+                let algebraic = Series::new(Kind::Algebraic, name, 0, values);
+                series.push(algebraic.with_unit(unit(known.units.z, i)));
             }
         }
         for (i, &name) in known.u.iter().enumerate() {
             let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, i)).collect();
-            series.push(self.bounded(Series::new(Kind::Control, name, 0, values), i, &controls));
+            let control = Series::new(Kind::Control, name, 0, values).with_unit(unit(known.units.u, i));
+            series.push(self.bounded(control, i, &controls));
         }
         let data = split::<P, T>(self.data.as_mut(), intervals);
         for (i, &name) in known.p.iter().enumerate() {
             let values = (0..=intervals).map(|k| get(data.p, k * P::Shape::NP + i)).collect();
-            series.push(Series::new(Kind::Parameter, name, 0, values));
+            let parameter = Series::new(Kind::Parameter, name, 0, values);
+            series.push(parameter.with_unit(unit(known.units.p, i)));
         }
         for (row, name) in names::<P::Path, _, T>().enumerate() {
-            series.push(self.of_constraint(Kind::Path, name, row, &values));
+            series.push(self.of_constraint(Kind::Path, name, row, &values).with_unit(P::Path::unit(row)));
         }
         for (row, name) in names::<P::Terminal, _, T>().enumerate() {
-            series.push(self.of_constraint(Kind::Terminal, name, row, &values));
+            let terminal = self.of_constraint(Kind::Terminal, name, row, &values);
+            series.push(terminal.with_unit(P::Terminal::unit(row)));
         }
-        Ok(Trajectory { model: known.model.into(), times: self.times().to_vec(), series })
+        let (model, time_unit) = (known.model.into(), known.units.t.into());
+        Ok(Trajectory { model, times: self.times().to_vec(), time_unit, series })
     }
 
     /// Algebraic states of the iterate.
-    pub(super) fn find_algebraic(&mut self) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn find_algebraic(&mut self) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, .. } = self.problem.parts();

@@ -75,6 +75,8 @@ use alloc::vec::Vec;
 pub struct Trajectory<T = f64> {
     model: String,
     times: Vec<T>,
+    /// The unit of the times, or an empty text.
+    time_unit: String,
     series: Vec<Series<T>>,
 }
 
@@ -148,6 +150,10 @@ pub struct Series<T = f64> {
     /// Its name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
     /// several: `Distance`, `Corner[2]`.
     pub name: String,
+    /// Its unit as the doc comments of the model say it
+    /// ([`Units`](crate::structure::Units)), or [`Trajectory::set_unit`] did; empty if nobody did.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub unit: String,
     /// Which time is that of the first value.
     pub first: usize,
     /// The values.
@@ -169,6 +175,7 @@ impl<T: Real> Series<T> {
         Self {
             kind,
             name: name.into(),
+            unit: String::new(),
             first,
             values,
             lower: Vec::new(),
@@ -177,6 +184,11 @@ impl<T: Real> Series<T> {
             upper_multipliers: Vec::new(),
             costates: Vec::new(),
         }
+    }
+
+    /// With a unit.
+    fn with_unit(self, unit: impl Into<String>) -> Self {
+        Self { unit: unit.into(), ..self }
     }
 
     /// Whether a name means it; of `x.cart.position` also `cart.position`.
@@ -222,6 +234,47 @@ impl<T: Real> Trajectory<T> {
     #[must_use]
     pub fn model(&self) -> &str {
         &self.model
+    }
+
+    /// The unit of the times, if it is known.
+    #[must_use]
+    pub fn time_unit(&self) -> &str {
+        &self.time_unit
+    }
+
+    /// Says the unit of all that a name means, or with the name `t` that of the times: pictures
+    /// show it. Units in doc comments of the model are there without this call.
+    ///
+    /// ```
+    /// # use casados::ocp::{Horizon, Problem};
+    /// # use casados::prelude::*;
+    /// # #[ode]
+    /// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// # let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?).on(Horizon::uniform(2, 0.5))?;
+    /// # ocp.fix_initial_state(&[0.0, 1.0])?.guess(&[0.0; 2], &[0.0])?;
+    /// let mut solution = ocp.solution()?;
+    /// solution.set_unit("x[0]", "m")?.set_unit("x[1]", "m/s")?.set_unit("t", "s")?;
+    /// assert_eq!(solution.get("x[1]")?.unit, "m/s");
+    /// assert!(solution.set_unit("y", "m").is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Unknown`]
+    pub fn set_unit(&mut self, name: &str, unit: &str) -> Result<&mut Self, TrajectoryError> {
+        if name == "t" {
+            self.time_unit = unit.into();
+            return Ok(self);
+        }
+        let mut meant = self.series.iter_mut().filter(|series| series.is_meant(name)).peekable();
+        if meant.peek().is_none() {
+            drop(meant);
+            // The error that lists the names.
+            self.get(name)?;
+            return Ok(self);
+        }
+        meant.for_each(|series| series.unit = unit.into());
+        Ok(self)
     }
 
     /// The times of all points.

@@ -11,19 +11,21 @@ use alloc::vec::Vec;
 pub struct Unchecked<T> {
     model: String,
     times: Vec<T>,
+    #[serde(default)]
+    time_unit: String,
     series: Vec<Series<T>>,
 }
 
 impl<T: Real> TryFrom<Unchecked<T>> for Trajectory<T> {
     type Error = TrajectoryError;
     fn try_from(read: Unchecked<T>) -> Result<Self, TrajectoryError> {
-        let Unchecked { model, times, series } = read;
+        let Unchecked { model, times, time_unit, series } = read;
         let increase = times.windows(2).all(|pair| matches!(pair, [a, b] if a <= b));
         if !(increase && times.iter().all(|time| time.is_finite())) {
             return Err(TrajectoryError::Times);
         }
         series.iter().try_for_each(|series| series.check(times.len()))?;
-        Ok(Self { model, times, series })
+        Ok(Self { model, times, time_unit, series })
     }
 }
 

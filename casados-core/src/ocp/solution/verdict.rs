@@ -1,0 +1,37 @@
+//! What an outcome says beyond its status: whether the problem is known to be convex, and of a run
+//! that ends without a solution the bound that its iterate violates most.
+
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::functions::pattern::{Entry, Origin};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::solution::outcome::Outcome;
+use crate::qp::StageDims;
+use crate::scalar::Real;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Completes the outcome of a run.
+    pub(in crate::ocp) fn complete(&mut self, outcome: &mut Outcome) {
+        outcome.is_convex = self.is_convex();
+        #[cfg(feature = "alloc")]
+        if !outcome.is_solved() && !outcome.status.names_a_constraint() {
+            outcome.violated = self.most_violated();
+        }
+    }
+
+    /// Whether dynamics and constraints are known to be linear, and costs to be convex.
+    fn is_convex(&self) -> bool {
+        let is_linear = match P::Dynamics::ORIGIN {
+            Origin::Unknown => false,
+            Origin::Equations(_, hessian) | Origin::Map(_, hessian) => hessian.is_empty(),
+        };
+        let costs = P::StageCost::CONVEX_IN_VARIABLES && P::TerminalCost::CONVEX_IN_VARIABLES;
+        let Problem { path, terminal, .. } = self.problem.parts_ref();
+        let mut curves = false;
+        let mut visit = |entry| curves |= matches!(entry, Entry::Curvature(..));
+        let is_known = path.pattern(&mut visit) && terminal.pattern(&mut visit);
+        is_linear && costs && is_known && !curves
+    }
+}

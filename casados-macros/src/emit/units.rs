@@ -1,0 +1,27 @@
+//! Units of the variables, as the constant `UNITS`, and of outputs, as `UNIT`.
+
+use crate::language::units::Units;
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// Both constants, as far as there is something in them.
+pub fn write(krate: &syn::Path, units: &Units) -> TokenStream {
+    let Units { x, z, u, p, t, .. } = units;
+    let [x, z, u, p] = [x, z, u, p].map(|list| {
+        let list = if list.iter().all(String::is_empty) { &[][..] } else { list };
+        quote!(&[#(#list),*])
+    });
+    let mut all = [&units.x, &units.z, &units.u, &units.p].into_iter().flatten().chain([t]);
+    if all.all(String::is_empty) {
+        return TokenStream::new();
+    }
+    quote! {
+        const UNITS: #krate::__private::Units = #krate::__private::Units { x: #x, z: #z, u: #u, p: #p, t: #t };
+    }
+}
+
+/// Of the outputs of a function, if there is one.
+pub fn of_outputs(units: &Units) -> Option<TokenStream> {
+    let unit = &units.outputs;
+    (!unit.is_empty()).then(|| quote!(const UNIT: &'static str = #unit;))
+}
