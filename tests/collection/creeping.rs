@@ -5,8 +5,7 @@ use super::ocps::line;
 use super::units::fix;
 use super::{Test, solve};
 use casados::ocp::{
-    Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Problem, SecondOrder,
-    WithIntegral,
+    Constraint, Exact, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder, WithIntegral,
 };
 use casados::prelude::*;
 use casados::qp::residuals;
