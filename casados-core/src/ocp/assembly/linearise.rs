@@ -7,11 +7,12 @@ use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::assembly::transfer::Left;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
-use crate::ocp::formulation::functions::point::{Terms, read};
-use crate::ocp::formulation::instance::data::{Node, inputs, split};
+use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::instance::data::{Layout, Node, inputs, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
@@ -37,8 +38,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let mut left = Left { plain: !C::EXACT, adding: false };
-        let sums = self.linearise_intervals(curvature, |k, step, stage, at| {
-            left.transfer::<P, C, T>(step, stage, at);
+        let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
+            left.transfer::<P, C, T>(step, free, stage, at);
             watch(k, step);
         })?;
         let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
@@ -58,44 +59,53 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, [&[T]; 2]),
+        mut to: impl FnMut(usize, &IntervalResult<'_, T>, (Arrays<'_, T>, Free<'_>), [&[T]; 2]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
-        let (intervals, nx, ld) = (self.intervals(), P::Shape::NX, ld_of::<P::Shape, T>());
-        let Self { problem, qp, iterate, data, step_length, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let (layout, nx) = (self.layout(), P::Shape::NX);
+        let ld = ld_of::<P::Shape, T>(layout);
+        let Self { problem, qp, iterate, data, step_length, free, .. } = self;
+        let free = free.view();
+        let data = split::<P, T>(data.as_mut(), layout);
         let (v, multipliers) = iterate.vectors();
         let weights = if C::EXACT { &*data.weights } else { &[] };
-        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, (data.p, free), data.times);
         let nodes = Nodes { step_length: *step_length, ..nodes };
         let mut stages = qp.stages_mut();
         let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
         let Problem { dynamics, .. } = problem.parts();
         curvature.run(dynamics, &nodes, &mut |k, step: &IntervalResult<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
-            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
                 left = add_stages(left, step.stages);
             }
-            to(k, step, stage.arrays(), [part(v, k * ld, ld), part(multipliers, k * pad::<T>(nx), nx)]);
+            to(
+                k,
+                step,
+                (stage.arrays(), free),
+                [part(v, k * ld, ld), part(multipliers, k * pad::<T>(nx), nx)],
+            );
         })?;
         Ok((objective, left))
     }
 
     /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
     pub(in crate::ocp) fn add_arrival(&mut self, at_iterate: bool) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let x0 = self.iterate.stages().next().filter(|_| at_iterate).map_or(&[][..], |first| first.x);
         arrival::add(data.arrival, x0, &mut self.qp);
     }
 
     /// The objective at the iterate, of intervals and `costs` at nodes.
     pub(in crate::ocp) fn keep_sums(&mut self, (objective, stages): Sums<T>, costs: T) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         self.objective = objective + costs + arrival::cost(data.arrival, &self.iterate);
         self.stages = stages;
     }
@@ -107,9 +117,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         plain: bool,
         begin: impl Fn(usize, &mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let Self { problem, qp, iterate, data, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let Self { problem, qp, iterate, data, free, .. } = self;
+        let free = free.view();
+        let data = split::<P, T>(data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
         let (v, _) = iterate.vectors();
         let mut objective = T::ZERO;
@@ -118,15 +129,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
             begin(k, hessian, gradient);
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
-            let mut direct = Terms { gradient, hessian, ld };
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
+            let mut direct = Terms { free, gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
             let from = if plain && is_direct::<P, T>(k == intervals, z) { here } else { &[] };
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
-            let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
+            let mut room =
+                Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] }, free);
             let (terms, slopes, ld_slopes) = if is_extended {
                 let ld = room.terms.ld;
                 (&mut room.terms, &mut *room.columns, ld)
@@ -146,13 +158,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             if k < intervals {
                 objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
-                path.linearise(&point, values, slopes, ld_slopes, k)?;
+                path.linearise(&point, values, slopes, ld_slopes, (k, free))?;
                 if !mu.is_empty() {
                     path.curve(&point, mu, terms);
                 }
             } else {
                 objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
-                terminal.linearise(&point, values, slopes, ld_slopes, k)?;
+                terminal.linearise(&point, values, slopes, ld_slopes, (k, free))?;
                 if !mu.is_empty() {
                     terminal.curve(&point, mu, terms);
                 }
@@ -169,13 +181,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
     /// complete.
     fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, plain: bool) {
-        let intervals = self.intervals();
+        let layout @ Layout { intervals, .. } = self.layout();
         let Self { qp, iterate, data, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let data = split::<P, T>(data.as_mut(), layout);
         let (v, _) = iterate.vectors();
-        let ld = ld_of::<P::Shape, T>();
+        let ld = ld_of::<P::Shape, T>(layout);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             if plain && is_direct::<P, T>(k == intervals, z) {
                 continue;
             }
@@ -226,7 +238,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// objective with penalties of soft bounds; after [`Ocp::linearise`].
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let (mut residuals, penalties) =
             crate::ocp::assembly::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
         if P::Dynamics::LIFTED {
@@ -243,28 +256,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let nx = P::Shape::NX;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let (nx, free) = (P::Shape::NX, self.free.view());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
         let (v, multipliers) = at.vectors();
         let mut objective = arrival::cost(data.arrival, at);
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let (nodes, mut of_stages) = (Nodes { step_length: self.step_length, ..nodes }, [T::ZERO; 2]);
         dynamics.simulate(&nodes, &mut |k, step: &IntervalResult<'_, T>| {
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
                 of_stages = add_stages(of_stages, step.stages);
             }
-            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
             assign(part_mut(ends, k * nx, nx), step.x);
         })?;
         let values = ends.get_mut(intervals * nx..).unwrap_or_default();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in at.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
             if k < intervals {
                 objective = objective + node.factor * stage_cost.value(&point, node.reference, k)?;
                 path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
@@ -290,14 +303,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Constants of the linearised dynamics and constraints such that these are exact at some
     /// point, whose `ends` are given: what a second-order correction solves.
     pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
-        let intervals = self.intervals();
+        let layout @ Layout { intervals, .. } = self.layout();
         let (nx, path) = (P::Shape::NX, P::Path::ROWS);
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let (v, _) = at.vectors();
         let values = ends.get(intervals * nx..).unwrap_or_default();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
             let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
             let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
             for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
                 *offset = x - dot(column, here);
@@ -344,6 +357,6 @@ pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims])
 }
 
 /// The distance of stages in vectors `v`.
-const fn ld_of<S: Shape, T>() -> usize {
-    pad::<T>(inputs::<S>())
+const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
+    pad::<T>(inputs::<S>(layout.free))
 }

@@ -39,8 +39,11 @@ pub trait Adjoints<T: Real>: Dynamics<T> {
 }
 
 /// What a sink is given: an end and the gradients of `πᵀφ`.
-pub(in crate::ocp) fn step<'a, T: Real>(x: &'a [T], [of_x, of_u]: [&'a [T]; 2]) -> IntervalResult<'a, T> {
-    let cost = IntegralTerms { x: of_x, u: of_u, ..IntegralTerms::default() };
+pub(in crate::ocp) fn step<'a, T: Real>(
+    x: &'a [T],
+    [of_x, of_u, of_p]: [&'a [T]; 3],
+) -> IntervalResult<'a, T> {
+    let cost = IntegralTerms { x: of_x, u: of_u, p: of_p, ..IntegralTerms::default() };
     IntervalResult { x, cost, ..IntervalResult::default() }
 }
 
@@ -53,7 +56,7 @@ macro_rules! adjoints {
                 each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
                     integrator.begin(at)?;
                     let result = integrator.adjoint(x, u, at.h, &vector(at.multipliers))?;
-                    let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
+                    let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
                     Ok(step(result.x.as_slice(), gradients))
                 })
             }

@@ -116,7 +116,8 @@ impl<I: Single> Shooting<I> {
             same &= put(&mut self.x, k, vector(interval.x), |x| x.as_slice() == interval.x);
             same &= put(&mut self.u, k, vector(interval.u), |u| u.as_slice() == interval.u);
             if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
-                same &= put(&mut self.p, k, vector(interval.p), |p| p.as_slice() == interval.p);
+                let p: VectorP<I::Model, I::Number> = interval.parameters();
+                same &= put(&mut self.p, k, p, |old| *old == p);
             }
             same &= put(&mut self.h, k, interval.h, |&h| h == interval.h);
             same &= put(&mut self.t, k, interval.t, |&t| t == interval.t);
@@ -217,7 +218,7 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
 impl<I: Single<Number = T> + Inside<T>, T: Real> Adjoints<T> for Shooting<I> {
     fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.each(nodes, [true, false], |own| &mut own.adjoint, &mut |k, result: &Adjoint<I::Model, T>| {
-            let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
+            let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
             sink(k, &step(result.x.as_slice(), gradients));
         })
     }

@@ -88,9 +88,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     pub fn shared(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
-        let mut found = false;
+        let (mut found, free) = (false, self.free.count());
         for (j, _) in known.u.iter().enumerate().filter(|(_, control)| means(name, control)) {
-            found |= self.qp.share(j);
+            found |= self.qp.share(free + j);
         }
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }

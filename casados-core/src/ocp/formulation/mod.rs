@@ -5,6 +5,7 @@
 //! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
 //! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
 //! | `instance/` | a problem on a horizon, with memory |
+//! | `free` | parameters and end times that are found |
 //! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | refusals by name |
 //! | `print` | a problem as mathematics |
@@ -14,6 +15,7 @@ pub(in crate::ocp) mod bounds;
 pub(in crate::ocp) mod check;
 pub(in crate::ocp) mod coupling;
 pub(in crate::ocp) mod error;
+pub(in crate::ocp) mod free;
 pub(in crate::ocp) mod functions;
 pub(in crate::ocp) mod horizon;
 pub(in crate::ocp) mod instance;

@@ -85,12 +85,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let name = names.x.get(i).copied().unwrap_or_default();
             writeln!(f, "         {name} at stage 0 = {name} at stage {intervals}")?;
         }
-        for j in marked(view.shared()) {
+        for j in marked(view.shared()).filter_map(|j| j.checked_sub(self.free.count())) {
             let name = names.u.get(j).copied().unwrap_or_default();
             writeln!(f, "         {name} the same at all stages")?;
         }
-        let [nx, nu] = [P::Shape::NX, P::Shape::NU];
-        let (variables, dynamics) = (intervals * (nx + nu) + nx, intervals * nx);
+        let [nx, nu, free] = [P::Shape::NX, P::Shape::NU, self.free.count()];
+        let (variables, dynamics) = (intervals * (nx + nu) + nx + free, intervals * nx);
         write!(f, "  size   {variables} variables, {dynamics} equations of dynamics")?;
         if count.equations > 0 {
             write!(f, ", {} other ones", count.equations)?;
@@ -134,11 +134,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             write!(f, "{separator}{} {kind}{plural} ", names.len())?;
             list(f, names)?;
         }
+        let free = self.free.count();
+        if free > 0 {
+            let plural = if free == 1 { "" } else { "s" };
+            write!(f, "; {free} free parameter{plural} ")?;
+            for w in 0..free {
+                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.name_of_free(w))?;
+            }
+        }
         writeln!(f)
     }
 
     fn bounds(&self, f: &mut Formatter<'_>, names: &Names, count: &mut Count) -> fmt::Result {
-        let (intervals, view) = (self.intervals(), self.qp.view());
+        let (intervals, view, free) = (self.intervals(), self.qp.view(), self.free.count());
         for (i, name) in names.x.iter().enumerate() {
             runs(f, name, 0..intervals + 1, count, |k| {
                 view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.x_bounds(), i))
@@ -146,11 +154,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         for (j, name) in names.u.iter().enumerate() {
             runs(f, name, 0..intervals, count, |k| {
-                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), j))
+                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), free + j))
             })?;
         }
+        for w in 0..free {
+            let sides = view.stage(0).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), w));
+            sides.count(count);
+            if sides.has() != [false; 2] {
+                f.write_str("         ")?;
+                sides.write(f, &self.name_of_free(w))?;
+                sides.write_penalties(f)?;
+                writeln!(f)?;
+            }
+        }
         // Bounds in the QP are those of what is linear.
-        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), intervals);
+        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), self.layout());
         let constraint = |k: usize, row: usize| {
             let place = k * P::Path::ROWS + row;
             let [lower, upper] = [lower, upper].map(|bounds| get(bounds, place).to_f64());

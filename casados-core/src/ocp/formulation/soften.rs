@@ -154,7 +154,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let labels = Labels::constraints::<P, T>(part, range.start);
         labels.check_penalty(row.unwrap_or(0), linear, quadratic)?;
-        let data = split::<P, T>(self.data.as_mut(), last);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let rows = |k: usize| {
             let count = if k == last { P::Terminal::ROWS } else { P::Path::ROWS };
             (0..count).filter(move |&row| match k == last {

@@ -3,9 +3,10 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::pattern::{self, Entries};
 use crate::ocp::formulation::functions::point::{
-    Cross, Terms, There, finite_outputs, is_algebraic, parameter, position,
+    Cross, Terms, There, finite_outputs, is_algebraic, parameter,
 };
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
@@ -63,7 +64,8 @@ pub trait Constraints<S: Shape, T: Real> {
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
     fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], stage: usize) -> Result<(), OcpError>;
-    /// The values, and their derivatives: a column for each, `ld` apart.
+    /// The values, and their derivatives: a column for each, `ld` apart. `place` is the stage and
+    /// where variables are.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -74,7 +76,7 @@ pub trait Constraints<S: Shape, T: Real> {
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        place: (usize, Free<'_>),
     ) -> Result<(), OcpError>;
     /// Adds the Hessian of `μᵀg`.
     #[doc(hidden)]
@@ -104,7 +106,7 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         _: &mut [T],
         _: &mut [T],
         _: usize,
-        _: usize,
+        _: (usize, Free<'_>),
     ) -> Result<(), OcpError> {
         Ok(())
     }
@@ -147,12 +149,12 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        place: (usize, Free<'_>),
     ) -> Result<(), OcpError> {
         let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
         let (mine, others) = columns.split_at_mut_checked(A::ROWS * ld).unwrap_or_default();
-        self.0.linearise(v, first, mine, ld, stage)?;
-        self.1.linearise(v, second, others, ld, stage)
+        self.0.linearise(v, first, mine, ld, place)?;
+        self.1.linearise(v, second, others, ld, place)
     }
     fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>) {
         let (first, second) = mu.split_at_checked(A::ROWS).unwrap_or_default();
@@ -278,7 +280,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        (stage, free): (usize, Free<'_>),
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
         finite_outputs::<F, T>(&self.g, stage)?;
@@ -287,7 +289,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         }
         for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
             let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
-            let Some(position) = position::<F::Shape>(variable) else { continue };
+            let Some(position) = free.position::<F::Shape>(variable) else { continue };
             if let Some(element) = columns.get_mut(row * ld + position) {
                 *element = value;
             }

@@ -7,7 +7,7 @@ use crate::ocp::formulation::horizon::Horizon;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data;
+use crate::ocp::formulation::instance::data::{self, Layout};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Qp, Solution, StageDims};
 #[cfg(feature = "alloc")]
@@ -35,11 +35,11 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let intervals = horizon.intervals();
         let mut dims = Vec::new();
         room(&mut dims, intervals.saturating_add(1))?;
-        dims.resize(intervals, data::stage::<Self, T>(false));
-        dims.push(data::stage::<Self, T>(true));
+        dims.resize(intervals, data::stage::<Self, T>(0, false));
+        dims.push(data::stage::<Self, T>(0, true));
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
-        let length = data::length::<Self, T>(intervals);
+        let length = data::length::<Self, T>(Layout { intervals, free: 0 });
         Ocp::build(self, horizon, qp, iterate, zeros(length)?)
     }
 
@@ -49,9 +49,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        let mut dims = [data::stage::<Self, T>(false); STAGES];
+        let mut dims = [data::stage::<Self, T>(0, false); STAGES];
         if let Some(last) = dims.last_mut() {
-            *last = data::stage::<Self, T>(true);
+            *last = data::stage::<Self, T>(0, true);
         }
         dims
     }
@@ -62,9 +62,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        Qp::<T, (), ()>::memory(dims)
-            .saturating_add(Solution::<T, (), ()>::memory(dims))
-            .saturating_add(data::length::<Self, T>(dims.len().saturating_sub(1)))
+        Qp::<T, (), ()>::memory(dims).saturating_add(Solution::<T, (), ()>::memory(dims)).saturating_add(
+            data::length::<Self, T>(Layout { intervals: dims.len().saturating_sub(1), free: 0 }),
+        )
     }
 
     /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
@@ -94,7 +94,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
             return Err(OcpError::Length { part, stage: 0, expected, found: dims.len() });
         }
         for (stage, &dims) in dims.iter().enumerate() {
-            let given = data::stage::<Self, T>(stage == intervals);
+            let given = data::stage::<Self, T>(0, stage == intervals);
             for (expected, found) in [(given.nx, dims.nx), (given.nu, dims.nu), (given.ng, dims.ng)] {
                 if expected != found {
                     return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });

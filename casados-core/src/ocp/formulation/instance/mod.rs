@@ -5,13 +5,14 @@ mod memory;
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::free::{Free, FreeParameters};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::horizon::Horizon;
-use crate::ocp::formulation::instance::data::{Data, split};
+use crate::ocp::formulation::instance::data::{Data, Layout, inputs, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
@@ -83,6 +84,7 @@ pub struct Ocp<P, T, D, M> {
     /// What was left of the equations of stages where intervals were evaluated last: the sum, and
     /// the largest.
     pub(in crate::ocp) stages: [T; 2],
+    pub(in crate::ocp) free: FreeParameters,
     /// See [`Nodes`].
     pub(in crate::ocp) step_length: Option<T>,
     /// Whether algebraic states of the last evaluation are those of the iterate.
@@ -143,7 +145,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         terminal_cost.check(at_end)?;
         path.check(inside)?;
         terminal.check(at_end)?;
-        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
+        let Data { times, p, lower, upper, references, .. } =
+            split::<P, T>(data.as_mut(), Layout { intervals, free: 0 });
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.
         p.fill(T::from_f64(f64::NAN));
@@ -174,6 +177,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             data,
             objective: T::ZERO,
             stages: [T::ZERO; 2],
+            free: FreeParameters::default(),
             step_length: None,
             has_algebraic: false,
         })
@@ -203,6 +207,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[must_use]
     pub fn intervals(&self) -> usize {
         self.qp.dims().len().saturating_sub(1)
+    }
+
+    /// How large it is.
+    #[inline(always)]
+    pub(crate) fn layout(&self) -> Layout {
+        Layout { intervals: self.intervals(), free: self.free.count() }
     }
 
     /// The functions of the problem: weights of costs and options of integrators may be changed
@@ -239,7 +249,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::NoSuchStage`]
     pub fn stage(&self, stage: usize) -> Result<SolutionStage<'_, T>, OcpError> {
         let stages = self.intervals() + 1;
-        self.iterate.stage(stage).ok_or(OcpError::NoSuchStage { part: Part::States, stage, stages })
+        match self.iterate.stage(stage) {
+            Some(point) => Ok(without_free(point, self.free.count())),
+            None => Err(OcpError::NoSuchStage { part: Part::States, stage, stages }),
+        }
     }
 
     /// A state and a control as the iterate at every stage, and no multipliers: a start that is
@@ -262,14 +275,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess_stage(&mut self, stage: usize, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
-        let last = self.intervals();
+        let (last, free) = (self.intervals(), self.free.count());
         let Some(place) = self.iterate.stage_mut(stage) else {
             return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
         };
+        let own = place.u.get_mut(free..).unwrap_or_default();
         Labels::states::<P, T>(Part::States, stage).check_vector(x, place.x.len())?;
-        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, place.u.len())?;
+        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, own.len())?;
         assign(place.x, x);
-        assign(place.u, u);
+        assign(own, u);
         for multipliers in [
             place.dynamics,
             place.x_lower,
@@ -333,12 +347,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (last, part) = (self.intervals(), Part::Multipliers);
         for (stage, point) in self.iterate.stages().enumerate() {
             Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
-            Labels::controls::<P, T>(Part::Controls, stage).check_finite(point.u)?;
+            for (part, values) in [(Part::Controls, point.u), (part, point.u_lower), (part, point.u_upper)] {
+                let (w, u) = values.split_at_checked(self.free.count()).unwrap_or_default();
+                Labels::controls::<P, T>(part, stage).check_finite(u)?;
+                self.check_free(part, w)?;
+            }
             for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
                 Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
-            }
-            for multipliers in [point.u_lower, point.u_upper] {
-                Labels::controls::<P, T>(part, stage).check_finite(multipliers)?;
             }
             let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
             let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
@@ -349,6 +364,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
+    /// Free parameters, or their multipliers, by name.
+    fn check_free(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
+        let Some((index, value)) = crate::finite::not_finite(w) else { return Ok(()) };
+        let part = if part == Part::Controls { Part::Parameters } else { part };
+        Err(OcpError::InvalidValue { part, stage: 0, name: self.name_of_free(index), index, value })
+    }
+
+    /// What a free parameter is called.
+    pub(in crate::ocp) fn name_of_free(&self, index: usize) -> &'static str {
+        let parameter = self.free.parameter(index);
+        parameter.and_then(|parameter| self.names().p.get(parameter).copied()).unwrap_or("")
+    }
+
     /// Everything of the iterate one interval earlier, as the start of the problem of the next
     /// sampling instant.
     pub fn shift(&mut self) {
@@ -356,15 +384,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
+/// A stage with the controls of the model alone.
+pub(in crate::ocp) fn without_free<T>(stage: SolutionStage<'_, T>, free: usize) -> SolutionStage<'_, T> {
+    let [u, u_lower, u_upper] =
+        [stage.u, stage.u_lower, stage.u_upper].map(|list| list.get(free..).unwrap_or_default());
+    SolutionStage { u, u_lower, u_upper, ..stage }
+}
+
 /// The intervals at a point; weights of algebraic states may be empty.
 pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
     v: &'a [T],
     multipliers: &'a [T],
     weights: &'a [T],
-    p: &'a [T],
+    (p, free): (&'a [T], Free<'a>),
     times: &'a [T],
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
-    let ld = [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)];
-    Nodes { v, multipliers, weights, p, times, dims, ld, step_length: None }
+    let ld = [pad::<T>(inputs::<S>(free.count())), pad::<T>(S::NX)];
+    Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None }
 }

@@ -114,9 +114,9 @@ impl<S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C,
 
     /// Writes the Hessians of the history to the QP that was written at the iterate.
     pub(super) fn take_hessians<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, take: Take) {
-        let intervals = ocp.intervals();
+        let layout = ocp.layout();
         let Ocp { qp, iterate, data, .. } = ocp;
-        let scratch = split::<P, T>(data.as_mut(), intervals).scratch;
+        let scratch = split::<P, T>(data.as_mut(), layout).scratch;
         let (all, _) = iterate.vectors();
         let mut rest = self.history.as_mut();
         let mut begin = 0;

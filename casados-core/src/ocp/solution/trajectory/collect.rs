@@ -60,20 +60,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             series.push(state);
         }
         if P::Dynamics::ALGEBRAIC {
-            let all = split::<P, T>(self.data.as_mut(), intervals).algebraic;
+            let layout = self.layout();
+            let all = split::<P, T>(self.data.as_mut(), layout).algebraic;
             for (i, &name) in known.z.iter().enumerate() {
-                let values = (0..intervals).map(|k| get(algebraic::at::<P::Shape, T>(all, k).0, i)).collect();
+                let at = |k| get(algebraic::at::<P::Shape, T>(all, layout, k).0, i);
+                let values = (0..intervals).map(at).collect();
                 series.push(Series::new(Kind::Algebraic, name, 0, values));
             }
         }
+        let free = self.free.count();
         for (i, &name) in known.u.iter().enumerate() {
-            let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, i)).collect();
-            series.push(self.bounded(Series::new(Kind::Control, name, 0, values), i, &controls));
+            let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, free + i)).collect();
+            series.push(self.bounded(Series::new(Kind::Control, name, 0, values), free + i, &controls));
         }
-        let data = split::<P, T>(self.data.as_mut(), intervals);
         for (i, &name) in known.p.iter().enumerate() {
-            let values = (0..=intervals).map(|k| get(data.p, k * P::Shape::NP + i)).collect();
-            series.push(Series::new(Kind::Parameter, name, 0, values));
+            series.push(match self.free.view().of(i) {
+                Some(w) => self.of_free(name, w, &controls),
+                None => {
+                    let p = self.data.as_ref().get(intervals + 1..).unwrap_or_default();
+                    let values = (0..=intervals).map(|k| get(p, k * P::Shape::NP + i)).collect();
+                    Series::new(Kind::Parameter, name, 0, values)
+                }
+            });
         }
         for (row, name) in names::<P::Path, _, T>().enumerate() {
             series.push(self.of_constraint(Kind::Path, name, row, &values));
@@ -86,12 +94,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Algebraic states of the iterate.
     pub(super) fn find_algebraic(&mut self) -> Result<(), OcpError> {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let (layout, free) = (self.layout(), self.free.view());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        dynamics.simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, k, step))
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
+        dynamics
+            .simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step))
+    }
+
+    /// A free parameter, with its bounds and multipliers at every node: it is one variable.
+    fn of_free(&self, name: &'static str, w: usize, places: &Places<T>) -> Series<T> {
+        let nodes = self.intervals() + 1;
+        let value = self.iterate.stages().next().map_or(T::ZERO, |stage| get(stage.u, w));
+        let one = self.bounded(Series::new(Kind::Parameter, name, 0, vec![value]), w, places);
+        let Series { lower, upper, lower_multipliers, upper_multipliers, .. } = one;
+        let mut series = Series::new(Kind::Parameter, name, 0, vec![value; nodes]);
+        let repeat = |list: Vec<Option<T>>| list.into_iter().cycle().take(nodes).collect();
+        (series.lower, series.upper) = (repeat(lower), repeat(upper));
+        let repeat = |list: Vec<T>| list.into_iter().cycle().take(nodes).collect();
+        (series.lower_multipliers, series.upper_multipliers) =
+            (repeat(lower_multipliers), repeat(upper_multipliers));
+        series
     }
 
     /// With the bounds and multipliers of states or controls.
@@ -113,7 +137,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn of_constraint(&mut self, kind: Kind, name: String, row: usize, values: &[T]) -> Series<T> {
         let intervals = self.intervals();
         let stages = if kind == Kind::Path { 0..intervals } else { intervals..intervals + 1 };
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let all = |list: &[T]| stages.clone().map(|k| get(list, k * P::Path::ROWS + row)).collect::<Vec<_>>();
         let finite = |bound: T| bound.is_finite().then_some(bound);
         let mut series = Series::new(kind, name, stages.start, all(values));

@@ -54,7 +54,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 };
                 let costates = if kind == Kind::State { intervals } else { 0 };
                 has(series, [count, count, count, costates])?;
+                let index = if kind == Kind::Control { self.free.count() + index } else { index };
                 found.push((index, first, series, places));
+            }
+        }
+        let mut free = Vec::new();
+        for (parameter, &name) in known.p.iter().enumerate() {
+            if let Some(w) = self.free.view().of(parameter) {
+                let series = trajectory.of(name, Kind::Parameter)?;
+                has(
+                    series,
+                    [intervals + 1, series.lower_multipliers.len(), series.upper_multipliers.len(), 0],
+                )?;
+                free.push((w, series));
+            }
+        }
+        for (w, series) in free {
+            self.write_free(w, get(&series.values, 0));
+            if let Some(first) = self.iterate.stage_mut(0) {
+                set(first.u_lower, w, get(&series.lower_multipliers, 0));
+                set(first.u_upper, w, get(&series.upper_multipliers, 0));
             }
         }
         for (index, first, series, places) in found {
@@ -77,7 +96,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Makes a trajectory the guess, with states between its points on straight lines and the
-    /// controls that hold there, and no multipliers: horizons may differ, as those of a coarse and
+    /// controls that hold there, free parameters where it has them, and no multipliers: horizons
+    /// may differ, as those of a coarse and
     /// a fine grid. Before its first time and after its last one the nearest values are taken.
     ///
     /// # Errors
@@ -128,6 +148,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             self.guess_stage(k, &x, &u)?;
         }
+        for (parameter, &name) in known.p.iter().enumerate() {
+            if let Some(w) = self.free.view().of(parameter)
+                && let Ok(series) = trajectory.of(name, Kind::Parameter)
+            {
+                self.write_free(w, get(&series.values, 0));
+            }
+        }
+        self.check_iterate()?;
         Ok(self)
     }
 }
