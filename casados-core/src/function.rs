@@ -181,6 +181,8 @@ pub trait Function: 'static {
     type Hessian<T: Plain>: Array<T>;
     /// What is known about the function before it runs.
     const STRUCTURE: FunctionStructure;
+    /// Whether it depends on the time that integrators have.
+    const IS_TIMED: bool = false;
 
     /// The value `y(v)`.
     fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);

@@ -404,6 +404,9 @@ pub trait Dae: 'static {
     /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
     /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
+    /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`. A
+    /// unit of time of an integrator takes that many units of time of the model.
+    const DURATION: Option<usize> = None;
     /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 

@@ -20,6 +20,7 @@ mod coupling;
 mod curvature;
 mod deadlines;
 mod estimation;
+mod free_end;
 mod free_parameters;
 mod guesses;
 mod ipm;

@@ -35,6 +35,12 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let numbers = [nx, nz, nu, np, nk, nv, nw, nc, residual.len(), jacobian.len(), hessian.len(), nv - 1];
     let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::of_function(analysis));
+    let is_timed = !analysis.time.is_empty() && model.duration.is_none();
+    let timed = is_timed.then(|| {
+        quote!(
+            const IS_TIMED: bool = true;
+        )
+    });
     quote! {
         #[automatically_derived]
         impl #krate::__private::Function for #ty {
@@ -43,6 +49,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
             type Jacobian<T: #krate::__private::Plain> = [T; #lj];
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
             const STRUCTURE: #krate::__private::FunctionStructure = #structure;
+            #timed
 
             #[inline]
             fn value<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {

@@ -21,6 +21,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph,
         spans: vec![Span::call_site(); residual.len()],
         residual,

@@ -77,6 +77,7 @@ impl Template<'_> {
             variables,
             samplings: Vec::new(),
             reduction: None,
+            duration: None,
             graph: evaluator.graph,
             residual,
             spans,

@@ -182,7 +182,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (z, _) = at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &stage, z, free);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
-            let place = At { stage: k, factor: node.factor, exact: false, from: &[] };
+            let factor = if *running { free.duration(stage.u) * node.factor } else { node.factor };
+            let place = At { stage: k, factor, exact: false, from: &[] };
             stage_cost.add(&point, node.reference, place, &mut terms)?;
             path.linearise(&point, &mut [], columns, terms.ld, (k, free))?;
             for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {

@@ -37,7 +37,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         watch: Sink<'_, T>,
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
-        let mut left = Left { plain: !C::EXACT, adding: false };
+        let is_free_cost = self.free.view().end().is_some() && self.problem.parts().running;
+        let mut left = Left { plain: !C::EXACT && !is_free_cost, adding: false };
         let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
             left.transfer::<P, C, T>(step, free, stage, at);
             watch(k, step);
@@ -150,14 +151,27 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let values = lower.get_mut(ld..).unwrap_or_default();
             let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
-            let place = At { stage: k, factor: node.factor, exact: C::EXACT, from };
+            // Of a running cost the end time is a factor.
+            let w = free.end().filter(|_| *running && k < intervals);
+            let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
+            let factor = duration * node.factor;
+            let place = At { stage: k, factor, exact: C::EXACT, from };
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
             let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
                 *mu = upper - lower;
             }
             if k < intervals {
-                objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
+                let cost = if let Some(w) = w {
+                    let before = part_mut(data.scratch, 0, terms.gradient.len());
+                    assign(before, terms.gradient);
+                    let cost = stage_cost.add(&point, node.reference, place, terms)?;
+                    terms.add_duration(w + P::Shape::NX, [cost, duration], before, C::EXACT);
+                    cost
+                } else {
+                    stage_cost.add(&point, node.reference, place, terms)?
+                };
+                objective = objective + cost;
                 path.linearise(&point, values, slopes, ld_slopes, (k, free))?;
                 if !mu.is_empty() {
                     path.curve(&point, mu, terms);
@@ -279,7 +293,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &at, z, free);
             if k < intervals {
-                objective = objective + node.factor * stage_cost.value(&point, node.reference, k)?;
+                let factor = if *running { free.duration(at.u) * node.factor } else { node.factor };
+                objective = objective + factor * stage_cost.value(&point, node.reference, k)?;
                 path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
             } else {
                 objective = objective + terminal_cost.value(&point, node.reference, k)?;

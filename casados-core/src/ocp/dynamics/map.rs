@@ -139,7 +139,14 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
     type Shape = F::Shape;
     const NAMES: Names = {
         let structure = &F::STRUCTURE;
-        Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
+        Names {
+            model: structure.name,
+            x: structure.x,
+            z: structure.z,
+            u: structure.u,
+            p: structure.p,
+            duration: None,
+        }
     };
     const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 

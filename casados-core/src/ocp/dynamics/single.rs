@@ -24,7 +24,14 @@ use core::fmt;
 /// The names that a model gives.
 pub(in crate::ocp) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
-    Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
+    Names {
+        model: structure.name,
+        x: structure.x,
+        z: structure.z,
+        u: structure.u,
+        p: structure.p,
+        duration: M::DURATION,
+    }
 }
 
 /// The equations of a model.
@@ -184,6 +191,7 @@ macro_rules! single {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
             const ALGEBRAIC: bool = true;
+            const INTEGRAL: bool = true;
 
             fn check(&self) -> Result<(), OcpError> {
                 self.integral.check()

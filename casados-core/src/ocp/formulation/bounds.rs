@@ -198,7 +198,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self
     }
 
-    /// The times of the nodes.
+    /// The times of the nodes; where the end of the horizon is free, as parts of the whole.
     #[must_use]
     pub fn times(&self) -> &[T] {
         crate::qp::part(self.data.as_ref(), 0, self.intervals() + 1)

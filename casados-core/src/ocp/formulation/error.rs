@@ -374,6 +374,22 @@ pub enum OcpError {
     Coupled,
     /// Parameters are free: derivatives of solutions by the others are not known there.
     FreeParameters,
+    /// The end of the horizon is free, and no parameter of the model is its duration.
+    FixedEndTime {
+        /// The model.
+        model: &'static str,
+    },
+    /// The end of the horizon is free where it cannot be: in memory of its owner, and of integral
+    /// costs (`WithIntegral`).
+    NoFreeEndTime {
+        /// Where.
+        place: &'static str,
+    },
+    /// The end of the horizon is free, and a function depends on the time of the integrator.
+    DependsOnTime {
+        /// The function.
+        function: &'static str,
+    },
     /// The model has no parameter of this name.
     UnknownParameter {
         /// The name.

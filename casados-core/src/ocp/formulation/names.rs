@@ -30,4 +30,6 @@ pub struct Names {
     pub u: &'static [&'static str],
     /// Parameters.
     pub p: &'static [&'static str],
+    /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`.
+    pub duration: Option<usize>,
 }

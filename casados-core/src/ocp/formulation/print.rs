@@ -61,7 +61,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (names, intervals, times) = (self.names(), self.intervals(), self.times());
         let [start, end] = [0, intervals].map(|node| get(times, node).to_f64());
         let plural = if intervals == 1 { "" } else { "s" };
-        writeln!(f, "{}: {intervals} interval{plural}, t from {start} to {end}", names.model)?;
+        write!(f, "{}: {intervals} interval{plural}, t from {start} to ", names.model)?;
+        match self.free.view().end() {
+            Some(w) => writeln!(f, "{}, which is free", self.name_of_free(w))?,
+            None => writeln!(f, "{end}")?,
+        }
         self.objective(f)?;
         self.variables(f, &names)?;
         let arguments = [("x", names.x.len()), ("u", names.u.len()), ("p", names.p.len())];

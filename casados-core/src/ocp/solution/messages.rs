@@ -195,6 +195,17 @@ impl fmt::Display for OcpError {
                 "derivatives of solutions are not known where parameters are free: set these with \
                  `set_parameters`, or make them states",
             ),
+            Self::FixedEndTime { model } => write!(
+                f,
+                "the end time is free, and no parameter of `{model}` is a duration: say which one, as in \
+                 `#[ode(duration = p.duration)]`"
+            ),
+            Self::NoFreeEndTime { place } => write!(f, "the end time cannot be free {place}"),
+            Self::DependsOnTime { function } => write!(
+                f,
+                "the end time is free, and `{function}` depends on the time: say which parameter is the duration, \
+                 as in `#[function(duration = p.duration)]`"
+            ),
             Self::UnknownParameter { name, known } => {
                 write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;
                 list(f, known.p)

@@ -159,6 +159,7 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
         variables: model.variables.clone(),
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph: model.graph.clone(),
         residual: outputs,
         spans,

@@ -49,6 +49,7 @@ pub fn of(invariants: &Model) -> Model {
         },
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph,
         residual,
         spans: Vec::new(),

@@ -24,6 +24,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         spans: vec![Span::call_site(); residual.len()],
         graph,
         residual,

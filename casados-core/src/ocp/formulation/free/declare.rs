@@ -3,6 +3,7 @@
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::horizon::{Horizon, limits};
 use crate::ocp::formulation::instance::data::{self, Layout, split};
 use crate::ocp::formulation::instance::{HeapOcp, Ocp};
 use crate::ocp::formulation::problem::Formulation;
@@ -13,7 +14,7 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use crate::structure::means;
 use alloc::vec::Vec;
-use core::ops::{Bound, RangeBounds};
+use core::ops::RangeBounds;
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Frees a parameter of the model, or all that a name means: it is found together with states
@@ -82,6 +83,25 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         Ok(self)
     }
 
+    /// Frees the end of a horizon that has a free one.
+    ///
+    /// # Errors
+    /// [`OcpError::FixedEndTime`], [`OcpError::Times`]; those of [`HeapOcp::free`]
+    pub(in crate::ocp) fn free_end(&mut self, horizon: &Horizon<'_, T>) -> Result<(), OcpError> {
+        let Horizon::Free { range: [lower, upper], guess, .. } = *horizon else { return Ok(()) };
+        let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
+        let Some((duration, name)) = known.duration.and_then(|d| Some((d, known.p.get(d)?))) else {
+            return Err(OcpError::FixedEndTime { model: known.model });
+        };
+        let positive = lower > T::ZERO;
+        if !positive {
+            return Err(OcpError::Times { interval: 0, start: 0.0, end: lower.to_f64() });
+        }
+        self.free(name, lower..=upper, guess)?;
+        self.free.set_end(duration);
+        self.check_functions()
+    }
+
     /// Makes room for one more; which one it is.
     fn add_free(&mut self, parameter: usize) -> Result<usize, OcpError> {
         let mut free = self.free.clone();
@@ -144,16 +164,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
     }
-}
-
-/// The sides of a range.
-fn limits<T: Real>(range: &impl RangeBounds<T>) -> [T; 2] {
-    let infinity = T::from_f64(f64::INFINITY);
-    let side = |bound: Bound<&T>, none: T| match bound {
-        Bound::Included(&value) | Bound::Excluded(&value) => value,
-        Bound::Unbounded => none,
-    };
-    [side(range.start_bound(), -infinity), side(range.end_bound(), infinity)]
 }
 
 /// Copies a list to one with another element at `gap`.

@@ -30,6 +30,9 @@ pub(in crate::ocp) struct FreeParameters {
     /// For every parameter of the model which one of these it is, or [`NONE`].
     #[cfg(feature = "alloc")]
     places: Vec<u32>,
+    /// Which one is the end of the horizon.
+    #[cfg(feature = "alloc")]
+    end: Option<usize>,
 }
 
 impl FreeParameters {
@@ -37,9 +40,9 @@ impl FreeParameters {
     #[inline(always)]
     pub fn view(&self) -> Free<'_> {
         #[cfg(feature = "alloc")]
-        return Free { count: self.parameters.len(), places: &self.places };
+        return Free { count: self.parameters.len(), places: &self.places, end: self.end };
         #[cfg(not(feature = "alloc"))]
-        Free { count: 0, places: &[] }
+        Free { count: 0, places: &[], end: None }
     }
 
     /// How many there are.
@@ -57,6 +60,12 @@ impl FreeParameters {
             let _ = index;
             None
         }
+    }
+
+    /// The end of the horizon is a parameter that is free.
+    #[cfg(feature = "alloc")]
+    pub fn set_end(&mut self, parameter: usize) {
+        self.end = self.view().of(parameter);
     }
 
     /// Adds one of `np` parameters of the model: which one of these it is.
@@ -78,9 +87,22 @@ impl FreeParameters {
 pub struct Free<'a> {
     count: usize,
     places: &'a [u32],
+    end: Option<usize>,
 }
 
 impl Free<'_> {
+    /// Which one is the end of the horizon.
+    #[inline(always)]
+    pub(in crate::ocp) fn end(self) -> Option<usize> {
+        self.end
+    }
+
+    /// How long the horizon is in units of its nodes' times: the end time, or one.
+    #[inline(always)]
+    pub(in crate::ocp) fn duration<T: Real>(self, w: &[T]) -> T {
+        self.end.and_then(|end| w.get(end).copied()).unwrap_or(T::ONE)
+    }
+
     /// How many there are.
     #[inline(always)]
     pub(in crate::ocp) fn count(self) -> usize {

@@ -246,6 +246,9 @@ pub trait Dynamics<T: Real> {
     const NAMES: Names;
     /// Whether [`IntervalResult::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
+    /// Whether there are integral costs.
+    #[doc(hidden)]
+    const INTEGRAL: bool = false;
     /// What the ends of intervals follow from.
     #[doc(hidden)]
     const ORIGIN: Origin = Origin::Unknown;

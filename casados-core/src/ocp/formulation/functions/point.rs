@@ -72,12 +72,17 @@ pub struct There {
     pub(in crate::ocp) u: bool,
     /// The first stage of these.
     pub(in crate::ocp) stage: usize,
+    /// A time that has no derivatives: not where the end of the horizon is free.
+    pub(in crate::ocp) t: bool,
 }
 
 impl There {
     /// Whether a function depends on this only.
     pub(in crate::ocp) fn check<F: Function>(self) -> Result<(), OcpError> {
         let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
+        if F::IS_TIMED && !self.t {
+            return Err(OcpError::DependsOnTime { function });
+        }
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for &variable in variables {
             let Some(index) = (variable as usize).checked_sub(2 * nx) else { continue };
@@ -141,6 +146,28 @@ impl<T: Real> Terms<'_, T> {
                 self.curve(row, column, factor * value);
             }
         });
+    }
+}
+
+impl<T: Real> Terms<'_, T> {
+    /// Adds what a duration `T`, the variable `place`, does to a cost `T l` beside what `l` does by
+    /// it: `l` to the gradient, `∇l` to its row and its column of an exact Hessian. The gradient
+    /// was `before`, and `∇(T l)` with `T` constant was added.
+    pub(in crate::ocp) fn add_duration(
+        &mut self,
+        place: usize,
+        [cost, duration]: [T; 2],
+        before: &[T],
+        exact: bool,
+    ) {
+        for (i, &before) in before.iter().enumerate().filter(|_| exact) {
+            let slope = (self.gradient.get(i).copied().unwrap_or(T::ZERO) - before) / duration;
+            self.curve(i.max(place), i.min(place), slope);
+            if i == place {
+                self.curve(i, i, slope);
+            }
+        }
+        self.slope(place, cost / duration);
     }
 }
 

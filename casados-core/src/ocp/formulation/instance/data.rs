@@ -68,9 +68,15 @@ const fn lengths<P: Formulation<T>, T: Real>(Layout { intervals, free }: Layout)
         intervals * kept::<P::Shape>(free),
         if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
         extended::<P::Shape>(free, constraints),
-        (2 * n + 1) * pad::<T>(n),
+        scratch::<T>(n, P::Shape::NZ),
         P::Shape::NX * (P::Shape::NX + 1),
     ]
+}
+
+/// Two matrices and a vector over `(x, w, u)`, or a gradient over `(x, w, u, z)`.
+const fn scratch<T>(n: usize, nz: usize) -> usize {
+    let (matrices, gradient) = ((2 * n + 1) * pad::<T>(n), n + nz);
+    if matrices < gradient { gradient } else { matrices }
 }
 
 /// How many numbers it takes.

@@ -22,7 +22,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
-    /// [`OcpError::OutOfMemory`]
+    /// [`OcpError::OutOfMemory`]; of a free end time [`OcpError::FixedEndTime`],
+    /// [`OcpError::OutOfRange`], [`OcpError::DependsOnTime`], [`OcpError::NoFreeEndTime`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
@@ -40,7 +41,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
         let length = data::length::<Self, T>(Layout { intervals, free: 0 });
-        Ocp::build(self, horizon, qp, iterate, zeros(length)?)
+        let mut ocp = Ocp::build(self, horizon, qp, iterate, zeros(length)?)?;
+        ocp.free_end(&horizon)?;
+        Ok(ocp)
     }
 
     /// The dimensions of the stages, of which there is one more than there are intervals.
@@ -88,6 +91,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
+        if matches!(horizon, Horizon::Free { .. }) {
+            return Err(OcpError::NoFreeEndTime { place: "in given memory: take `Problem::on`" });
+        }
         let intervals = horizon.intervals();
         let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));
         if dims.len() != expected {

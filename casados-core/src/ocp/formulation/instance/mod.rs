@@ -138,8 +138,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
         let z = P::Dynamics::ALGEBRAIC;
-        let (inside, at_end) =
-            (There { z, u: true, stage: 0 }, There { z: false, u: false, stage: intervals });
+        let (inside, at_end) = (
+            There { z, u: true, stage: 0, t: true },
+            There { z: false, u: false, stage: intervals, t: true },
+        );
         dynamics.check()?;
         stage_cost.check(inside)?;
         terminal_cost.check(at_end)?;
@@ -331,13 +333,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
+    /// Finds functions of what has no derivatives where the end of the horizon is free.
+    ///
+    /// # Errors
+    /// [`OcpError::DependsOnTime`], [`OcpError::NoFreeEndTime`]
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn check_functions(&mut self) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        if P::Dynamics::INTEGRAL {
+            return Err(OcpError::NoFreeEndTime { place: "with `WithIntegral`: take a running cost" });
+        }
+        let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
+        let inside = There { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
+        let at_end = There { z: false, u: false, stage: intervals, t: false };
+        stage_cost.check(inside)?;
+        terminal_cost.check(at_end)?;
+        path.check(inside)?;
+        terminal.check(at_end)
+    }
+
     /// Finds functions of algebraic states, where these have no derivatives.
     ///
     /// # Errors
     /// [`OcpError::NotThere`]
     pub(in crate::ocp) fn check_without_algebraic(&mut self) -> Result<(), OcpError> {
         let Problem { stage_cost, path, .. } = self.problem.parts();
-        let there = There { z: false, u: true, stage: 0 };
+        let there = There { z: false, u: true, stage: 0, t: self.free.view().end().is_none() };
         stage_cost.check(there)?;
         path.check(there)
     }

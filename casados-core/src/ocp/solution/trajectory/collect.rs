@@ -89,7 +89,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (row, name) in names::<P::Terminal, _, T>().enumerate() {
             series.push(self.of_constraint(Kind::Terminal, name, row, &values));
         }
-        Ok(Trajectory { model: known.model.into(), times: self.times().to_vec(), series })
+        let duration =
+            self.iterate.stages().next().map_or(T::ONE, |first| self.free.view().duration(first.u));
+        let times = self.times().iter().map(|&time| duration * time).collect();
+        Ok(Trajectory { model: known.model.into(), times, series })
     }
 
     /// Algebraic states of the iterate.

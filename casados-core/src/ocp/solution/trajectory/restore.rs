@@ -135,7 +135,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (states, controls) = (all(known.x, Kind::State)?, all(known.u, Kind::Control)?);
         let (mut x, mut u) = (Vec::new(), Vec::new());
         for k in 0..=self.intervals() {
-            let time = get(self.times(), k);
+            let unit = if self.free.view().end().is_some() { trajectory.end_time() } else { T::ONE };
+            let time = unit * get(self.times(), k);
             let (before, along) = place(&trajectory.times, time);
             x.clear();
             u.clear();
