@@ -11,6 +11,7 @@ mod runs;
 
 mod algebraic;
 mod arrival;
+mod boundary;
 mod bounds;
 mod chain;
 mod closed_form;

@@ -101,6 +101,7 @@ pub use feedback::phases::{Fallback, Feedback, Prepared};
 pub use feedback::real_time::HeapRealTime;
 pub use feedback::real_time::RealTime;
 pub use formulation::error::{ConstraintName, OcpError, Part, Text};
+pub use formulation::functions::boundary::Boundary;
 pub use formulation::functions::constraint::{Constraint, Constraints};
 pub use formulation::functions::convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
 pub use formulation::functions::cost::{Cost, GeneralCost};

@@ -130,7 +130,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let arguments = match form {
         Form::Dae => "`xdot`, `x`, `z`, `u`, `p` and `t`",
         Form::Ode => "`x`, `u`, `p` and `t`",
-        Form::Function => "`x`, `z`, `u`, `p` and `t`",
+        Form::Function => "`x`, `z`, `u`, `p` and `t`; `x0`, `x` and `p` of a boundary condition",
     };
     let Pat::Ident(identifier) = pattern else {
         return Err(Error::new(
@@ -141,6 +141,10 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             ),
         ));
     };
+    // The other state of a function of two.
+    if form == Form::Function && identifier.ident.to_string().trim_start_matches('_') == "x0" {
+        return Ok(Role::Z);
+    }
     match (Role::of(&identifier.ident), form) {
         (Some(Role::Xdot), Form::Ode) => Err(Error::new_spanned(
             &identifier.ident,

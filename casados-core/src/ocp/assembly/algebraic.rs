@@ -12,7 +12,7 @@
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
 #[cfg(feature = "alloc")]
@@ -185,7 +185,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let factor = if *running { free.duration(stage.u) * node.factor } else { node.factor };
             let place = At { stage: k, factor, exact: false, from: &[] };
             stage_cost.add(&point, node.reference, place, &mut terms)?;
-            path.linearise(&point, &mut [], columns, terms.ld, (k, free))?;
+            path.linearise(&point, &mut [], columns, terms.ld, Spot::new(k, free, &[]))?;
             for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
                 *nu = get(terms.gradient, n + j);
                 let mu = stage.g_upper.iter().zip(stage.g_lower);

@@ -8,14 +8,17 @@ use crate::ocp::assembly::transfer::Left;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
 use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::instance::data::{Layout, Node, inputs, split};
+use crate::ocp::formulation::instance::data::{Layout, Node, inputs, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
+use crate::qp::element::{get, set};
+use crate::qp::{
+    Arrays, Residuals, Solution, SolutionStage, StageDims, add_symmetric, assign, larger, pad, part, part_mut,
+};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -149,13 +152,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // Values lie where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
-            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let count = if k < intervals { path_rows::<P, T>() } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
             // Of a running cost the end time is a factor.
             let w = free.end().filter(|_| *running && k < intervals);
             let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
             let factor = duration * node.factor;
             let place = At { stage: k, factor, exact: C::EXACT, from };
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
             let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
@@ -172,21 +176,25 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     stage_cost.add(&point, node.reference, place, terms)?
                 };
                 objective = objective + cost;
-                path.linearise(&point, values, slopes, ld_slopes, (k, free))?;
+                path.linearise(&point, values, slopes, ld_slopes, spot)?;
                 if !mu.is_empty() {
-                    path.curve(&point, mu, terms);
+                    path.curve(&point, mu, spot, terms);
                 }
             } else {
                 objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
-                terminal.linearise(&point, values, slopes, ld_slopes, (k, free))?;
+                terminal.linearise(&point, values, slopes, ld_slopes, spot)?;
                 if !mu.is_empty() {
-                    terminal.curve(&point, mu, terms);
+                    terminal.curve(&point, mu, spot, terms);
                 }
             }
             if is_extended {
                 room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
             }
-            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, k * P::Path::ROWS, count));
+            if k < intervals {
+                link_start::<P, T>(&at, k, (values, columns, ld));
+            }
+            let given =
+                [&*data.lower, &*data.upper].map(|limits| part(limits, k * path_rows::<P, T>(), count));
             shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
         }
         Ok(objective)
@@ -292,13 +300,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &at, z, free);
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             if k < intervals {
                 let factor = if *running { free.duration(at.u) * node.factor } else { node.factor };
                 objective = objective + factor * stage_cost.value(&point, node.reference, k)?;
-                path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
+                let rows = path_rows::<P, T>();
+                let values = part_mut(values, k * rows, rows);
+                path.value(&point, values, spot)?;
+                link_start::<P, T>(&at, k, (values, &mut [], 0));
             } else {
                 objective = objective + terminal_cost.value(&point, node.reference, k)?;
-                terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
+                terminal.value(&point, part_mut(values, k * path_rows::<P, T>(), P::Terminal::ROWS), spot)?;
             }
         }
         self.stages = of_stages;
@@ -312,14 +324,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Rows of the path constraints.
     pub(in crate::ocp) fn rows(&self) -> usize {
-        P::Path::ROWS
+        path_rows::<P, T>()
     }
 
     /// Constants of the linearised dynamics and constraints such that these are exact at some
     /// point, whose `ends` are given: what a second-order correction solves.
     pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
         let layout @ Layout { intervals, .. } = self.layout();
-        let (nx, path) = (P::Shape::NX, P::Path::ROWS);
+        let (nx, path) = (P::Shape::NX, path_rows::<P, T>());
         let data = split::<P, T>(self.data.as_mut(), layout);
         let (v, _) = at.vectors();
         let values = ends.get(intervals * nx..).unwrap_or_default();
@@ -368,7 +380,25 @@ fn shift_limits<T: Real>(
 
 /// How many numbers `φ` of every interval and `g` of every stage are.
 pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
-    dims.len().saturating_sub(1) * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
+    dims.len().saturating_sub(1) * (P::Shape::NX + path_rows::<P, T>()) + P::Terminal::ROWS
+}
+
+/// What links copies of elements of the first state to it, `x₀[i] − w`, behind the path constraints:
+/// values and columns, which are zero at other stages.
+fn link_start<P: Formulation<T>, T: Real>(
+    at: &SolutionStage<'_, T>,
+    stage: usize,
+    (values, columns, ld): (&mut [T], &mut [T], usize),
+) {
+    for copy in 0..P::Terminal::STARTS {
+        let (row, state, w) = (P::Path::ROWS + copy, P::Terminal::start(copy), P::Shape::NX + copy);
+        let is_first = stage == 0;
+        set(values, row, if is_first { get(at.x, state) - get(at.u, copy) } else { T::ZERO });
+        if is_first && ld > 0 {
+            set(columns, row * ld + state, T::ONE);
+            set(columns, row * ld + w, -T::ONE);
+        }
+    }
 }
 
 /// The distance of stages in vectors `v`.

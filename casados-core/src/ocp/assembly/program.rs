@@ -5,17 +5,17 @@ use crate::ocp::assembly::algebraic;
 #[cfg(feature = "casadi")]
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 #[cfg(feature = "casadi")]
 use crate::ocp::formulation::functions::dynamics::Sink;
 #[cfg(feature = "casadi")]
 use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::{Layout, Node, split};
+use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 #[cfg(feature = "casadi")]
 use crate::qp::Arrays;
-use crate::qp::{StageDims, part_mut};
+use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -69,11 +69,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &at, z, free);
-            let values = values.get_mut(k * P::Path::ROWS..).unwrap_or_default();
+            let values = values.get_mut(k * path_rows::<P, T>()..).unwrap_or_default();
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             if k < intervals {
-                path.value(&point, part_mut(values, 0, P::Path::ROWS), k)?;
+                path.value(&point, part_mut(values, 0, P::Path::ROWS), spot)?;
             } else {
-                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), k)?;
+                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), spot)?;
             }
         }
         Ok(self.objective)

@@ -5,7 +5,7 @@ use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
@@ -19,9 +19,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Bounds of a general constraint of a stage, as they were given.
     pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
         let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let rows = intervals * path_rows::<P, T>() + P::Terminal::ROWS;
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_rows::<P, T>() + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 
@@ -167,7 +167,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
-                crate::qp::assign(crate::qp::part_mut(bounds, k * P::Path::ROWS, rows), given);
+                crate::qp::assign(crate::qp::part_mut(bounds, k * path_rows::<P, T>(), rows), given);
             }
         }
         Ok(self)
@@ -312,7 +312,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 None => (Part::ParameterBounds, (self.name_of_free(index), 0)),
             },
             _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
-            _ => (Part::PathBounds, P::Path::name(index)),
+            _ => match index.checked_sub(P::Path::ROWS) {
+                Some(copy) => (Part::StateBounds, (self.name_of_free(copy), 0)),
+                None => (Part::PathBounds, P::Path::name(index)),
+            },
         };
         ConstraintName { part, stage, name, output, side }
     }
@@ -346,7 +349,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let rows = match field {
             QpField::A | QpField::B | QpField::Q => nx,
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
-            QpField::C | QpField::D => P::Path::ROWS,
+            QpField::C | QpField::D => path_rows::<P, T>(),
             QpField::R | QpField::S => nu,
             QpField::GradientX | QpField::GradientU => 1,
             _ => return None,

@@ -379,11 +379,10 @@ pub enum OcpError {
         /// The model.
         model: &'static str,
     },
-    /// The end of the horizon is free where it cannot be: in memory of its owner, and of integral
-    /// costs (`WithIntegral`).
-    NoFreeEndTime {
-        /// Where.
-        place: &'static str,
+    /// Something that cannot be said of this problem.
+    Unsupported {
+        /// What, and what can be said instead.
+        what: &'static str,
     },
     /// The end of the horizon is free, and a function depends on the time of the integrator.
     DependsOnTime {

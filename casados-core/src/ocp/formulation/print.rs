@@ -3,7 +3,7 @@
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::bounds;
+use crate::ocp::formulation::instance::data::{bounds, path_rows};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::names::Names;
@@ -138,12 +138,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             write!(f, "{separator}{} {kind}{plural} ", names.len())?;
             list(f, names)?;
         }
-        let free = self.free.count();
+        let (copies, free) = (P::Terminal::STARTS, self.free.count() - P::Terminal::STARTS);
         if free > 0 {
             let plural = if free == 1 { "" } else { "s" };
             write!(f, "; {free} free parameter{plural} ")?;
             for w in 0..free {
-                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.name_of_free(w))?;
+                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.name_of_free(copies + w))?;
             }
         }
         writeln!(f)
@@ -161,7 +161,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), free + j))
             })?;
         }
-        for w in 0..free {
+        for w in P::Terminal::STARTS..free {
             let sides = view.stage(0).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), w));
             sides.count(count);
             if sides.has() != [false; 2] {
@@ -174,7 +174,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // Bounds in the QP are those of what is linear.
         let [lower, upper] = bounds::<P, T>(self.data.as_ref(), self.layout());
         let constraint = |k: usize, row: usize| {
-            let place = k * P::Path::ROWS + row;
+            let place = k * path_rows::<P, T>() + row;
             let [lower, upper] = [lower, upper].map(|bounds| get(bounds, place).to_f64());
             let of = |stage: Stage<'_, T>| Sides { lower, upper, ..Sides::of(&stage.g_bounds(), row) };
             view.stage(k).map_or(Sides::NONE, of)

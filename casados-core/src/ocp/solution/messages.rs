@@ -200,7 +200,7 @@ impl fmt::Display for OcpError {
                 "the end time is free, and no parameter of `{model}` is a duration: say which one, as in \
                  `#[ode(duration = p.duration)]`"
             ),
-            Self::NoFreeEndTime { place } => write!(f, "the end time cannot be free {place}"),
+            Self::Unsupported { what } => write!(f, "there is no support for {what}"),
             Self::DependsOnTime { function } => write!(
                 f,
                 "the end time is free, and `{function}` depends on the time: say which parameter is the duration, \

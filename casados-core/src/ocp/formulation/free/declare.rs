@@ -4,8 +4,8 @@ use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::horizon::{Horizon, limits};
+use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::data::{self, Layout, split};
-use crate::ocp::formulation::instance::{HeapOcp, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{
     Bounds, BoundsMut, Qp, Solution, SolutionStage, SolutionStageMut, StageDims, assign, marked, room, zeros,
@@ -86,7 +86,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Frees the end of a horizon that has a free one.
     ///
     /// # Errors
-    /// [`OcpError::FixedEndTime`], [`OcpError::Times`]; those of [`HeapOcp::free`]
+    /// [`OcpError::FixedEndTime`], [`OcpError::Times`], [`OcpError::Unsupported`]; those of [`HeapOcp::free`]
     pub(in crate::ocp) fn free_end(&mut self, horizon: &Horizon<'_, T>) -> Result<(), OcpError> {
         let Horizon::Free { range: [lower, upper], guess, .. } = *horizon else { return Ok(()) };
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
@@ -152,17 +152,6 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             to.share(j);
         });
         to.share(w);
-    }
-}
-
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Writes a free parameter of the iterate.
-    pub(in crate::ocp) fn write_free(&mut self, w: usize, value: T) {
-        for k in 0..=self.intervals() {
-            if let Some(place) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(w)) {
-                *place = value;
-            }
-        }
     }
 }
 

@@ -24,6 +24,9 @@ const NONE: u32 = u32::MAX;
 /// The free parameters of a problem.
 #[derive(Clone, Debug, Default)]
 pub(in crate::ocp) struct FreeParameters {
+    /// How many copies of elements of the first state are in front of them.
+    #[cfg(feature = "alloc")]
+    starts: usize,
     /// Which parameter of the model each is.
     #[cfg(feature = "alloc")]
     parameters: Vec<usize>,
@@ -36,16 +39,26 @@ pub(in crate::ocp) struct FreeParameters {
 }
 
 impl FreeParameters {
+    /// None, behind so many copies of elements of the first state.
+    pub fn with_starts(starts: usize) -> Self {
+        let _ = starts;
+        Self {
+            #[cfg(feature = "alloc")]
+            starts,
+            ..Self::default()
+        }
+    }
+
     /// For the functions of a problem.
     #[inline(always)]
     pub fn view(&self) -> Free<'_> {
         #[cfg(feature = "alloc")]
-        return Free { count: self.parameters.len(), places: &self.places, end: self.end };
+        return Free { count: self.starts + self.parameters.len(), places: &self.places, end: self.end };
         #[cfg(not(feature = "alloc"))]
         Free { count: 0, places: &[], end: None }
     }
 
-    /// How many there are.
+    /// How many variables there are for these and for copies of elements of the first state.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.view().count
@@ -54,7 +67,7 @@ impl FreeParameters {
     /// Which parameter of the model one of them is.
     pub fn parameter(&self, index: usize) -> Option<usize> {
         #[cfg(feature = "alloc")]
-        return self.parameters.get(index).copied();
+        return self.parameters.get(index.checked_sub(self.starts)?).copied();
         #[cfg(not(feature = "alloc"))]
         {
             let _ = index;
@@ -72,7 +85,7 @@ impl FreeParameters {
     #[cfg(feature = "alloc")]
     pub fn add(&mut self, parameter: usize, np: usize) -> usize {
         self.places.resize(np, NONE);
-        let index = self.parameters.len();
+        let index = self.starts + self.parameters.len();
         match self.places.get_mut(parameter) {
             Some(place) if *place == NONE => *place = index as u32,
             place => return place.map_or(index, |place| *place as usize),

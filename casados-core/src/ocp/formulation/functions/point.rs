@@ -174,7 +174,7 @@ impl<T: Real> Terms<'_, T> {
 /// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in
 /// `hessian`.
 #[inline(always)]
-fn each_entry<F: Function, T: Real>(
+pub(in crate::ocp) fn each_entry<F: Function, T: Real>(
     v: &ArrayV<F, T>,
     mu: &ArrayY<F, T>,
     hessian: &mut F::Hessian<T>,

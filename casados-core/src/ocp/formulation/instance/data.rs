@@ -54,11 +54,17 @@ pub(in crate::ocp) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
+/// Rows of the path constraints, and of what links copies of elements of the first state to it.
+pub(in crate::ocp) const fn path_rows<P: Formulation<T>, T: Real>() -> usize {
+    P::Path::ROWS + P::Terminal::STARTS
+}
+
 const fn lengths<P: Formulation<T>, T: Real>(Layout { intervals, free }: Layout) -> [usize; 10] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-    let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+    let path = path_rows::<P, T>();
+    let rows = intervals * path + P::Terminal::ROWS;
     let n = inputs::<P::Shape>(free);
-    let constraints = if P::Path::ROWS > P::Terminal::ROWS { P::Path::ROWS } else { P::Terminal::ROWS };
+    let constraints = if path > P::Terminal::ROWS { path } else { P::Terminal::ROWS };
     [
         intervals + 1,
         (intervals + 1) * P::Shape::NP,
@@ -162,7 +168,7 @@ pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(free: usize, last:
     if last {
         StageDims::new(P::Shape::NX, free, P::Terminal::ROWS)
     } else {
-        StageDims::new(P::Shape::NX, free + P::Shape::NU, P::Path::ROWS)
+        StageDims::new(P::Shape::NX, free + P::Shape::NU, path_rows::<P, T>())
     }
 }
 

@@ -23,7 +23,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
     /// [`OcpError::OutOfMemory`]; of a free end time [`OcpError::FixedEndTime`],
-    /// [`OcpError::OutOfRange`], [`OcpError::DependsOnTime`], [`OcpError::NoFreeEndTime`]
+    /// [`OcpError::OutOfRange`], [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
@@ -33,14 +33,14 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
-        let intervals = horizon.intervals();
+        let (intervals, free) = (horizon.intervals(), H::STARTS);
         let mut dims = Vec::new();
         room(&mut dims, intervals.saturating_add(1))?;
-        dims.resize(intervals, data::stage::<Self, T>(0, false));
-        dims.push(data::stage::<Self, T>(0, true));
+        dims.resize(intervals, data::stage::<Self, T>(free, false));
+        dims.push(data::stage::<Self, T>(free, true));
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
-        let length = data::length::<Self, T>(Layout { intervals, free: 0 });
+        let length = data::length::<Self, T>(Layout { intervals, free });
         let mut ocp = Ocp::build(self, horizon, qp, iterate, zeros(length)?)?;
         ocp.free_end(&horizon)?;
         Ok(ocp)
@@ -76,7 +76,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`];
-    /// [`OcpError::Length`] if memory or dimensions do not fit.
+    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] of a free end
+    /// time and boundary conditions.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,
@@ -91,8 +92,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
-        if matches!(horizon, Horizon::Free { .. }) {
-            return Err(OcpError::NoFreeEndTime { place: "in given memory: take `Problem::on`" });
+        let what = "couplings of stages in given memory: take `Problem::on`";
+        if matches!(horizon, Horizon::Free { .. }) || H::STARTS > 0 {
+            return Err(OcpError::Unsupported { what });
         }
         let intervals = horizon.intervals();
         let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));

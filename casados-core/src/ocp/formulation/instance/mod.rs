@@ -12,7 +12,7 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::horizon::Horizon;
-use crate::ocp::formulation::instance::data::{Data, Layout, inputs, split};
+use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
@@ -148,14 +148,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         path.check(inside)?;
         terminal.check(at_end)?;
         let Data { times, p, lower, upper, references, .. } =
-            split::<P, T>(data.as_mut(), Layout { intervals, free: 0 });
+            split::<P, T>(data.as_mut(), Layout { intervals, free: P::Terminal::STARTS });
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.
         p.fill(T::from_f64(f64::NAN));
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let begin = k * P::Path::ROWS;
+            let (begin, starts) = (k * path_rows::<P, T>(), P::Path::ROWS);
             let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            if k < intervals && starts < path_rows::<P, T>() {
+                // Copies of the first state are equal to it, at its stage.
+                let bound = if k == 0 { T::ZERO } else { T::from_f64(f64::INFINITY) };
+                let links = [&mut *lower, &mut *upper].into_iter().zip([T::ZERO - bound, bound]);
+                links.for_each(|(to, bound)| {
+                    part_mut(to, begin + starts, path_rows::<P, T>() - starts).fill(bound);
+                });
+            }
             let bounds = stage.g_bounds_mut();
             let limits = [
                 part_mut(lower, begin, rows),
@@ -171,6 +179,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             assign(bounds.upper_linear, bounds.lower_linear);
             assign(bounds.upper_quadratic, bounds.lower_quadratic);
         }
+        for copy in 0..P::Terminal::STARTS {
+            qp.share(copy);
+        }
         Ok(Self {
             problem,
             initial: Initial::Unknown,
@@ -179,7 +190,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             data,
             objective: T::ZERO,
             stages: [T::ZERO; 2],
-            free: FreeParameters::default(),
+            free: FreeParameters::with_starts(P::Terminal::STARTS),
             step_length: None,
             has_algebraic: false,
         })
@@ -297,7 +308,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ] {
             multipliers.fill(T::ZERO);
         }
+        if stage == 0 {
+            self.copy_start();
+        }
         Ok(self)
+    }
+
+    /// Makes copies of the first state what it is.
+    pub(in crate::ocp) fn copy_start(&mut self) {
+        for copy in 0..P::Terminal::STARTS {
+            let first = self.iterate.stages().next();
+            let value = first.and_then(|first| first.x.get(P::Terminal::start(copy)).copied());
+            self.write_free(copy, value.unwrap_or(T::ZERO));
+        }
+    }
+
+    /// Writes a shared variable of the iterate.
+    pub(in crate::ocp) fn write_free(&mut self, w: usize, value: T) {
+        for k in 0..=self.intervals() {
+            if let Some(place) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(w)) {
+                *place = value;
+            }
+        }
     }
 
     /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
@@ -336,12 +368,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Finds functions of what has no derivatives where the end of the horizon is free.
     ///
     /// # Errors
-    /// [`OcpError::DependsOnTime`], [`OcpError::NoFreeEndTime`]
+    /// [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn check_functions(&mut self) -> Result<(), OcpError> {
         let intervals = self.intervals();
         if P::Dynamics::INTEGRAL {
-            return Err(OcpError::NoFreeEndTime { place: "with `WithIntegral`: take a running cost" });
+            let what = "a free end time with `WithIntegral`: take a running cost";
+            return Err(OcpError::Unsupported { what });
         }
         let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
         let inside = There { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
@@ -392,8 +425,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Err(OcpError::InvalidValue { part, stage: 0, name: self.name_of_free(index), index, value })
     }
 
-    /// What a free parameter is called.
+    /// What a free parameter is called; of a copy of an element of the first state, this element.
     pub(in crate::ocp) fn name_of_free(&self, index: usize) -> &'static str {
+        if index < P::Terminal::STARTS {
+            return self.names().x.get(P::Terminal::start(index)).copied().unwrap_or("");
+        }
         let parameter = self.free.parameter(index);
         parameter.and_then(|parameter| self.names().p.get(parameter).copied()).unwrap_or("")
     }

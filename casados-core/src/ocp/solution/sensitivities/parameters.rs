@@ -4,7 +4,7 @@ use crate::linalg::{axpy, dot};
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::IntervalResult;
 use crate::ocp::formulation::functions::point::Cross;
@@ -181,11 +181,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let mut direct = Cross { free, columns: extended, ld: size + z.len(), slopes: of_value, square };
             stage_cost.cross(&point, node.reference, place, &mut direct)?;
             path.cross(&point, mu, slopes, &mut direct);
+            let spot = Spot::new(k, free, &[]);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
             stage_cost.add(&point, node.reference, place, &mut terms)?;
-            path.linearise(&point, values, columns, terms.ld, (k, free))?;
+            path.linearise(&point, values, columns, terms.ld, spot)?;
             if let Some(mu) = mu {
-                path.curve(&point, mu, &mut terms);
+                path.curve(&point, mu, spot, &mut terms);
             }
             let dp = part(dz_dp, k * z.len() * np, z.len() * np);
             Extended { terms, columns }.fold_parameters::<P::Shape>([dz, dp], extended, &mut cross, slopes);

@@ -2,7 +2,7 @@
 
 use super::{Kind, Series, Trajectory};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult};
 use crate::ocp::formulation::instance::data::{Node, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
@@ -98,7 +98,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let p = part(data.p, k * np, np);
                 let node = Node { time: start + along * (end - start), p, reference: &[], factor: T::ONE };
                 node.read::<P::Shape>(&mut point, &SolutionStage { x, ..stage }, z, free);
-                path.value(&point, g, k)?;
+                path.value(&point, g, Spot::new(k, free, &[]))?;
             }
         }
         Ok(is_there.then_some(Inside { points, values, width }))

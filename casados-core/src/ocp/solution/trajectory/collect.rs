@@ -5,7 +5,7 @@ use crate::ocp::assembly::algebraic;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::problem::{Formulation, Problem};
@@ -38,7 +38,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn solution(&mut self) -> Result<Trajectory<T>, OcpError> {
         self.check()?;
         let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let rows = intervals * path_rows::<P, T>() + P::Terminal::ROWS;
         let mut values = vec![T::ZERO; rows];
         if P::Shape::NZ > 0 && P::Dynamics::ALGEBRAIC {
             self.find_algebraic()?;
@@ -142,7 +142,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let stages = if kind == Kind::Path { 0..intervals } else { intervals..intervals + 1 };
         let layout = self.layout();
         let data = split::<P, T>(self.data.as_mut(), layout);
-        let all = |list: &[T]| stages.clone().map(|k| get(list, k * P::Path::ROWS + row)).collect::<Vec<_>>();
+        let all =
+            |list: &[T]| stages.clone().map(|k| get(list, k * path_rows::<P, T>() + row)).collect::<Vec<_>>();
         let finite = |bound: T| bound.is_finite().then_some(bound);
         let mut series = Series::new(kind, name, stages.start, all(values));
         series.lower = all(data.lower).into_iter().map(finite).collect();

@@ -90,6 +90,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
             }
         }
+        self.copy_start();
         self.has_algebraic = false;
         self.check_iterate()?;
         Ok(self)
