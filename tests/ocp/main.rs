@@ -34,5 +34,6 @@ mod scaling;
 mod secant;
 mod second_attempt;
 mod trajectory;
+mod verification;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

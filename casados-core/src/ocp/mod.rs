@@ -137,3 +137,5 @@ pub use solution::sensitivities::{
 };
 #[cfg(feature = "alloc")]
 pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};
+#[cfg(feature = "alloc")]
+pub use solution::verification::{Defect, InnerViolation, Verification};

@@ -130,7 +130,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let arguments = match form {
         Form::Dae => "`xdot`, `x`, `z`, `u`, `p` and `t`",
         Form::Ode => "`x`, `u`, `p` and `t`",
-        Form::Function => "`x`, `z`, `u`, `p` and `t`; `x0`, `x` and `p` of a boundary condition",
+        Form::Function => "`x`, `z`, `u`, `p` and `t`",
     };
     let Pat::Ident(identifier) = pattern else {
         return Err(Error::new(

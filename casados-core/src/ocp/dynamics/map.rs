@@ -148,6 +148,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
             duration: None,
         }
     };
+    const IS_FLOW: bool = false;
     const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {

@@ -116,6 +116,7 @@ impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for Ret
     type Shape = D::Shape;
     const NAMES: Names = D::NAMES;
     const INTEGRAL: bool = D::INTEGRAL;
+    const IS_FLOW: bool = false;
     const ALGEBRAIC: bool = {
         assert!(!D::LIFTED, "a return map needs shooting: ends of collocated intervals are variables");
         D::ALGEBRAIC

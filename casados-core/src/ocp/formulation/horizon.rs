@@ -3,6 +3,8 @@
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::get;
 use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 use core::ops::{Bound, RangeBounds};
 
 /// The nodes in time.
@@ -98,6 +100,29 @@ impl<'a, T: Real> Horizon<'a, T> {
             Self::Uniform { intervals, .. } | Self::Free { intervals, .. } => *intervals,
             Self::Nodes(times) => times.len().saturating_sub(1),
         }
+    }
+    /// Nodes with these intervals halved: of `nodes` as [`Ocp::times`](crate::ocp::Ocp::times) has
+    /// them, for [`Horizon::nodes`], or [`Horizon::free_nodes`] where the end is free. Intervals
+    /// that there are not are passed by.
+    ///
+    /// ```
+    /// use casados::ocp::Horizon;
+    ///
+    /// assert_eq!(Horizon::refined(&[0.0, 1.0, 2.0, 4.0], &[0, 2]), [0.0, 0.5, 1.0, 2.0, 3.0, 4.0]);
+    /// ```
+    #[cfg(feature = "alloc")]
+    #[must_use]
+    pub fn refined(nodes: &[T], intervals: &[usize]) -> Vec<T> {
+        let mut finer = Vec::new();
+        for (k, pair) in nodes.windows(2).enumerate() {
+            let [start, end] = [0, 1].map(|i| get(pair, i));
+            finer.push(start);
+            if intervals.contains(&k) {
+                finer.push(start + T::from_f64(0.5) * (end - start));
+            }
+        }
+        finer.extend(nodes.last());
+        finer
     }
     fn time(&self, node: usize) -> T {
         match self {

@@ -7,3 +7,5 @@ pub(in crate::ocp) mod outcome;
 pub(in crate::ocp) mod sensitivities;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod trajectory;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod verification;

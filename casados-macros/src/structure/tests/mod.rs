@@ -1,6 +1,7 @@
 //! Models whose graphs are built by hand, and what is found out about them.
 
 mod branches;
+mod duration;
 mod index;
 mod kinematic;
 mod reduction;

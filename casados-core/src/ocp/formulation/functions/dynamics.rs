@@ -246,6 +246,9 @@ pub trait Dynamics<T: Real> {
     const NAMES: Names;
     /// Whether [`IntervalResult::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
+    /// Whether the end of an interval is that of the equations of a model.
+    #[doc(hidden)]
+    const IS_FLOW: bool = true;
     /// Whether there are integral costs.
     #[doc(hidden)]
     const INTEGRAL: bool = false;
