@@ -415,7 +415,8 @@ fn price_of_the_end(x: f64, _p: f64) -> f64 {
     2.5 * x * x
 }
 
-/// Hull's problem with a constant control: `½ c x₀² / (1 + c T)`, with an integral of the parameter.
+/// Hull's problem with a constant control: `½ c x₀² / (1 + c T)`, with an integral of
+/// the parameter.
 #[test]
 fn an_integral_of_a_parameter() -> Test {
     let erk = Erk::<ConstantRate, Rk4>::new(Options::default())?;
@@ -428,5 +429,44 @@ fn an_integral_of_a_parameter() -> Test {
     let expected = 0.5 * 5.0 * 1.5 * 1.5 / (1.0 + 5.0 * 5.0);
     assert!(outcome.is_converged() && (outcome.objective - expected).abs() < 1e-12, "{outcome}");
     assert!((ocp.solution()?.parameter("p")?[0] + 5.0 * 1.5 / 26.0).abs() < 1e-9);
+    Ok(())
+}
+
+/// What climbs by a parameter in each step, and its measurements with a standard deviation of 0.1.
+#[function]
+fn climb(x: f64, p: f64) -> f64 {
+    x + p
+}
+#[function]
+fn measured(x: f64, _p: f64) -> f64 {
+    10.0 * x
+}
+
+/// The variance of a slope is `σ² / Σ k²`, and that of a state follows from it.
+#[test]
+fn covariances_of_free_parameters() -> Test {
+    const N: usize = 5;
+    let cost = || LeastSquaresCost::<Measured>::diagonal(&[1.0]);
+    let mut ocp = Problem::new(Map::<Climb, f64>::new())
+        .stage_cost(cost())
+        .terminal_cost(cost())
+        .on(Horizon::uniform(N, 1.0))?;
+    ocp.fix_initial_state(&[0.0])?.guess(&[0.0], &[])?.free("p", .., 0.0)?;
+    for k in 0..N {
+        ocp.set_reference(k..=k, &[10.0 * (2.0 * k as f64 + 0.01 * (3.0 * k as f64).sin())])?;
+    }
+    ocp.set_terminal_reference(&[10.0 * 2.0 * N as f64])?;
+    assert!(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?.is_converged());
+    let covariance = ocp.covariance(GaussNewton::default())?;
+    let squares: f64 = (0..=N).map(|k| (k * k) as f64).sum();
+    let expected = 0.1 / squares.sqrt();
+    for stage in [0, 2, N] {
+        assert!((covariance.standard_deviation("p", stage)? - expected).abs() < 1e-12);
+        let state = covariance.standard_deviation("x", stage)?;
+        assert!((state - stage as f64 * expected).abs() < 1e-12);
+    }
+    let joint = covariance.covariance(("p", 0), ("x", 3))?;
+    assert!((joint - 3.0 * expected * expected).abs() < 1e-12);
+    assert!(covariance.variance("q", 0).is_err() && covariance.variance("p", N + 1).is_err());
     Ok(())
 }

@@ -35,5 +35,6 @@ mod secant;
 mod second_attempt;
 mod trajectory;
 mod verification;
+mod warnings;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

@@ -69,8 +69,10 @@
 //! nobody could integrate.
 //!
 //! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
-//! (`ocp.shared("u.duration")?`). Such controls are parameters that are found, and free end times:
-//! `dx/dτ = T f(x, u)` over `τ ∈ [0, 1]`.
+//! (`ocp.shared("u.duration")?`). Parameters of the model are found by name
+//! (`ocp.free("p.mass", 0.1..=5.0, 1.0)?`), end times with [`Horizon::free`], and [`Boundary`] has
+//! conditions `r(x₀, x_N, p)` of any function. `Ocp::verify` says what a solution is worth between
+//! its nodes.
 //!
 //! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose
 //! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
@@ -139,3 +141,5 @@ pub use solution::sensitivities::{
 pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};
 #[cfg(feature = "alloc")]
 pub use solution::verification::{Defect, InnerViolation, Verification};
+#[cfg(feature = "alloc")]
+pub use solution::warnings::Warning;

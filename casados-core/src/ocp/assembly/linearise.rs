@@ -4,6 +4,7 @@ use crate::linalg::dot;
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::assembly::start::link_start;
 use crate::ocp::assembly::transfer::Left;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
@@ -15,10 +16,7 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::data::{Layout, Node, inputs, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::element::{get, set};
-use crate::qp::{
-    Arrays, Residuals, Solution, SolutionStage, StageDims, add_symmetric, assign, larger, pad, part, part_mut,
-};
+use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -381,24 +379,6 @@ fn shift_limits<T: Real>(
 /// How many numbers `φ` of every interval and `g` of every stage are.
 pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
     dims.len().saturating_sub(1) * (P::Shape::NX + path_rows::<P, T>()) + P::Terminal::ROWS
-}
-
-/// What links copies of elements of the first state to it, `x₀[i] − w`, behind the path constraints:
-/// values and columns, which are zero at other stages.
-fn link_start<P: Formulation<T>, T: Real>(
-    at: &SolutionStage<'_, T>,
-    stage: usize,
-    (values, columns, ld): (&mut [T], &mut [T], usize),
-) {
-    for copy in 0..P::Terminal::STARTS {
-        let (row, state, w) = (P::Path::ROWS + copy, P::Terminal::start(copy), P::Shape::NX + copy);
-        let is_first = stage == 0;
-        set(values, row, if is_first { get(at.x, state) - get(at.u, copy) } else { T::ZERO });
-        if is_first && ld > 0 {
-            set(columns, row * ld + state, T::ONE);
-            set(columns, row * ld + w, -T::ONE);
-        }
-    }
 }
 
 /// The distance of stages in vectors `v`.

@@ -31,8 +31,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         <P::Dynamics as Dynamics<T>>::NAMES
     }
 
-    /// Where a name means states, controls and free parameters: a part is left out of which it means
-    /// nothing.
+    /// Where a name means states, controls and free parameters: a part is left out of which it
+    /// means nothing.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
@@ -105,7 +105,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Bounds of a state, control or free parameter, or of all of them that a name means (`u` means
     /// `u[0]`, `u[1]`, …), at some stages: `..` are all of them, the last one has no controls, and
-    /// free parameters are the same at all of them. An infinite bound is none. While the initial state is fixed, bounds of states do not touch stage 0.
+    /// free parameters are the same at all of them. An infinite bound is none. While the initial
+    /// state is fixed, bounds of states do not touch stage 0.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],

@@ -9,3 +9,5 @@ pub(in crate::ocp) mod sensitivities;
 pub(in crate::ocp) mod trajectory;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod verification;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod warnings;

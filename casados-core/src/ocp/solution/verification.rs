@@ -153,16 +153,17 @@ impl<T: Real> fmt::Display for Verification<T> {
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// Integrates every interval of the iterate from its node on, by an integrator of the same model
-    /// with error control, and says where that differs from the next node, and which bounds of
-    /// states and path constraints are violated at eighths between the nodes. A state has the wider
-    /// one of the bounds at both ends of an interval.
+    /// Integrates every interval of the iterate from its node on, by an integrator of the same
+    /// model with error control, and says where that differs from the next node, and which bounds
+    /// of states and path constraints are violated at eighths between the nodes. A state has the
+    /// wider one of the bounds at both ends of an interval.
     ///
     /// Tolerances are those of the integrator: let them be a hundredth of what matters.
     ///
     /// # Errors
-    /// [`OcpError::Integration`], [`OcpError::NonFiniteFunction`]; [`OcpError::Unsupported`] of maps
-    /// and return maps, which are no flow of a model; those of [`Ocp::check`](crate::ocp::Ocp::check)
+    /// [`OcpError::Integration`], [`OcpError::NonFiniteFunction`]; [`OcpError::Unsupported`] of
+    /// maps and return maps, which are no flow of a model; those of
+    /// [`Ocp::check`](crate::ocp::Ocp::check)
     pub fn verify<I>(&mut self, integrator: &mut I) -> Result<Verification<T>, OcpError>
     where
         I: Integrator<Model: Dae<Shape = P::Shape>, Number = T>,

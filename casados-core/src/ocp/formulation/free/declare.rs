@@ -86,7 +86,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Frees the end of a horizon that has a free one.
     ///
     /// # Errors
-    /// [`OcpError::FixedEndTime`], [`OcpError::Times`], [`OcpError::Unsupported`]; those of [`HeapOcp::free`]
+    /// [`OcpError::FixedEndTime`], [`OcpError::Times`], [`OcpError::Unsupported`]; those of
+    /// [`HeapOcp::free`]
     pub(in crate::ocp) fn free_end(&mut self, horizon: &Horizon<'_, T>) -> Result<(), OcpError> {
         let Horizon::Free { range: [lower, upper], guess, .. } = *horizon else { return Ok(()) };
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };

@@ -76,8 +76,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`];
-    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] of a free end
-    /// time and boundary conditions.
+    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] of a free
+    /// end time and boundary conditions.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,

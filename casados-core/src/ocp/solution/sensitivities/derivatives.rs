@@ -136,9 +136,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// value, which has no Hessian in it.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state; [`OcpError::FreeParameters`];
-    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::InvalidOption`] of the
-    /// smoothing; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state;
+    /// [`OcpError::FreeParameters`]; [`OcpError::Length`] if the memory is of another problem;
+    /// [`OcpError::InvalidOption`] of the smoothing; [`OcpError::Qp`] if the reduced Hessian is not
+    /// positive definite.
     pub fn factorise<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
