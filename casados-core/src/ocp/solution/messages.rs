@@ -54,6 +54,9 @@ impl fmt::Display for ConstraintName {
         if matches!(self.part, Part::PathBounds | Part::TerminalBounds) {
             write!(f, " (output {})", self.output)?;
         }
+        if self.part == Part::ParameterBounds {
+            return Ok(());
+        }
         write!(f, " at stage {}", self.stage)
     }
 }
