@@ -7,8 +7,8 @@ use crate::qp::element::{get, set};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// What links copies of elements of the first state to it, `x₀[i] − w`, behind the path constraints:
-/// values and columns, which are zero at other stages.
+/// What links copies of elements of the first state to it, `x₀[i] − w`, behind the path
+/// constraints: values and columns, which are zero at other stages.
 pub(in crate::ocp) fn link_start<P: Formulation<T>, T: Real>(
     at: &SolutionStage<'_, T>,
     stage: usize,

@@ -62,7 +62,8 @@ pub enum Warning {
         /// By how much it is violated.
         violation: f64,
     },
-    /// Sizes of two variables, by guesses and bounds, differ by more than 1e8: other units may help.
+    /// Sizes of two variables, by guesses and bounds, differ by more than 1e8: other units may
+    /// help.
     FarUnits {
         /// The name and the size of the smallest variable.
         small: (&'static str, f64),
