@@ -5,7 +5,7 @@
 //! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
 //! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
 //! | `instance/` | a problem on a horizon, with memory |
-//! | `free` | parameters and end times that are found |
+//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them |
 //! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | refusals by name |
 //! | `print` | a problem as mathematics |
@@ -14,6 +14,8 @@ pub(in crate::ocp) mod arrival;
 pub(in crate::ocp) mod bounds;
 pub(in crate::ocp) mod check;
 pub(in crate::ocp) mod coupling;
+#[cfg(feature = "alloc")]
+mod declare;
 pub(in crate::ocp) mod error;
 pub(in crate::ocp) mod free;
 pub(in crate::ocp) mod functions;

@@ -9,9 +9,6 @@
 //! the places of the free ones.
 
 #[cfg(feature = "alloc")]
-mod declare;
-
-#[cfg(feature = "alloc")]
 use crate::qp::element::set;
 use crate::scalar::Real;
 use crate::shape::Shape;
