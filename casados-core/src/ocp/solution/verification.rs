@@ -226,13 +226,10 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
 }
 
 /// The largest value of every state at any node, at least one.
-fn largest_states<'a, T: Real>(
+fn largest_states<'a, T: Real + 'a>(
     stages: impl Iterator<Item = SolutionStage<'a, T>>,
     nx: usize,
-) -> Result<Vec<T>, OcpError>
-where
-    T: 'a,
-{
+) -> Result<Vec<T>, OcpError> {
     let mut sizes = zeros(nx)?;
     sizes.fill(T::ONE);
     for stage in stages {
