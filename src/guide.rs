@@ -23,6 +23,7 @@ chapters! {
     tables "guide/tables.md"
     integrators "guide/integrators.md"
     ocp "guide/ocp.md"
+    formulations "guide/formulations.md"
     trouble "guide/trouble.md"
     mpc "guide/mpc.md"
     estimation "guide/estimation.md"

@@ -198,6 +198,8 @@ pub trait Function: 'static {
     /// The unit of all outputs: what stands behind a comma in the first paragraph of the doc
     /// comment, as `/// Tension of the tether, N.`
     const UNIT: &'static str = "";
+    /// Whether it depends on the time that integrators have.
+    const IS_TIMED: bool = false;
 
     /// The value `y(v)`.
     fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);

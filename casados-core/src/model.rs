@@ -406,6 +406,9 @@ pub trait Dae: 'static {
     const RANGES: &'static [Range] = &[];
     /// The units of the variables, which pictures show. The attributes take them from doc comments.
     const UNITS: Units = Units::NONE;
+    /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`. A
+    /// unit of time of an integrator takes that many units of time of the model.
+    const DURATION: Option<usize> = None;
     /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 

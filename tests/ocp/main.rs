@@ -11,6 +11,7 @@ mod runs;
 
 mod algebraic;
 mod arrival;
+mod boundary;
 mod bounds;
 mod chain;
 mod closed_form;
@@ -20,6 +21,8 @@ mod coupling;
 mod curvature;
 mod deadlines;
 mod estimation;
+mod free_end;
+mod free_parameters;
 mod guesses;
 mod ipm;
 mod lifted;
@@ -29,5 +32,7 @@ mod real_time;
 mod scaling;
 mod second_attempt;
 mod trajectory;
+mod verification;
+mod warnings;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

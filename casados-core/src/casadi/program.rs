@@ -151,6 +151,9 @@ where
     }
 
     fn check(&mut self) -> Result<(), String> {
+        if self.layout().free > 0 {
+            return Err(OcpError::FreeParameters.to_string());
+        }
         HeapOcp::check(self).map_err(|error| error.to_string())
     }
 

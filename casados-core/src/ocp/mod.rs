@@ -66,8 +66,10 @@
 //! nobody could integrate.
 //!
 //! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
-//! (`ocp.shared("u.duration")?`). Such controls are parameters that are found, and free end times:
-//! `dx/dτ = T f(x, u)` over `τ ∈ [0, 1]`.
+//! (`ocp.shared("u.duration")?`). Parameters of the model are found by name
+//! (`ocp.free("p.mass", 0.1..=5.0, 1.0)?`), end times with [`Horizon::free`], and [`Boundary`] has
+//! conditions `r(x₀, x_N, p)` of any function. `Ocp::verify` says what a solution is worth between
+//! its nodes.
 //!
 //! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose
 //! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
@@ -96,6 +98,7 @@ pub use feedback::phases::{Fallback, Feedback, Prepared};
 pub use feedback::real_time::HeapRealTime;
 pub use feedback::real_time::RealTime;
 pub use formulation::error::{ConstraintName, OcpError, Part, Text};
+pub use formulation::functions::boundary::Boundary;
 pub use formulation::functions::constraint::{Constraint, Constraints};
 pub use formulation::functions::convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
 pub use formulation::functions::cost::{Cost, GeneralCost};
@@ -131,3 +134,7 @@ pub use solution::sensitivities::{
 };
 #[cfg(feature = "alloc")]
 pub use solution::trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError, Violation};
+#[cfg(feature = "alloc")]
+pub use solution::verification::{Defect, InnerViolation, Verification};
+#[cfg(feature = "alloc")]
+pub use solution::warnings::Warning;

@@ -36,6 +36,12 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let (ty, structure) = (ty(model), structure::of_function(analysis));
     let (units, unit) = (units::write(krate, &model.units), units::of_outputs(&model.units));
+    let is_timed = !analysis.time.is_empty() && model.duration.is_none();
+    let timed = is_timed.then(|| {
+        quote!(
+            const IS_TIMED: bool = true;
+        )
+    });
     quote! {
         #[automatically_derived]
         impl #krate::__private::Function for #ty {
@@ -46,6 +52,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
             const STRUCTURE: #krate::__private::FunctionStructure = #structure;
             #units
             #unit
+            #timed
 
             #[inline]
             fn value<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {

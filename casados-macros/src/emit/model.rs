@@ -47,6 +47,10 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             }
         }
     });
+    let duration = model.duration.map(|index| {
+        let index = Literal::u32_unsuffixed(index);
+        quote!(const DURATION: ::core::option::Option<usize> = ::core::option::Option::Some(#index);)
+    });
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
     let units = units::write(krate, &model.units);
     quote! {
@@ -57,6 +61,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             type Hessian<T: #krate::__private::Plain> = [T; #lh];
             type Factors<B: #krate::__private::Plain> = [B; #lb];
             const STRUCTURE: #krate::__private::Structure = #structure;
+            #duration
             #domain
             #units
             #branches

@@ -23,6 +23,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph,
         spans: vec![Span::call_site(); residual.len()],
         residual,

@@ -4,9 +4,11 @@
 //! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
 //! - `name = Ident`: another name for the model's type;
 //! - `crate = path`: where casados is found;
+//! - `duration = p.duration`: the parameter that time is a multiple of;
 //! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives;
 //! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: equations may be differentiated.
 
+use super::duration::Duration;
 use super::mistakes::Mistakes;
 use super::reduction::Reduction;
 use super::sampling::{self, Kind, Sampling, Setting};
@@ -18,7 +20,7 @@ use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
 /// What an attribute can say.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
-    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `nominal(x = ..)`, `range(x = ..)` and \
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `nominal(x = ..)`, `range(x = ..)` and \
     `index_reduction`";
 
 /// More models than this in one attribute are taken for a mistake.
@@ -32,6 +34,8 @@ pub struct Arguments {
     pub name: Option<Ident>,
     /// How the index is reduced, if that is asked for.
     pub reduction: Option<Reduction>,
+    /// The parameter that time is a multiple of.
+    pub duration: Option<Duration>,
     /// Groups of const parameters with the values that they take together.
     values: Vec<Values>,
     /// Nominal values and ranges.
@@ -47,8 +51,14 @@ struct Values {
 impl Arguments {
     /// Reads the tokens in the brackets.
     pub fn read(tokens: TokenStream) -> Result<Self> {
-        let mut arguments =
-            Self { krate: None, name: None, reduction: None, values: Vec::new(), settings: Vec::new() };
+        let mut arguments = Self {
+            krate: None,
+            name: None,
+            reduction: None,
+            duration: None,
+            values: Vec::new(),
+            settings: Vec::new(),
+        };
         let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
         let mut mistakes = Mistakes::default();
         for entry in entries {
@@ -67,6 +77,12 @@ impl Arguments {
                     let span = reduction.span;
                     if arguments.reduction.replace(reduction).is_some() {
                         mistakes.note(Error::new(span, "`index_reduction` is given twice"));
+                    }
+                }
+                Entry::Duration(duration) => {
+                    let span = duration.span;
+                    if arguments.duration.replace(duration).is_some() {
+                        mistakes.note(Error::new(span, "`duration` is given twice"));
                     }
                 }
                 Entry::Values(values) => {
@@ -97,7 +113,7 @@ impl Arguments {
 
     /// Refuses what is said about the model of a module in which every one has its own attribute.
     pub fn without_model(&self, module: &Ident) -> Result<()> {
-        let settings = self.name.is_some() || self.reduction.is_some();
+        let settings = self.name.is_some() || self.reduction.is_some() || self.duration.is_some();
         if settings || !self.values.is_empty() || !self.settings.is_empty() {
             return Err(Error::new(
                 module.span(),
@@ -208,6 +224,7 @@ enum Entry {
     Values(Values),
     Settings(Vec<Setting>),
     Reduction(Reduction),
+    Duration(Duration),
 }
 
 impl Parse for Entry {
@@ -247,6 +264,9 @@ impl Parse for Entry {
         input.parse::<Token![=]>()?;
         if names.len() == 1 && names[0] == "name" {
             return Ok(Self::Name(span, input.parse()?));
+        }
+        if names.len() == 1 && names[0] == "duration" {
+            return Ok(Self::Duration(Duration::read(span, &input.parse()?)));
         }
         let rows = rows(&input.parse()?, names.len())?;
         if rows.is_empty() {

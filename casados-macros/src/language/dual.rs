@@ -98,6 +98,10 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
         let message = "a dual model has no graph that could be differentiated in time: write it with `f64`";
         return Err(Error::new(reduction.span, message));
     }
+    if let Some(duration) = &arguments.duration {
+        let message = "a dual model has no graph whose time could be scaled: write it with `f64`";
+        return Err(Error::new(duration.span, message));
+    }
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();

@@ -11,6 +11,7 @@ mod closure;
 mod coercion;
 mod division;
 pub mod dual;
+mod duration;
 mod environment;
 mod evaluator;
 mod expression;
@@ -131,6 +132,8 @@ pub struct Model {
     pub samplings: Vec<Sampling>,
     /// How its index is reduced, if the attribute asks for that.
     pub reduction: Option<Reduction>,
+    /// Which parameter time is a multiple of, if one is.
+    pub duration: Option<u32>,
     /// The expressions.
     pub graph: Graph,
     /// `f`, one node per equation.
@@ -278,6 +281,9 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
         let mut model = template.model(instance)?;
         model.samplings = arguments.samplings(&model.variables)?;
         model.reduction.clone_from(&arguments.reduction);
+        if let Some(duration) = &arguments.duration {
+            duration.scale(&mut model, template.form == Form::Function)?;
+        }
         Ok(model)
     };
     instances.into_iter().map(model).collect()

@@ -80,6 +80,7 @@ impl Template<'_> {
             units,
             samplings: Vec::new(),
             reduction: None,
+            duration: None,
             graph: evaluator.graph,
             residual,
             spans,

@@ -141,6 +141,10 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             ),
         ));
     };
+    // The other state of a function of two.
+    if form == Form::Function && identifier.ident.to_string().trim_start_matches('_') == "x0" {
+        return Ok(Role::Z);
+    }
     match (Role::of(&identifier.ident), form) {
         (Some(Role::Xdot), Form::Ode) => Err(Error::new_spanned(
             &identifier.ident,

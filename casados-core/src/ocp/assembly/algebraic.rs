@@ -11,13 +11,14 @@
 //! the dynamics.
 
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::functions::point::Cross;
-use crate::ocp::formulation::functions::point::{Terms, read};
-use crate::ocp::formulation::instance::data::{Node, inputs, is_algebraic, kept, sizes, split};
+use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::instance::data::{Layout, Node, inputs, is_algebraic, kept, sizes, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
@@ -27,15 +28,24 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// Keeps what an interval says about the algebraic states at its start.
-pub(in crate::ocp) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &IntervalResult<'_, T>) {
-    let [n, nz] = sizes::<S>();
+pub(in crate::ocp) fn keep<S: Shape, T: Real>(
+    all: &mut [T],
+    free: Free<'_>,
+    k: usize,
+    step: &IntervalResult<'_, T>,
+) {
+    let [n, nz] = sizes::<S>(free.count());
     if nz == 0 {
         return;
     }
-    let (z, rows) = part_mut(all, k * kept::<S>(), kept::<S>()).split_at_mut_checked(nz).unwrap_or_default();
+    let (z, rows) =
+        part_mut(all, k * (nz + nz * n), nz + nz * n).split_at_mut_checked(nz).unwrap_or_default();
     crate::qp::assign(z, step.z);
-    let [dx, du, _] = step.dz;
-    for (j, column) in dx.chunks_exact(nz).chain(du.chunks_exact(nz)).enumerate() {
+    let [dx, du, dp] = step.dz;
+    let of_free = free.columns(dp, nz).map(|(w, column)| (S::NX + w, column));
+    let of_states = dx.chunks_exact(nz).enumerate();
+    let of_controls = (S::NX + free.count()..).zip(du.chunks_exact(nz));
+    for (j, column) in of_states.chain(of_controls).chain(of_free) {
         for (i, &value) in column.iter().enumerate() {
             if let Some(element) = rows.get_mut(i * n + j) {
                 *element = value;
@@ -45,8 +55,9 @@ pub(in crate::ocp) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &In
 }
 
 /// What was kept of a stage: nothing of the last one.
-pub(in crate::ocp) fn at<S: Shape, T>(all: &[T], k: usize) -> (&[T], &[T]) {
-    part(all, k * kept::<S>(), kept::<S>()).split_at_checked(S::NZ).unwrap_or_default()
+pub(in crate::ocp) fn at<S: Shape, T>(all: &[T], layout: Layout, k: usize) -> (&[T], &[T]) {
+    let kept = kept::<S>(layout.free);
+    part(all, k * kept, kept).split_at_checked(S::NZ).unwrap_or_default()
 }
 
 /// Derivatives of a stage over `(x, u, z)`.
@@ -58,13 +69,13 @@ pub(in crate::ocp) struct Extended<'a, T> {
 
 impl<'a, T: Real> Extended<'a, T> {
     /// Zeros; nothing if there are no algebraic states.
-    pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T]) -> Self {
+    pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T], free: Free<'a>) -> Self {
         memory.fill(T::ZERO);
-        let [n, nz] = sizes::<S>();
+        let [n, nz] = sizes::<S>(free.count());
         let ld = n + nz;
         let (gradient, rest) = memory.split_at_mut_checked(ld).unwrap_or_default();
         let (hessian, columns) = rest.split_at_mut_checked(ld * ld).unwrap_or_default();
-        Self { terms: Terms { gradient, hessian, ld }, columns }
+        Self { terms: Terms { free, gradient, hessian, ld }, columns }
     }
 
     /// An element of the symmetric Hessian.
@@ -81,7 +92,7 @@ impl<'a, T: Real> Extended<'a, T> {
         columns: &mut [T],
         ld: usize,
     ) {
-        let [n, _] = sizes::<S>();
+        let [n, _] = sizes::<S>(self.terms.free.count());
         let rows = || dz.chunks_exact(n.max(1)).enumerate();
         // `a_j + Σ_i a_zi ∂z_i/∂v_j`
         let total = |a: &dyn Fn(usize) -> T, j: usize| {
@@ -114,7 +125,7 @@ impl<'a, T: Real> Extended<'a, T> {
         to: &mut Cross<'_, T>,
         slopes: &mut [T],
     ) {
-        let [n, nz] = sizes::<S>();
+        let [n, nz] = sizes::<S>(self.terms.free.count());
         let parameters = || direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate();
         for (p, (direct, dp)) in parameters() {
             let through = |i: usize| {
@@ -154,25 +165,27 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if const { !is_algebraic::<P, T>() } {
             return Ok(());
         }
-        let intervals = self.intervals();
-        let (n, nz) = (inputs::<P::Shape>(), P::Shape::NZ);
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout @ Layout { intervals, free } = self.layout();
+        let (n, nz) = (inputs::<P::Shape>(free), P::Shape::NZ);
+        let free = self.free.view();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let nodes = Nodes { step_length: self.step_length, ..nodes };
         if !core::mem::take(&mut self.has_algebraic) {
-            dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
+            dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, free, k, step))?;
         }
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [stage.x, z, stage.u, node.p], node.time);
-            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
-            let place = At { stage: k, factor: node.factor, exact: false, from: &[] };
+            let (z, _) = at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &stage, z, free);
+            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
+            let factor = if *running { free.duration(stage.u) * node.factor } else { node.factor };
+            let place = At { stage: k, factor, exact: false, from: &[] };
             stage_cost.add(&point, node.reference, place, &mut terms)?;
-            path.linearise(&point, &mut [], columns, terms.ld, k)?;
+            path.linearise(&point, &mut [], columns, terms.ld, Spot::new(k, free, &[]))?;
             for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
                 *nu = get(terms.gradient, n + j);
                 let mu = stage.g_upper.iter().zip(stage.g_lower);

@@ -4,14 +4,16 @@ use crate::linalg::dot;
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::assembly::start::link_start;
 use crate::ocp::assembly::transfer::Left;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
-use crate::ocp::formulation::functions::point::{Terms, read};
-use crate::ocp::formulation::instance::data::{Node, inputs, split};
+use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::instance::data::{Layout, Node, inputs, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
@@ -36,9 +38,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         watch: Sink<'_, T>,
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
-        let mut left = Left { plain: !C::EXACT, adding: false };
-        let sums = self.linearise_intervals(curvature, |k, step, stage, at| {
-            left.transfer::<P, T>(step, stage, at);
+        let is_free_cost = self.free.view().end().is_some() && self.problem.parts().running;
+        let mut left = Left { plain: !C::EXACT && !is_free_cost, adding: false };
+        let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
+            left.transfer::<P, T>(step, free, stage, at);
             watch(k, step);
         })?;
         let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
@@ -58,44 +61,48 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut to: impl FnMut(usize, &IntervalResult<'_, T>, Arrays<'_, T>, &[T]),
+        mut to: impl FnMut(usize, &IntervalResult<'_, T>, (Arrays<'_, T>, Free<'_>), &[T]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
-        let (intervals, ld) = (self.intervals(), ld_of::<P::Shape, T>());
-        let Self { problem, qp, iterate, data, step_length, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let layout = self.layout();
+        let ld = ld_of::<P::Shape, T>(layout);
+        let Self { problem, qp, iterate, data, step_length, free, .. } = self;
+        let free = free.view();
+        let data = split::<P, T>(data.as_mut(), layout);
         let (v, multipliers) = iterate.vectors();
         let weights = if C::EXACT { &*data.weights } else { &[] };
-        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, (data.p, free), data.times);
         let nodes = Nodes { step_length: *step_length, ..nodes };
         let mut stages = qp.stages_mut();
         let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
         let Problem { dynamics, .. } = problem.parts();
         curvature.run(dynamics, &nodes, &mut |k, step: &IntervalResult<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
-            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
                 left = add_stages(left, step.stages);
             }
-            to(k, step, stage.arrays(), part(v, k * ld, ld));
+            to(k, step, (stage.arrays(), free), part(v, k * ld, ld));
         })?;
         Ok((objective, left))
     }
 
     /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
     pub(in crate::ocp) fn add_arrival(&mut self, at_iterate: bool) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let x0 = self.iterate.stages().next().filter(|_| at_iterate).map_or(&[][..], |first| first.x);
         arrival::add(data.arrival, x0, &mut self.qp);
     }
 
     /// The objective at the iterate, of intervals and `costs` at nodes.
     pub(in crate::ocp) fn keep_sums(&mut self, (objective, stages): Sums<T>, costs: T) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         self.objective = objective + costs + arrival::cost(data.arrival, &self.iterate);
         self.stages = stages;
     }
@@ -107,9 +114,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         plain: bool,
         begin: impl Fn(usize, &mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let Self { problem, qp, iterate, data, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let Self { problem, qp, iterate, data, free, .. } = self;
+        let free = free.view();
+        let data = split::<P, T>(data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
         let (v, _) = iterate.vectors();
         let mut objective = T::ZERO;
@@ -118,15 +126,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
             begin(k, hessian, gradient);
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
-            let mut direct = Terms { gradient, hessian, ld };
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
+            let mut direct = Terms { free, gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
             let from = if plain && is_direct::<P, T>(k == intervals, z) { here } else { &[] };
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
-            let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
+            let mut room =
+                Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] }, free);
             let (terms, slopes, ld_slopes) = if is_extended {
                 let ld = room.terms.ld;
                 (&mut room.terms, &mut *room.columns, ld)
@@ -136,31 +145,49 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // Values lie where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
-            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let count = if k < intervals { path_rows::<P, T>() } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
-            let place = At { stage: k, factor: node.factor, exact: C::EXACT, from };
+            // Of a running cost the end time is a factor.
+            let w = free.end().filter(|_| *running && k < intervals);
+            let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
+            let factor = duration * node.factor;
+            let place = At { stage: k, factor, exact: C::EXACT, from };
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
             let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
                 *mu = upper - lower;
             }
             if k < intervals {
-                objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
-                path.linearise(&point, values, slopes, ld_slopes, k)?;
+                let cost = if let Some(w) = w {
+                    let before = part_mut(data.scratch, 0, terms.gradient.len());
+                    assign(before, terms.gradient);
+                    let cost = stage_cost.add(&point, node.reference, place, terms)?;
+                    terms.add_duration(w + P::Shape::NX, [cost, duration], before, C::EXACT);
+                    cost
+                } else {
+                    stage_cost.add(&point, node.reference, place, terms)?
+                };
+                objective = objective + cost;
+                path.linearise(&point, values, slopes, ld_slopes, spot)?;
                 if !mu.is_empty() {
-                    path.curve(&point, mu, terms);
+                    path.curve(&point, mu, spot, terms);
                 }
             } else {
                 objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
-                terminal.linearise(&point, values, slopes, ld_slopes, k)?;
+                terminal.linearise(&point, values, slopes, ld_slopes, spot)?;
                 if !mu.is_empty() {
-                    terminal.curve(&point, mu, terms);
+                    terminal.curve(&point, mu, spot, terms);
                 }
             }
             if is_extended {
                 room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
             }
-            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, k * P::Path::ROWS, count));
+            if k < intervals {
+                link_start::<P, T>(&at, k, (values, columns, ld));
+            }
+            let given =
+                [&*data.lower, &*data.upper].map(|limits| part(limits, k * path_rows::<P, T>(), count));
             shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
         }
         Ok(objective)
@@ -169,13 +196,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
     /// complete.
     fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, plain: bool) {
-        let intervals = self.intervals();
+        let layout @ Layout { intervals, .. } = self.layout();
         let Self { qp, iterate, data, .. } = self;
-        let data = split::<P, T>(data.as_mut(), intervals);
+        let data = split::<P, T>(data.as_mut(), layout);
         let (v, _) = iterate.vectors();
-        let ld = ld_of::<P::Shape, T>();
+        let ld = ld_of::<P::Shape, T>(layout);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             if plain && is_direct::<P, T>(k == intervals, z) {
                 continue;
             }
@@ -226,7 +253,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// objective with penalties of soft bounds; after [`Ocp::linearise`].
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let (mut residuals, penalties) =
             crate::ocp::assembly::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
         if P::Dynamics::LIFTED {
@@ -243,34 +271,39 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let nx = P::Shape::NX;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let (nx, free) = (P::Shape::NX, self.free.view());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
         let (v, multipliers) = at.vectors();
         let mut objective = arrival::cost(data.arrival, at);
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let (nodes, mut of_stages) = (Nodes { step_length: self.step_length, ..nodes }, [T::ZERO; 2]);
         dynamics.simulate(&nodes, &mut |k, step: &IntervalResult<'_, T>| {
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
                 of_stages = add_stages(of_stages, step.stages);
             }
-            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
+            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
             assign(part_mut(ends, k * nx, nx), step.x);
         })?;
         let values = ends.get_mut(intervals * nx..).unwrap_or_default();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in at.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             if k < intervals {
-                objective = objective + node.factor * stage_cost.value(&point, node.reference, k)?;
-                path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
+                let factor = if *running { free.duration(at.u) * node.factor } else { node.factor };
+                objective = objective + factor * stage_cost.value(&point, node.reference, k)?;
+                let rows = path_rows::<P, T>();
+                let values = part_mut(values, k * rows, rows);
+                path.value(&point, values, spot)?;
+                link_start::<P, T>(&at, k, (values, &mut [], 0));
             } else {
                 objective = objective + terminal_cost.value(&point, node.reference, k)?;
-                terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
+                terminal.value(&point, part_mut(values, k * path_rows::<P, T>(), P::Terminal::ROWS), spot)?;
             }
         }
         self.stages = of_stages;
@@ -284,20 +317,20 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Rows of the path constraints.
     pub(in crate::ocp) fn rows(&self) -> usize {
-        P::Path::ROWS
+        path_rows::<P, T>()
     }
 
     /// Constants of the linearised dynamics and constraints such that these are exact at some
     /// point, whose `ends` are given: what a second-order correction solves.
     pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
-        let intervals = self.intervals();
-        let (nx, path) = (P::Shape::NX, P::Path::ROWS);
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let (nx, path) = (P::Shape::NX, path_rows::<P, T>());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let (v, _) = at.vectors();
         let values = ends.get(intervals * nx..).unwrap_or_default();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
             let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
             let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
             for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
                 *offset = x - dot(column, here);
@@ -340,10 +373,10 @@ fn shift_limits<T: Real>(
 
 /// How many numbers `φ` of every interval and `g` of every stage are.
 pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
-    dims.len().saturating_sub(1) * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
+    dims.len().saturating_sub(1) * (P::Shape::NX + path_rows::<P, T>()) + P::Terminal::ROWS
 }
 
 /// The distance of stages in vectors `v`.
-const fn ld_of<S: Shape, T>() -> usize {
-    pad::<T>(inputs::<S>())
+const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
+    pad::<T>(inputs::<S>(layout.free))
 }

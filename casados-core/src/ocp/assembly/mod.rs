@@ -8,5 +8,6 @@ pub(in crate::ocp) mod kkt;
 pub(in crate::ocp) mod linearise;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod program;
+pub(in crate::ocp) mod start;
 pub(in crate::ocp) mod transfer;
 pub(in crate::ocp) mod units;

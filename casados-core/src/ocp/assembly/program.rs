@@ -5,18 +5,17 @@ use crate::ocp::assembly::algebraic;
 #[cfg(feature = "casadi")]
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 #[cfg(feature = "casadi")]
 use crate::ocp::formulation::functions::dynamics::Sink;
 #[cfg(feature = "casadi")]
 use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::functions::point::read;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::{Node, split};
+use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 #[cfg(feature = "casadi")]
 use crate::qp::Arrays;
-use crate::qp::{StageDims, part_mut};
+use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -39,14 +38,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             clear(k, hessian);
             gradient.fill(T::ZERO);
         }
-        let sums =
-            self.linearise_intervals(curvature, |k, step, Arrays { ld, hessian, gradient, .. }, _| {
+        let sums = self.linearise_intervals(
+            curvature,
+            |k, step, (Arrays { ld, hessian, gradient, .. }, free), _| {
                 watch(k, step);
                 // The Hessian of what is integrated along is in that of the interval.
                 let (mut terms, slopes) =
-                    (Terms { gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
+                    (Terms { free, gradient, hessian, ld }, step.cost.x.iter().chain(step.cost.u));
                 slopes.enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
-            })?;
+            },
+        )?;
         let costs = self.linearise_functions::<C>(false, |_, _, _| {})?;
         self.add_arrival(true);
         self.keep_sums(sums, costs);
@@ -59,19 +60,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     pub(crate) fn constraints(&mut self, values: &mut [T]) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout @ Layout { intervals, .. } = self.layout();
+        let free = self.free.view();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { path, terminal, running, .. } = self.problem.parts();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
-            let values = values.get_mut(k * P::Path::ROWS..).unwrap_or_default();
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
+            let values = values.get_mut(k * path_rows::<P, T>()..).unwrap_or_default();
+            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             if k < intervals {
-                path.value(&point, part_mut(values, 0, P::Path::ROWS), k)?;
+                path.value(&point, part_mut(values, 0, P::Path::ROWS), spot)?;
             } else {
-                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), k)?;
+                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), spot)?;
             }
         }
         Ok(self.objective)

@@ -1,8 +1,12 @@
 //! The linearised dynamics of an interval, in the layout of the QP.
 
+use crate::linalg::dot;
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::instance::data::inputs;
 use crate::ocp::formulation::functions::dynamics::{IntegralTerms, IntervalResult};
 use crate::ocp::formulation::functions::point::{Terms, add_blocks};
 use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::set;
 use crate::qp::{Arrays, part, part_mut, splat};
 use crate::scalar::{Packed, Real, Registers, compiled};
 use crate::shape::Shape;
@@ -112,23 +116,55 @@ impl Left {
     pub fn transfer<P: Formulation<T>, T: Real>(
         &mut self,
         step: &IntervalResult<'_, T>,
+        free: Free<'_>,
         Arrays { ld, matrix, hessian, gradient, offset, .. }: Arrays<'_, T>,
         point: &[T],
     ) {
         let nx = P::Shape::NX;
-        Transfer { columns: [step.dx, step.du], next: step.x, point, matrix, ld, offset }.run();
-        let IntegralTerms { x, u, hessian: blocks, .. } = step.cost;
+        if free.count() > 0 {
+            let n = inputs::<P::Shape>(free.count());
+            transfer_with_free(step, free, (matrix, ld), offset, part(point, 0, n));
+        } else {
+            Transfer { columns: [step.dx, step.du], next: step.x, point, matrix, ld, offset }.run();
+        }
+        let IntegralTerms { x, u, p, hessian: blocks, hessian_p: blocks_p, .. } = step.cost;
         self.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
         if self.plain && x.is_empty() && u.is_empty() {
             return;
         }
         self.adding = true;
-        let mut terms = Terms { gradient, hessian, ld };
+        let mut terms = Terms { free, gradient, hessian, ld };
         terms.hessian.fill(T::ZERO);
         terms.gradient.fill(T::ZERO);
-        x.iter().chain(u).enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
-        add_blocks(&mut terms, nx, blocks);
-        add_blocks(&mut terms, nx, step.hessian);
+        x.iter().enumerate().for_each(|(i, &slope)| terms.slope(i, slope));
+        (nx + free.count()..).zip(u).for_each(|(i, &slope)| terms.slope(i, slope));
+        free.elements(p).for_each(|(w, slope)| terms.slope(nx + w, slope));
+        add_blocks(&mut terms, nx, blocks, blocks_p);
+        add_blocks(&mut terms, nx, step.hessian, step.hessian_p);
+    }
+}
+
+/// As [`Transfer`], with the derivatives by free parameters between those by states and controls.
+fn transfer_with_free<T: Real>(
+    step: &IntervalResult<'_, T>,
+    free: Free<'_>,
+    (matrix, ld): (&mut [T], usize),
+    offset: &mut [T],
+    point: &[T],
+) {
+    let nx = step.x.len();
+    matrix.get_mut(..nx * ld).unwrap_or_default().fill(T::ZERO);
+    let states = step.dx.chunks_exact(nx.max(1)).enumerate();
+    let controls = (nx + free.count()..).zip(step.du.chunks_exact(nx.max(1)));
+    let parameters = free.columns(step.dp, nx).map(|(w, column)| (nx + w, column));
+    for (j, column) in states.chain(controls).chain(parameters) {
+        for (i, &value) in column.iter().enumerate() {
+            set(matrix, i * ld + j, value);
+        }
+    }
+    let columns = matrix.chunks_exact(ld.max(1));
+    for ((offset, &x), column) in offset.iter_mut().zip(step.x).zip(columns) {
+        *offset = x - dot(column, point);
     }
 }
 

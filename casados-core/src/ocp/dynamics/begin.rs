@@ -17,7 +17,7 @@ pub(in crate::ocp) trait Begin<T> {
 impl<T: Real, I: Integrator<Number = T>> Begin<T> for I {
     fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error> {
         if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
-            self.set_parameters(&vector(interval.p))?;
+            self.set_parameters(&interval.parameters())?;
         }
         self.set_time(interval.t)
     }

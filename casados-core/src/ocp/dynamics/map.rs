@@ -2,11 +2,12 @@
 
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector,
 };
 use crate::ocp::formulation::functions::pattern::Origin;
-use crate::ocp::formulation::functions::point::{finite_outputs, parameter, position, read};
+use crate::ocp::formulation::functions::point::{finite_outputs, parameter, read};
 use crate::ocp::formulation::names::Names;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
@@ -69,7 +70,8 @@ impl<F: Function, T: Real> Map<F, T> {
     fn run(&mut self, nodes: &Nodes<'_, T>, second: bool, sink: Sink<'_, T>) -> Result<(), OcpError> {
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for (k, interval) in nodes.iter().enumerate() {
-            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
+            let p: <F::Shape as Shape>::VectorP<T> = interval.parameters();
+            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, p.as_slice()], interval.t);
             F::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
             finite_outputs::<F, T>(&self.y, k)?;
             self.x = vector(self.y.as_ref());
@@ -94,7 +96,8 @@ impl<F: Function, T: Real> Map<F, T> {
                     if let (Some(p), Some(q)) = (parameter::<F::Shape>(row), parameter::<F::Shape>(column)) {
                         (self.h_pp[(p, q)], self.h_pp[(q, p)]) = (value, value);
                     }
-                    let here = |variable| position::<F::Shape>(variable).filter(|&i| i < nx + nu);
+                    let here =
+                        |variable| Free::default().position::<F::Shape>(variable).filter(|&i| i < nx + nu);
                     let Some(column) = here(column) else { continue };
                     if let Some(p) = parameter::<F::Shape>(row) {
                         match column.checked_sub(nx) {
@@ -143,13 +146,16 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
             u: structure.u,
             p: structure.p,
             units: F::UNITS,
+            duration: None,
         }
     };
+    const IS_FLOW: bool = false;
     const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         for (k, interval) in nodes.iter().enumerate() {
-            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
+            let p: <F::Shape as Shape>::VectorP<T> = interval.parameters();
+            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, p.as_slice()], interval.t);
             F::value::<T>(&self.v, &mut self.y);
             finite_outputs::<F, T>(&self.y, k)?;
             sink(k, &IntervalResult { x: self.y.as_ref(), ..IntervalResult::default() });

@@ -115,6 +115,8 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
 impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for ReturnMap<G, D, T> {
     type Shape = D::Shape;
     const NAMES: Names = D::NAMES;
+    const INTEGRAL: bool = D::INTEGRAL;
+    const IS_FLOW: bool = false;
     const ALGEBRAIC: bool = {
         assert!(!D::LIFTED, "a return map needs shooting: ends of collocated intervals are variables");
         D::ALGEBRAIC

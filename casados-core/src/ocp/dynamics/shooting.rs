@@ -113,7 +113,8 @@ impl<I: Single> Shooting<I> {
             same &= put(&mut self.x, k, vector(interval.x), |x| x.as_slice() == interval.x);
             same &= put(&mut self.u, k, vector(interval.u), |u| u.as_slice() == interval.u);
             if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
-                same &= put(&mut self.p, k, vector(interval.p), |p| p.as_slice() == interval.p);
+                let p: VectorP<I::Model, I::Number> = interval.parameters();
+                same &= put(&mut self.p, k, p, |old| *old == p);
             }
             same &= put(&mut self.h, k, interval.h, |&h| h == interval.h);
             same &= put(&mut self.t, k, interval.t, |&t| t == interval.t);

@@ -31,6 +31,7 @@ pub(in crate::ocp) const fn names<M: Dae>() -> Names {
         u: structure.u,
         p: structure.p,
         units: M::UNITS,
+        duration: M::DURATION,
     }
 }
 
@@ -212,6 +213,7 @@ macro_rules! single {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
             const ALGEBRAIC: bool = true;
+            const INTEGRAL: bool = true;
 
             fn check(&self) -> Result<(), OcpError> {
                 self.integral.check()

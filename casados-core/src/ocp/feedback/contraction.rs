@@ -282,8 +282,8 @@ fn energy<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsM
     ocp: &mut Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,
 ) -> f64 {
-    let intervals = ocp.intervals();
-    let data = split::<P, T>(ocp.data.as_mut(), intervals);
+    let layout = ocp.layout();
+    let data = split::<P, T>(ocp.data.as_mut(), layout);
     let ((from, _), (to, _)) = (ocp.iterate.vectors(), solution.vectors());
     let (mut energy, mut begin) = (T::ZERO, 0);
     for stage in ocp.qp.view().stages() {

@@ -166,7 +166,7 @@ where
     ) -> (&'a [T], Result<Feedback<'a, T>, OcpError>) {
         let result = self.controller.iterate(x0, over);
         let controller = &*self.controller;
-        let plan = controller.ocp.iterate.stages().next().map_or(&[][..], |first| first.u);
+        let plan = controller.ocp.stage(0).map_or(&[][..], |first| first.u);
         match (result, fallback) {
             (Ok(step), _) => (plan, Ok(step.feedback(plan, 1))),
             (Err(error), Fallback::Plan) => (plan, Err(error)),

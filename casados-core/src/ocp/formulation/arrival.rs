@@ -62,8 +62,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let states = place.map(|state| x.get(state).copied().unwrap_or_default());
             OcpError::InvalidArrivalWeight { states, value, allowed }
         })?;
-        let intervals = self.intervals();
-        let arrival = split::<P, T>(self.data.as_mut(), intervals).arrival;
+        let layout = self.layout();
+        let arrival = split::<P, T>(self.data.as_mut(), layout).arrival;
         crate::qp::assign(arrival, mean);
         crate::qp::assign(arrival.get_mut(nx..).unwrap_or_default(), weight);
         Ok(self)
@@ -73,7 +73,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Whether the first state has a cost of its own, by which all of its elements may be coupled.
     pub(crate) fn has_arrival_cost(&self) -> bool {
-        let weights = arrival_weights::<P, T>(self.data.as_ref(), self.intervals());
+        let weights = arrival_weights::<P, T>(self.data.as_ref(), self.layout());
         weights.iter().any(|&weight| weight != T::ZERO)
     }
 }

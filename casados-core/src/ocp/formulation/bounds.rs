@@ -5,7 +5,7 @@ use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
@@ -19,9 +19,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Bounds of a general constraint of a stage, as they were given.
     pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
         let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let rows = intervals * path_rows::<P, T>() + P::Terminal::ROWS;
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_rows::<P, T>() + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 
@@ -31,8 +31,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         <P::Dynamics as Dynamics<T>>::NAMES
     }
 
-    /// Where a name means states, and where it means controls: a part is left out of which it means
-    /// nothing.
+    /// Where a name means states, controls and free parameters: a part is left out of which it
+    /// means nothing.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
@@ -40,7 +40,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         &self,
         name: &str,
         stages: &impl RangeBounds<usize>,
-    ) -> Result<[Range<usize>; 2], OcpError> {
+    ) -> Result<[Range<usize>; 3], OcpError> {
         let known = self.names();
         let find = |part, names: &[&str], count| match names.iter().any(|variable| means(name, variable)) {
             true => range(part, stages, count),
@@ -48,33 +48,46 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
         let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
-        if of_states.is_empty() && of_controls.is_empty() {
+        // They are the same at all stages.
+        let is_free =
+            known.p.iter().enumerate().any(|(p, name_of_p)| self.is_meant_and_free(name, p, name_of_p));
+        if of_states.is_empty() && of_controls.is_empty() && !is_free {
             let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
             return Err(OcpError::UnknownName { name: Text::new(name), known });
         }
-        Ok([of_states, of_controls])
+        Ok([of_states, of_controls, 0..usize::from(is_free)])
+    }
+
+    fn is_meant_and_free(&self, name: &str, parameter: usize, name_of_it: &str) -> bool {
+        means(name, name_of_it) && self.free.view().of(parameter).is_some()
     }
 
     /// Does something to the bounds of every variable that a name means.
     pub(in crate::ocp) fn each(
         &mut self,
         name: &str,
-        [of_states, of_controls]: [Range<usize>; 2],
+        [of_states, of_controls, of_free]: [Range<usize>; 3],
         mut visit: impl FnMut(&mut BoundsMut<'_, T>, usize),
     ) {
         let known = self.names();
         // Of a state that is given there is nothing to be bounded.
         let first = usize::from(self.initial == Initial::Fixed);
+        let free = self.free.view();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
-            let mut visit_all = |bounds: &mut BoundsMut<'_, T>, names: &[&str]| {
+            let mut visit_all = |bounds: &mut BoundsMut<'_, T>, names: &[&str], begin: usize| {
                 let variables = names.iter().enumerate().filter(|(_, variable)| means(name, variable));
-                variables.for_each(|(index, _)| visit(bounds, index));
+                variables.for_each(|(index, _)| visit(bounds, begin + index));
             };
             if k >= first && of_states.contains(&k) {
-                visit_all(&mut stage.x_bounds_mut(), known.x);
+                visit_all(&mut stage.x_bounds_mut(), known.x, 0);
             }
             if of_controls.contains(&k) {
-                visit_all(&mut stage.u_bounds_mut(), known.u);
+                visit_all(&mut stage.u_bounds_mut(), known.u, free.count());
+            }
+            if of_free.contains(&k) {
+                let meant = known.p.iter().enumerate().filter(|(_, variable)| means(name, variable));
+                let meant = meant.filter_map(|(parameter, _)| free.of(parameter));
+                meant.for_each(|w| visit(&mut stage.u_bounds_mut(), w));
             }
         }
     }
@@ -83,15 +96,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
         let known = self.names();
         let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
-        match position(known.x) {
-            Some(index) => (Labels::states::<P, T>(Part::StateBounds, stage), index),
-            None => (Labels::controls::<P, T>(Part::ControlBounds, stage), position(known.u).unwrap_or(0)),
+        match [known.x, known.u, known.p].map(position) {
+            [Some(index), ..] => (Labels::states::<P, T>(Part::StateBounds, stage), index),
+            [_, Some(index), _] => (Labels::controls::<P, T>(Part::ControlBounds, stage), index),
+            [.., index] => (Labels::parameters::<P, T>(Part::ParameterBounds, 0), index.unwrap_or(0)),
         }
     }
 
-    /// Bounds of a state or control, or of all of them that a name means (`u` means `u[0]`, `u[1]`,
-    /// …), at some stages: `..` are all of them, the last one has no controls. An infinite bound is
-    /// none. While the initial state is fixed, bounds of states do not touch stage 0.
+    /// Bounds of a state, control or free parameter, or of all of them that a name means (`u` means
+    /// `u[0]`, `u[1]`, …), at some stages: `..` are all of them, the last one has no controls, and
+    /// free parameters are the same at all of them. An infinite bound is none. While the initial
+    /// state is fixed, bounds of states do not touch stage 0.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
@@ -148,12 +163,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
             labels.check_bounds(index, lower, upper)?;
         }
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
-                crate::qp::assign(crate::qp::part_mut(bounds, k * P::Path::ROWS, rows), given);
+                crate::qp::assign(crate::qp::part_mut(bounds, k * path_rows::<P, T>(), rows), given);
             }
         }
         Ok(self)
@@ -184,7 +199,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self
     }
 
-    /// The times of the nodes.
+    /// The times of the nodes; where the end of the horizon is free, as parts of the whole.
     #[must_use]
     pub fn times(&self) -> &[T] {
         crate::qp::part(self.data.as_ref(), 0, self.intervals() + 1)
@@ -202,8 +217,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<&mut Self, OcpError> {
         let intervals = self.intervals();
         let range = range(Part::Parameters, &stages, intervals + 1)?;
-        Labels::parameters::<P, T>(range.start).check_vector(p, P::Shape::NP)?;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        Labels::parameters::<P, T>(Part::Parameters, range.start).check_vector(p, P::Shape::NP)?;
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         for k in range {
             crate::qp::assign(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
         }
@@ -223,7 +239,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
         let range = range(Part::Reference, &stages, intervals)?;
         Labels::references::<P, T>(Part::Reference, range.start).check_vector(reference, length)?;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         for k in range {
             crate::qp::assign(crate::qp::part_mut(data.references, k * length, length), reference);
         }
@@ -259,7 +276,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         mut write: impl FnMut(usize, T, &mut [T]),
     ) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         for (k, &mut time) in data.times.iter_mut().enumerate().take(intervals) {
             let reference = crate::qp::part_mut(data.references, k * length, length);
             reference.fill(T::ZERO);
@@ -276,7 +294,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn set_terminal_reference(&mut self, reference: &[T]) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::TerminalCost::REFERENCES);
         Labels::references::<P, T>(Part::TerminalReference, intervals).check_vector(reference, length)?;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let begin = intervals * P::StageCost::REFERENCES;
         crate::qp::assign(crate::qp::part_mut(data.references, begin, length), reference);
         Ok(self)
@@ -289,9 +308,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
         let (part, (name, output)) = match field {
             QpField::StateBounds => (Part::StateBounds, (of(names.x), 0)),
-            QpField::ControlBounds => (Part::ControlBounds, (of(names.u), 0)),
+            QpField::ControlBounds => match index.checked_sub(self.free.count()) {
+                Some(u) => (Part::ControlBounds, (names.u.get(u).copied().unwrap_or(""), 0)),
+                None => (Part::ParameterBounds, (self.name_of_free(index), 0)),
+            },
             _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
-            _ => (Part::PathBounds, P::Path::name(index)),
+            _ => match index.checked_sub(P::Path::ROWS) {
+                Some(copy) => (Part::StateBounds, (self.name_of_free(copy), 0)),
+                None => (Part::PathBounds, P::Path::name(index)),
+            },
         };
         ConstraintName { part, stage, name, output, side }
     }
@@ -316,30 +341,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let Err(QpError::InvalidValue { field, stage, index, value }) = check(self.qp()) else { return None };
         let known = self.names();
-        let (nx, nu) = (known.x.len(), known.u.len());
+        let (nx, nu) = (known.x.len(), self.free.count() + known.u.len());
+        let input = |index: usize| match index.checked_sub(self.free.count()) {
+            Some(u) => known.u.get(u).copied().unwrap_or(""),
+            None => self.name_of_free(index),
+        };
+        let state = |index: usize| known.x.get(index).copied().unwrap_or("");
         let rows = match field {
             QpField::A | QpField::B | QpField::Q => nx,
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
-            QpField::C | QpField::D => P::Path::ROWS,
+            QpField::C | QpField::D => path_rows::<P, T>(),
             QpField::R | QpField::S => nu,
             QpField::GradientX | QpField::GradientU => 1,
             _ => return None,
         };
         let (row, column) = (index.checked_rem(rows)?, index.checked_div(rows)?);
-        let (list, by) = match field {
-            QpField::A | QpField::Q => (known.x, known.x),
-            QpField::B => (known.x, known.u),
-            QpField::R => (known.u, known.u),
-            QpField::S => (known.u, known.x),
-            QpField::C | QpField::GradientX => (&[][..], known.x),
-            _ => (&[][..], known.u),
+        let by = match field {
+            QpField::A | QpField::Q | QpField::S | QpField::C | QpField::GradientX => state(column),
+            _ => input(column),
         };
         let (of, output) = match field {
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::name(row),
             QpField::C | QpField::D => P::Path::name(row),
-            _ => (list.get(row).copied().unwrap_or(""), 0),
+            QpField::A | QpField::B | QpField::Q => (state(row), 0),
+            QpField::R | QpField::S => (input(row), 0),
+            _ => ("", 0),
         };
-        let by = by.get(column).copied().unwrap_or("");
         Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value })
     }
 }

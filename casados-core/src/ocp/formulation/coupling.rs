@@ -49,9 +49,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }
 
-    /// Makes controls the same at all stages, `u_k = u₀`: one, or all that a name means. These are
-    /// parameters that are found, among them the length of the horizon: `dx/dτ = T f(x, u)` over
-    /// `τ ∈ [0, 1]`, with `T` a control of the model that is shared.
+    /// Makes controls the same at all stages, `u_k = u₀`: one, or all that a name means. Parameters
+    /// of the model are found by `HeapOcp::free`, end times with
+    /// [`Horizon::free`](crate::ocp::Horizon::free).
     ///
     /// Their guess is that of stage 0. A bound at one stage is a bound of all: one at stage 0 is
     /// enough. What is a rate adds up to the value itself over a horizon of length one:
@@ -88,9 +88,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     pub fn shared(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
-        let mut found = false;
+        let (mut found, free) = (false, self.free.count());
         for (j, _) in known.u.iter().enumerate().filter(|(_, control)| means(name, control)) {
-            found |= self.qp.share(j);
+            found |= self.qp.share(free + j);
         }
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }

@@ -43,6 +43,8 @@ pub enum Part {
     Multipliers,
     /// Parameters.
     Parameters,
+    /// Ranges of free parameters.
+    ParameterBounds,
     /// The state at the start.
     InitialState,
     /// Weights of an arrival cost.
@@ -370,6 +372,41 @@ pub enum OcpError {
     /// States are periodic or controls shared: feedback gains are not defined.
     /// [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) has `du/dx₀`.
     Coupled,
+    /// Parameters are free: derivatives of solutions by the others are not known there.
+    FreeParameters,
+    /// The end of the horizon is free, and no parameter of the model is its duration.
+    FixedEndTime {
+        /// The model.
+        model: &'static str,
+    },
+    /// Something that cannot be said of this problem.
+    Unsupported {
+        /// What, and what can be said instead.
+        what: &'static str,
+    },
+    /// The end of the horizon is free, and a function depends on the time of the integrator.
+    DependsOnTime {
+        /// The function.
+        function: &'static str,
+    },
+    /// The model has no parameter of this name.
+    UnknownParameter {
+        /// The name.
+        name: Text,
+        /// Those that there are.
+        known: &'static Names,
+    },
+    /// The guess of a free parameter is outside of its range.
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// The guess.
+        value: f64,
+        /// The range.
+        lower: f64,
+        /// Its end.
+        upper: f64,
+    },
     /// An option of the solver is out of its range.
     InvalidOption {
         /// Its name.

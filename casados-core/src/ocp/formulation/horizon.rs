@@ -1,7 +1,11 @@
 //! The nodes in time.
 
 use crate::ocp::formulation::error::OcpError;
+use crate::qp::element::get;
 use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+use core::ops::{Bound, RangeBounds};
 
 /// The nodes in time.
 ///
@@ -25,6 +29,18 @@ pub enum Horizon<'a, T> {
     },
     /// The times of all nodes, one more than there are intervals.
     Nodes(&'a [T]),
+    /// From time zero to an end that is found.
+    Free {
+        /// How many intervals.
+        intervals: usize,
+        /// Where nodes are, as parts of the whole from 0 to 1, one more than there are intervals;
+        /// empty if these are of equal length.
+        parts: &'a [T],
+        /// The range of the end time.
+        range: [T; 2],
+        /// Its guess.
+        guess: T,
+    },
 }
 
 impl<'a, T: Real> Horizon<'a, T> {
@@ -38,18 +54,82 @@ impl<'a, T: Real> Horizon<'a, T> {
     pub fn nodes(times: &'a [T]) -> Self {
         Self::Nodes(times)
     }
+    /// From time zero to an end that is found in a range, in intervals of equal length. The model
+    /// says which of its parameters is the duration, and is otherwise as it was, in its own units
+    /// of time; so are costs, constraints and the times of the solution.
+    ///
+    /// In a running cost each interval counts as long as it is, with derivatives by the end time.
+    ///
+    /// # Example
+    /// A car that goes a hundred metres from rest to rest, with at most 2 m/s²: in `2 √50` s.
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[ode(duration = p)]
+    /// fn car(x: [f64; 2], u: f64, _p: f64) -> [f64; 2] { [x[1], u] }
+    /// #[function]
+    /// fn time(_x: [f64; 2], _u: f64, _p: f64) -> f64 { 1.0 }
+    ///
+    /// let n = 20;
+    /// let mut ocp = Problem::new(Irk::<Car, Gauss<2>>::new(Options::default())?)
+    ///     .running_cost(GeneralCost::<Time>::new())
+    ///     .on(Horizon::free(n, 1.0..=60.0, 20.0))?;
+    /// ocp.fix_initial_state(&[0.0; 2])?.bound("u", .., -2.0, 2.0)?;
+    /// ocp.bound("x[0]", n.., 100.0, 100.0)?.bound("x[1]", n.., 0.0, 0.0)?.guess(&[50.0, 5.0], &[0.0])?;
+    /// assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// let solution = ocp.solution()?;
+    /// assert!((solution.end_time() - 2.0 * 50.0_f64.sqrt()).abs() < 1e-6);
+    /// assert_eq!(solution.times()[n / 2], solution.end_time() / 2.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn free(intervals: usize, range: impl RangeBounds<T>, guess: T) -> Self {
+        Self::Free { intervals, parts: &[], range: limits(&range), guess }
+    }
+    /// As [`Horizon::free`], with nodes at these parts of the whole, from 0 to 1.
+    #[must_use]
+    pub fn free_nodes(parts: &'a [T], range: impl RangeBounds<T>, guess: T) -> Self {
+        let intervals = parts.len().saturating_sub(1);
+        Self::Free { intervals, parts, range: limits(&range), guess }
+    }
     /// How many intervals.
     #[must_use]
     pub fn intervals(&self) -> usize {
         match self {
-            Self::Uniform { intervals, .. } => *intervals,
+            Self::Uniform { intervals, .. } | Self::Free { intervals, .. } => *intervals,
             Self::Nodes(times) => times.len().saturating_sub(1),
         }
+    }
+    /// Nodes with these intervals halved: of `nodes` as [`Ocp::times`](crate::ocp::Ocp::times) has
+    /// them, for [`Horizon::nodes`], or [`Horizon::free_nodes`] where the end is free. Intervals
+    /// that there are not are passed by.
+    ///
+    /// ```
+    /// use casados::ocp::Horizon;
+    ///
+    /// assert_eq!(Horizon::refined(&[0.0, 1.0, 2.0, 4.0], &[0, 2]), [0.0, 0.5, 1.0, 2.0, 3.0, 4.0]);
+    /// ```
+    #[cfg(feature = "alloc")]
+    #[must_use]
+    pub fn refined(nodes: &[T], intervals: &[usize]) -> Vec<T> {
+        let mut finer = Vec::new();
+        for (k, pair) in nodes.windows(2).enumerate() {
+            let [start, end] = [0, 1].map(|i| get(pair, i));
+            finer.push(start);
+            if intervals.contains(&k) {
+                finer.push(start + T::from_f64(0.5) * (end - start));
+            }
+        }
+        finer.extend(nodes.last());
+        finer
     }
     fn time(&self, node: usize) -> T {
         match self {
             Self::Uniform { length, .. } => T::from_whole(node) * *length,
-            Self::Nodes(times) => times.get(node).copied().unwrap_or(T::ZERO),
+            Self::Nodes(times) => get(times, node),
+            Self::Free { intervals, parts: [], .. } => T::from_whole(node) / T::from_whole(*intervals),
+            Self::Free { parts, .. } => get(parts, node),
         }
     }
     /// Writes the times.
@@ -57,6 +137,12 @@ impl<'a, T: Real> Horizon<'a, T> {
     /// # Errors
     /// [`OcpError::Times`]
     pub(in crate::ocp) fn write(&self, times: &mut [T]) -> Result<(), OcpError> {
+        if let Self::Free { parts: [start, .., end], .. } = self
+            && !(*start == T::ZERO && *end == T::ONE)
+        {
+            let (start, end) = (start.to_f64(), end.to_f64());
+            return Err(OcpError::Times { interval: self.intervals(), start, end });
+        }
         for (node, time) in times.iter_mut().enumerate() {
             *time = self.time(node);
             let start = self.time(node.saturating_sub(1));
@@ -68,4 +154,14 @@ impl<'a, T: Real> Horizon<'a, T> {
         }
         Ok(())
     }
+}
+
+/// The sides of a range.
+pub(in crate::ocp) fn limits<T: Real>(range: &impl RangeBounds<T>) -> [T; 2] {
+    let infinity = T::from_f64(f64::INFINITY);
+    let side = |bound: Bound<&T>, none: T| match bound {
+        Bound::Included(&value) | Bound::Excluded(&value) => value,
+        Bound::Unbounded => none,
+    };
+    [side(range.start_bound(), -infinity), side(range.end_bound(), infinity)]
 }

@@ -60,8 +60,8 @@ impl Labels {
         Self { part, stage, name: |index| listed(names::<P, T>().u, index) }
     }
     /// Of parameters.
-    pub fn parameters<P: Formulation<T>, T: Real>(stage: usize) -> Self {
-        Self { part: Part::Parameters, stage, name: |index| listed(names::<P, T>().p, index) }
+    pub fn parameters<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
+        Self { part, stage, name: |index| listed(names::<P, T>().p, index) }
     }
     /// Of constraints.
     pub fn constraints<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {

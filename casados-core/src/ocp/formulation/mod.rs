@@ -5,6 +5,7 @@
 //! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
 //! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
 //! | `instance/` | a problem on a horizon, with memory |
+//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them |
 //! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | refusals by name |
 //! | `print` | a problem as mathematics |
@@ -13,7 +14,10 @@ pub(in crate::ocp) mod arrival;
 pub(in crate::ocp) mod bounds;
 pub(in crate::ocp) mod check;
 pub(in crate::ocp) mod coupling;
+#[cfg(feature = "alloc")]
+mod declare;
 pub(in crate::ocp) mod error;
+pub(in crate::ocp) mod free;
 pub(in crate::ocp) mod functions;
 pub(in crate::ocp) mod horizon;
 pub(in crate::ocp) mod instance;

@@ -34,4 +34,6 @@ pub struct Names {
     pub p: &'static [&'static str],
     /// Their units, as far as the model says.
     pub units: Units,
+    /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`.
+    pub duration: Option<usize>,
 }

@@ -3,7 +3,7 @@
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::bounds;
+use crate::ocp::formulation::instance::data::{bounds, path_rows};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::names::Names;
@@ -61,7 +61,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (names, intervals, times) = (self.names(), self.intervals(), self.times());
         let [start, end] = [0, intervals].map(|node| get(times, node).to_f64());
         let plural = if intervals == 1 { "" } else { "s" };
-        writeln!(f, "{}: {intervals} interval{plural}, t from {start} to {end}", names.model)?;
+        write!(f, "{}: {intervals} interval{plural}, t from {start} to ", names.model)?;
+        match self.free.view().end() {
+            Some(w) => writeln!(f, "{}, which is free", self.name_of_free(w))?,
+            None => writeln!(f, "{end}")?,
+        }
         self.objective(f)?;
         self.variables(f, &names)?;
         let arguments = [("x", names.x.len()), ("u", names.u.len()), ("p", names.p.len())];
@@ -85,12 +89,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let name = names.x.get(i).copied().unwrap_or_default();
             writeln!(f, "         {name} at stage 0 = {name} at stage {intervals}")?;
         }
-        for j in marked(view.shared()) {
+        for j in marked(view.shared()).filter_map(|j| j.checked_sub(self.free.count())) {
             let name = names.u.get(j).copied().unwrap_or_default();
             writeln!(f, "         {name} the same at all stages")?;
         }
-        let [nx, nu] = [P::Shape::NX, P::Shape::NU];
-        let (variables, dynamics) = (intervals * (nx + nu) + nx, intervals * nx);
+        let [nx, nu, free] = [P::Shape::NX, P::Shape::NU, self.free.count()];
+        let (variables, dynamics) = (intervals * (nx + nu) + nx + free, intervals * nx);
         write!(f, "  size   {variables} variables, {dynamics} equations of dynamics")?;
         if count.equations > 0 {
             write!(f, ", {} other ones", count.equations)?;
@@ -134,11 +138,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             write!(f, "{separator}{} {kind}{plural} ", names.len())?;
             list(f, names)?;
         }
+        let (copies, free) = (P::Terminal::STARTS, self.free.count() - P::Terminal::STARTS);
+        if free > 0 {
+            let plural = if free == 1 { "" } else { "s" };
+            write!(f, "; {free} free parameter{plural} ")?;
+            for w in 0..free {
+                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.name_of_free(copies + w))?;
+            }
+        }
         writeln!(f)
     }
 
     fn bounds(&self, f: &mut Formatter<'_>, names: &Names, count: &mut Count) -> fmt::Result {
-        let (intervals, view) = (self.intervals(), self.qp.view());
+        let (intervals, view, free) = (self.intervals(), self.qp.view(), self.free.count());
         for (i, name) in names.x.iter().enumerate() {
             runs(f, name, 0..intervals + 1, count, |k| {
                 view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.x_bounds(), i))
@@ -146,13 +158,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         for (j, name) in names.u.iter().enumerate() {
             runs(f, name, 0..intervals, count, |k| {
-                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), j))
+                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), free + j))
             })?;
         }
+        for w in P::Terminal::STARTS..free {
+            let sides = view.stage(0).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), w));
+            sides.count(count);
+            if sides.has() != [false; 2] {
+                f.write_str("         ")?;
+                sides.write(f, &self.name_of_free(w))?;
+                sides.write_penalties(f)?;
+                writeln!(f)?;
+            }
+        }
         // Bounds in the QP are those of what is linear.
-        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), intervals);
+        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), self.layout());
         let constraint = |k: usize, row: usize| {
-            let place = k * P::Path::ROWS + row;
+            let place = k * path_rows::<P, T>() + row;
             let [lower, upper] = [lower, upper].map(|bounds| get(bounds, place).to_f64());
             let of = |stage: Stage<'_, T>| Sides { lower, upper, ..Sides::of(&stage.g_bounds(), row) };
             view.stage(k).map_or(Sides::NONE, of)

@@ -4,7 +4,7 @@ use crate::ocp::formulation::check::{Labels, first, range};
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
@@ -154,7 +154,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let labels = Labels::constraints::<P, T>(part, range.start);
         labels.check_penalty(row.unwrap_or(0), linear, quadratic)?;
-        let data = split::<P, T>(self.data.as_mut(), last);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let rows = |k: usize| {
             let count = if k == last { P::Terminal::ROWS } else { P::Path::ROWS };
             (0..count).filter(move |&row| match k == last {
@@ -166,7 +167,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let of = |&side: &Side| if side == Side::Lower { &*data.lower } else { &*data.upper };
             sides.iter().map(of).any(|list| get(list, place).is_finite())
         };
-        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * P::Path::ROWS + row))) {
+        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * path_rows::<P, T>() + row))) {
             return Ok(Some(range.end));
         }
         for (k, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| range.contains(k)) {

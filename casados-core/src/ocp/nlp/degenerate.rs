@@ -76,6 +76,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         copy.copy_from(&self.iterate);
         for which in [Perturbed::Controls, Perturbed::States] {
             self.perturb(which);
+            self.join_controls();
             self.join_states();
             if linearise(self).is_ok() && !self.has_vanishing_gradient() {
                 return Ok(true);

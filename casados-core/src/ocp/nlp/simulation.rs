@@ -6,7 +6,7 @@ use crate::ocp::dynamics::begin::{Begin, at};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, vector};
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{Layout, inputs, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::nlp::degenerate::Perturbed;
@@ -143,15 +143,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::NoIntegrator);
         }
         self.roll_out(|ocp, k, end| {
-            let intervals = ocp.intervals();
-            let data = split::<P, T>(ocp.data.as_mut(), intervals);
+            let layout @ Layout { intervals, .. } = ocp.layout();
+            let data = split::<P, T>(ocp.data.as_mut(), layout);
             let (v, _) = ocp.iterate.vectors();
-            let (ld, np) = (pad::<T>(P::Shape::NX + P::Shape::NU), P::Shape::NP);
+            let (ld, np) = (pad::<T>(inputs::<P::Shape>(layout.free)), P::Shape::NP);
             // Of two intervals, since the last one of a horizon may end with a map.
             let times = data.times.get(k..(k + 3).min(intervals + 1)).unwrap_or_default();
             let (v, p) = (v.get(k * ld..).unwrap_or_default(), data.p.get(k * np..).unwrap_or_default());
             let mut has_end = false;
-            let nodes = nodes::<P::Shape, T>(v, &[], &[], p, times);
+            let nodes = nodes::<P::Shape, T>(v, &[], &[], (p, ocp.free.view()), times);
             let Problem { dynamics, .. } = ocp.problem.parts();
             let result = dynamics.simulate(&nodes, &mut |interval, step| {
                 if interval == 0 {
@@ -191,10 +191,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         I: Integrator<Model: Dae<Shape = P::Shape>, Number = T>,
     {
         self.roll_out(|ocp, k, end| {
-            let intervals = ocp.intervals();
-            let data = split::<P, T>(ocp.data.as_mut(), intervals);
+            let layout = ocp.layout();
+            let data = split::<P, T>(ocp.data.as_mut(), layout);
             let (v, _) = ocp.iterate.vectors();
-            let nodes = nodes::<P::Shape, T>(v, &[], &[], data.p, data.times);
+            let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, ocp.free.view()), data.times);
             let Some(interval) = nodes.iter().nth(k) else { return Ok(()) };
             at(k, integrator.begin(&interval))?;
             let result = integrator.solve(&vector(interval.x), &vector(interval.u), interval.h);

@@ -9,7 +9,8 @@ const ELSEWHERE: &str = "another guess, or bounds that keep away from there, may
 
 impl Part {
     fn is_bound(self) -> bool {
-        matches!(self, Self::StateBounds | Self::ControlBounds | Self::PathBounds | Self::TerminalBounds)
+        let of_variables = matches!(self, Self::StateBounds | Self::ControlBounds | Self::ParameterBounds);
+        of_variables || matches!(self, Self::PathBounds | Self::TerminalBounds)
     }
     fn verb(self) -> &'static str {
         match self {
@@ -31,6 +32,7 @@ impl fmt::Display for Part {
             Self::Arrival => "the weights of the arrival cost",
             Self::Reference => "the reference of the stage cost",
             Self::TerminalReference => "the reference of the terminal cost",
+            Self::ParameterBounds => "the ranges of free parameters",
             Self::StateBounds => "the bounds of the states",
             Self::ControlBounds => "the bounds of the controls",
             Self::PathBounds => "the bounds of the path constraints",
@@ -51,6 +53,9 @@ impl fmt::Display for ConstraintName {
         write!(f, "the {side} bound of `{}`", self.name)?;
         if matches!(self.part, Part::PathBounds | Part::TerminalBounds) {
             write!(f, " (output {})", self.output)?;
+        }
+        if self.part == Part::ParameterBounds {
+            return Ok(());
         }
         write!(f, " at stage {}", self.stage)
     }
@@ -189,6 +194,28 @@ impl fmt::Display for OcpError {
                 "feedback gains are not defined for periodic states or shared controls: use `du/dx₀` of \
                  `Ocp::differentiate`",
             ),
+            Self::FreeParameters => f.write_str(
+                "derivatives of solutions are not known where parameters are free: set these with \
+                 `set_parameters`, or make them states",
+            ),
+            Self::FixedEndTime { model } => write!(
+                f,
+                "the end time is free, and no parameter of `{model}` is a duration: say which one, as in \
+                 `#[ode(duration = p.duration)]`"
+            ),
+            Self::Unsupported { what } => write!(f, "there is no support for {what}"),
+            Self::DependsOnTime { function } => write!(
+                f,
+                "the end time is free, and `{function}` depends on the time: say which parameter is the duration, \
+                 as in `#[function(duration = p.duration)]`"
+            ),
+            Self::UnknownParameter { name, known } => {
+                write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;
+                list(f, known.p)
+            }
+            Self::OutOfRange { name, value, lower, upper } => {
+                write!(f, "the guess {value} of `{name}` is outside of its range, {lower} to {upper}")
+            }
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")
             }

@@ -9,4 +9,8 @@ pub(in crate::ocp) mod sensitivities;
 pub(in crate::ocp) mod trajectory;
 pub(in crate::ocp) mod verdict;
 #[cfg(feature = "alloc")]
+pub(in crate::ocp) mod verification;
+#[cfg(feature = "alloc")]
 mod violated;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod warnings;

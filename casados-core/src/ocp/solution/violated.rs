@@ -48,7 +48,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.constraints(&mut values).ok()?;
         }
         let is_given = self.initial == Initial::Fixed;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let mut largest = Largest { amount: 0.0, place: None };
         for (k, (stage, at)) in self.qp.view().stages().zip(self.iterate.stages()).enumerate() {
             let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };

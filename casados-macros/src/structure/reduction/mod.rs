@@ -160,6 +160,7 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
         units: model.units.clone(),
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph: model.graph.clone(),
         residual: outputs,
         spans,

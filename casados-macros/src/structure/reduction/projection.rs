@@ -51,6 +51,7 @@ pub fn of(invariants: &Model) -> Model {
         units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         graph,
         residual,
         spans: Vec::new(),

@@ -1,6 +1,7 @@
 //! Models whose graphs are built by hand, and what is found out about them.
 
 mod branches;
+mod duration;
 mod index;
 mod kinematic;
 mod reduction;
@@ -26,6 +27,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         units: Units::default(),
         samplings: Vec::new(),
         reduction: None,
+        duration: None,
         spans: vec![Span::call_site(); residual.len()],
         graph,
         residual,

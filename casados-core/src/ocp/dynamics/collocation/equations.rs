@@ -1,7 +1,7 @@
 //! The equations of the stages of an interval, at stages that need not solve them.
 
 use crate::irk::{Coefficients, dot};
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorX, VectorZ};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorX, VectorZ};
 use crate::ocp::formulation::functions::dynamics::Interval;
 use crate::qp::{assign, larger};
 use crate::scalar::Real;
@@ -34,7 +34,8 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
         let (mut x, mut v) = (ArrayX::<M, T>::zeroed(), ArrayV::<M, T>::zeroed());
         assign(x.as_mut(), interval.x);
         let inputs = v.as_mut().get_mut(2 * M::Shape::NX + M::Shape::NZ..).unwrap_or_default();
-        for (to, &from) in inputs.iter_mut().zip(interval.u.iter().chain(interval.p)) {
+        let p: VectorP<M, T> = interval.parameters();
+        for (to, &from) in inputs.iter_mut().zip(interval.u.iter().chain(p.as_slice())) {
             *to = from;
         }
         Self { coefficients, x, v, h: interval.h / T::from_whole(steps), t: interval.t }

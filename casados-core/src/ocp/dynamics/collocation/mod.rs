@@ -23,7 +23,7 @@ mod equations;
 use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, VectorU, VectorX};
+use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::ocp::dynamics::begin::{Begin, at};
 use crate::ocp::dynamics::inside::Inside;
 use crate::ocp::dynamics::single::names;
@@ -192,6 +192,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let mut seeds = Seeds::<M, T, 1>::zeroed();
             assign(seeds.x0.as_mut_slice(), step.x);
             assign(seeds.u.as_mut_slice(), step.u);
+            step.free.spread(seeds.p.as_mut_slice(), step.w);
             let (x, u) = (vector(interval.x), vector(interval.u));
             at(k, self.at.begin(&interval))?;
             at(k, self.at.set_solution(self.stages.get(places).unwrap_or_default()))?;
@@ -239,7 +240,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             at(k, self.at.begin(&interval))?;
             at(k, self.at.set_solution(stages))?;
             let step = at(k, run(&mut self.at, &interval))?;
-            let (mut of_x, mut of_u) = (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed());
+            let (mut of_x, mut of_u, mut of_p) =
+                (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed(), VectorP::<M, T>::zeroed());
             let mut cost = IntegralTerms::default();
             if second {
                 let after = IntervalResult::from(&after);
@@ -249,7 +251,10 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
                 };
                 changes([step.dx, step.dz[0]], [after.dx, after.dz[0]], of_x.as_mut_slice());
                 changes([step.du, step.dz[1]], [after.du, after.dz[1]], of_u.as_mut_slice());
-                (cost.x, cost.u) = (of_x.as_slice(), of_u.as_slice());
+                if interval.free.count() > 0 {
+                    changes([step.dp, step.dz[2]], [after.dp, after.dz[2]], of_p.as_mut_slice());
+                }
+                (cost.x, cost.u, cost.p) = (of_x.as_slice(), of_u.as_slice(), of_p.as_slice());
             }
             let (x, z) = (after.nominal.x.as_slice(), after.nominal.z0.as_slice());
             sink(k, &IntervalResult { x, z, cost, stages: residual, ..step });

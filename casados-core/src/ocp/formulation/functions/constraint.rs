@@ -3,13 +3,38 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::pattern::{self, Entries};
 use crate::ocp::formulation::functions::point::{
-    Cross, Terms, There, finite_outputs, is_algebraic, parameter, position,
+    Cross, Terms, There, finite_outputs, is_algebraic, parameter,
 };
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
+
+/// Where constraints are evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot<'a, T> {
+    pub(in crate::ocp) stage: usize,
+    /// Where variables are.
+    pub(in crate::ocp) free: Free<'a>,
+    /// Copies of elements of the first state, and which of the shared variables the first one is.
+    pub(in crate::ocp) starts: &'a [T],
+    pub(in crate::ocp) first: usize,
+}
+
+impl<'a, T> Spot<'a, T> {
+    /// Of a stage with these shared variables, the first ones of which are the copies.
+    #[inline(always)]
+    pub(in crate::ocp) fn new(stage: usize, free: Free<'a>, w: &'a [T]) -> Self {
+        Self { stage, free, starts: w, first: 0 }
+    }
+
+    /// Without so many copies.
+    fn behind(self, count: usize) -> Self {
+        Self { starts: self.starts.get(count..).unwrap_or_default(), first: self.first + count, ..self }
+    }
+}
 
 /// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is
 /// both.
@@ -39,7 +64,14 @@ pub trait Constraints<S: Shape, T: Real> {
     const ROWS: usize;
     /// Whether they depend on algebraic states.
     const ALGEBRAIC: bool;
+    /// How many elements of the first state they depend on, of which the last stage has copies.
+    const STARTS: usize = 0;
 
+    /// Which state a copy is of.
+    #[doc(hidden)]
+    fn start(copy: usize) -> usize {
+        copy
+    }
     /// Whether they depend on what is there only.
     ///
     /// # Errors
@@ -62,7 +94,7 @@ pub trait Constraints<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
-    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], stage: usize) -> Result<(), OcpError>;
+    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError>;
     /// The values, and their derivatives: a column for each, `ld` apart.
     ///
     /// # Errors
@@ -74,11 +106,11 @@ pub trait Constraints<S: Shape, T: Real> {
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        at: Spot<'_, T>,
     ) -> Result<(), OcpError>;
     /// Adds the Hessian of `μᵀg`.
     #[doc(hidden)]
-    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>);
+    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>);
     /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of
     /// `μᵀg`, if `μ` is given.
     #[doc(hidden)]
@@ -100,7 +132,7 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         Ok(())
     }
     fn bounds(&self, _: [&mut [T]; 4]) {}
-    fn value(&mut self, _: &S::ArrayV<T>, _: &mut [T], _: usize) -> Result<(), OcpError> {
+    fn value(&mut self, _: &S::ArrayV<T>, _: &mut [T], _: Spot<'_, T>) -> Result<(), OcpError> {
         Ok(())
     }
     fn linearise(
@@ -109,11 +141,11 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         _: &mut [T],
         _: &mut [T],
         _: usize,
-        _: usize,
+        _: Spot<'_, T>,
     ) -> Result<(), OcpError> {
         Ok(())
     }
-    fn curve(&mut self, _: &S::ArrayV<T>, _: &[T], _: &mut Terms<'_, T>) {}
+    fn curve(&mut self, _: &S::ArrayV<T>, _: &[T], _: Spot<'_, T>, _: &mut Terms<'_, T>) {}
     fn cross(&mut self, _: &S::ArrayV<T>, _: Option<&[T]>, _: &mut [T], _: &mut Cross<'_, T>) {}
     fn name(row: usize) -> (&'static str, usize) {
         ("", row)
@@ -123,6 +155,13 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
 impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<S, T> for (A, B) {
     const ROWS: usize = A::ROWS + B::ROWS;
     const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
+    const STARTS: usize = A::STARTS + B::STARTS;
+    fn start(copy: usize) -> usize {
+        match copy.checked_sub(A::STARTS) {
+            None => A::start(copy),
+            Some(copy) => B::start(copy),
+        }
+    }
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
@@ -141,10 +180,10 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         self.0.bounds([l, u, i, q]);
         self.1.bounds([lower, upper, linear, quadratic]);
     }
-    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], stage: usize) -> Result<(), OcpError> {
+    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
         let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
-        self.0.value(v, first, stage)?;
-        self.1.value(v, second, stage)
+        self.0.value(v, first, at)?;
+        self.1.value(v, second, at.behind(A::STARTS))
     }
     fn linearise(
         &mut self,
@@ -152,17 +191,17 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        at: Spot<'_, T>,
     ) -> Result<(), OcpError> {
         let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
         let (mine, others) = columns.split_at_mut_checked(A::ROWS * ld).unwrap_or_default();
-        self.0.linearise(v, first, mine, ld, stage)?;
-        self.1.linearise(v, second, others, ld, stage)
+        self.0.linearise(v, first, mine, ld, at)?;
+        self.1.linearise(v, second, others, ld, at.behind(A::STARTS))
     }
-    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>) {
+    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>) {
         let (first, second) = mu.split_at_checked(A::ROWS).unwrap_or_default();
-        self.0.curve(v, first, terms);
-        self.1.curve(v, second, terms);
+        self.0.curve(v, first, at, terms);
+        self.1.curve(v, second, at.behind(A::STARTS), terms);
     }
     fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
         let (mine, others) = slopes.split_at_mut_checked(A::ROWS * S::NP).unwrap_or_default();
@@ -272,9 +311,9 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
             }
         }
     }
-    fn value(&mut self, v: &ArrayV<F, T>, values: &mut [T], stage: usize) -> Result<(), OcpError> {
+    fn value(&mut self, v: &ArrayV<F, T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
         F::value::<T>(v, &mut self.g);
-        finite_outputs::<F, T>(&self.g, stage)?;
+        finite_outputs::<F, T>(&self.g, at.stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }
@@ -286,23 +325,23 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        stage: usize,
+        at: Spot<'_, T>,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
-        finite_outputs::<F, T>(&self.g, stage)?;
+        finite_outputs::<F, T>(&self.g, at.stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }
         for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
             let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
-            let Some(position) = position::<F::Shape>(variable) else { continue };
+            let Some(position) = at.free.position::<F::Shape>(variable) else { continue };
             if let Some(element) = columns.get_mut(row * ld + position) {
                 *element = value;
             }
         }
         Ok(())
     }
-    fn curve(&mut self, v: &ArrayV<F, T>, mu: &[T], terms: &mut Terms<'_, T>) {
+    fn curve(&mut self, v: &ArrayV<F, T>, mu: &[T], _: Spot<'_, T>, terms: &mut Terms<'_, T>) {
         terms.curvature::<F>(v, &multipliers::<F, T>(mu), T::ONE, &mut self.hessian);
     }
     fn cross(&mut self, v: &ArrayV<F, T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {

@@ -3,9 +3,7 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::pattern::{self, Entries};
-use crate::ocp::formulation::functions::point::{
-    Cross, Terms, There, finite, is_algebraic, parameter, position,
-};
+use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic, parameter};
 use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape, plain};
 use bytemuck::Zeroable;
@@ -308,7 +306,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T>
         self.mu = Array::from_fn(|_| T::ONE);
         F::adjoint::<T>(v, &self.mu, &mut self.gradient);
         for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
-            if let Some(i) = position::<F::Shape>(variable) {
+            if let Some(i) = terms.free.position::<F::Shape>(variable) {
                 terms.slope(i, at.factor * slope);
             }
         }

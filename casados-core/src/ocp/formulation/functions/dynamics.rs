@@ -2,6 +2,7 @@
 
 use crate::model::Dae;
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::cost::Show;
 use crate::ocp::formulation::functions::pattern::Origin;
 use crate::ocp::formulation::names::Names;
@@ -19,8 +20,11 @@ pub struct Interval<'a, T> {
     pub x: &'a [T],
     /// The control, constant over the interval.
     pub u: &'a [T],
-    /// The parameters.
-    pub p: &'a [T],
+    /// The parameters that were set.
+    pub(in crate::ocp) p: &'a [T],
+    /// The free ones, and where they are.
+    pub(in crate::ocp) w: &'a [T],
+    pub(in crate::ocp) free: Free<'a>,
     /// The multipliers `π` of its end.
     pub multipliers: &'a [T],
     /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if
@@ -32,6 +36,16 @@ pub struct Interval<'a, T> {
     pub h: T,
 }
 
+impl<T: Real> Interval<'_, T> {
+    /// The parameters.
+    #[inline(always)]
+    pub(in crate::ocp) fn parameters<V: Matrix<T>>(&self) -> V {
+        let mut p: V = vector(self.p);
+        self.free.write(p.as_mut_slice(), self.w);
+        p
+    }
+}
+
 /// The intervals of a horizon at the current iterate.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +54,7 @@ pub struct Nodes<'a, T> {
     pub(in crate::ocp) multipliers: &'a [T],
     pub(in crate::ocp) weights: &'a [T],
     pub(in crate::ocp) p: &'a [T],
+    pub(in crate::ocp) free: Free<'a>,
     pub(in crate::ocp) times: &'a [T],
     /// `NX`, `NU`, `NP`, `NZ`
     pub(in crate::ocp) dims: [usize; 4],
@@ -64,14 +79,18 @@ impl<'a, T: Real> Nodes<'a, T> {
     }
     /// All intervals, in order.
     pub fn iter(&self) -> impl Iterator<Item = Interval<'a, T>> + use<'a, T> {
-        let Self { v, multipliers, weights, p, times, dims: [nx, nu, np, nz], ld: [ld, ld_next], .. } = *self;
+        let Self {
+            v, multipliers, weights, p, free, times, dims: [nx, nu, np, nz], ld: [ld, ld_next], ..
+        } = *self;
         let part = crate::qp::part::<T>;
         times.windows(2).enumerate().map(move |(k, times)| {
             let [t, end] = [0, 1].map(|i| times.get(i).copied().unwrap_or(T::ZERO));
             Interval {
                 x: part(v, k * ld, nx),
-                u: part(v, k * ld + nx, nu),
+                u: part(v, k * ld + nx + free.count(), nu),
                 p: part(p, k * np, np),
+                w: part(v, k * ld + nx, free.count()),
+                free,
                 multipliers: part(multipliers, k * ld_next, nx),
                 nu: part(weights, k * nz, nz),
                 t,
@@ -227,6 +246,12 @@ pub trait Dynamics<T: Real> {
     const NAMES: Names;
     /// Whether [`IntervalResult::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
+    /// Whether the end of an interval is that of the equations of a model.
+    #[doc(hidden)]
+    const IS_FLOW: bool = true;
+    /// Whether there are integral costs.
+    #[doc(hidden)]
+    const INTEGRAL: bool = false;
     /// What the ends of intervals follow from.
     #[doc(hidden)]
     const ORIGIN: Origin = Origin::Unknown;

@@ -1,6 +1,7 @@
 //! Costs and constraints of the variables that dynamics have, for messages of the compiler.
 
 use crate::function::Function;
+use crate::ocp::formulation::functions::boundary::Boundary;
 use crate::ocp::formulation::functions::constraint::{Constraint, Constraints};
 use crate::ocp::formulation::functions::convex::ConvexCost;
 use crate::ocp::formulation::functions::cost::{Cost, GeneralCost};
@@ -93,6 +94,30 @@ impl<A: IsConstraint, B: IsConstraint> IsConstraint for (A, B) {
 impl<F: Function, T: Plain> IsConstraint for Constraint<F, T> {
     type Functions = Of<F>;
 }
+
+impl<F: Function, T: Plain> IsConstraint for Boundary<F, T> {
+    type Functions = OfEnds<F>;
+}
+
+/// The function of a boundary condition.
+pub struct OfEnds<F>(PhantomData<F>);
+
+impl<D: Dynamics<T>, T: Real, F: Function> HasArgumentsOf<D, T> for OfEnds<F>
+where
+    <F::Shape as Shape>::ArrayX<f64>: StatesOf<<D::Shape as Shape>::ArrayX<f64>>,
+    <F::Shape as Shape>::ArrayZ<f64>: FirstStatesOf<<D::Shape as Shape>::ArrayX<f64>>,
+    <F::Shape as Shape>::ArrayP<f64>: ParametersOf<<D::Shape as Shape>::ArrayP<f64>>,
+{
+}
+
+/// The same states, at the start.
+#[diagnostic::on_unimplemented(
+    message = "the boundary condition has the argument `x0: {Self}`, and the model `x: {Model}`",
+    label = "its function has another argument `x0` than the states of the model",
+    note = "a boundary condition is a `#[function]` of `x0: {Model}`, `x: {Model}` and the parameters `p` of the model"
+)]
+pub trait FirstStatesOf<Model> {}
+impl<X> FirstStatesOf<X> for X {}
 
 /// The one function of a cost or of constraints.
 pub struct Of<F>(PhantomData<F>);

@@ -5,7 +5,7 @@ use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::cost::{At, Cost, Show};
 use crate::ocp::formulation::functions::pattern::{self, Entries};
-use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic, position};
+use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic};
 use crate::ocp::formulation::functions::weights;
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape, plain};
@@ -167,7 +167,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
         let value = self.square(reference, at.stage)?;
         let Self { weights, coupled, y, mu, jacobian, hessian, .. } = self;
         let mut square = Square::<F, T> { weights, y, jacobian, at, terms: &mut *terms };
-        if *coupled == 0 {
+        if *coupled == 0 && !square.has_free() {
             dispatch(square);
         } else {
             square.coupled(&Zeroable::zeroed());
@@ -215,12 +215,12 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
         begin(output)..begin(output + 1)
     }
 
-    /// One of them, as a position in `(x, u, z)` and a value.
+    /// One of them, as a position in `(x, w, u, z)` and a value.
     #[inline(always)]
     fn entry(&self, place: usize) -> Option<(usize, T)> {
         let entry = *F::STRUCTURE.by_row.get(place)? as usize;
         let (_, variable) = F::STRUCTURE.jacobian.get(entry)?;
-        Some((position::<F::Shape>(variable)?, *self.jacobian.as_ref().get(entry)?))
+        Some((self.terms.free.position::<F::Shape>(variable)?, *self.jacobian.as_ref().get(entry)?))
     }
 
     /// The weight of two outputs, without a place for a panic.
@@ -268,8 +268,42 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
         }
     }
 
+    /// Whether the outputs depend on free parameters.
+    #[inline(always)]
+    fn has_free(&self) -> bool {
+        F::STRUCTURE.blocks[4] < F::STRUCTURE.blocks[5] && self.terms.free.count() > 0
+    }
+
+    /// As [`Square::coupled`], over free parameters too.
+    fn coupled_with_free(&mut self, mu: &ArrayY<F, T>) {
+        let (free, jacobian, from) = (self.terms.free, self.jacobian.as_ref(), self.at.from);
+        let entries = || {
+            let entries = F::STRUCTURE.jacobian.iter().zip(jacobian);
+            entries.filter_map(move |((k, variable), &a)| Some((k, free.position::<F::Shape>(variable)?, a)))
+        };
+        let mut moved = *self.y;
+        for (k, i, a) in entries() {
+            if let (Some(y), Some(&v)) = (moved.as_mut().get_mut(k), from.get(i)) {
+                *y = *y - a * v;
+            }
+        }
+        let slopes: ArrayY<F, T> = Array::from_fn(|k| {
+            let own = self.at.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
+            moved.as_ref().iter().enumerate().fold(own, |sum, (l, &y)| sum + self.weight(k, l) * y)
+        });
+        for (k, i, a) in entries() {
+            self.terms.slope(i, slopes[k] * a);
+            for (l, j, b) in entries().filter(|&(_, j, _)| j <= i) {
+                self.terms.curve(i, j, self.weight(k, l) * a * b);
+            }
+        }
+    }
+
     /// With weights between outputs, and `Jᵀ μ` too.
     pub fn coupled(&mut self, mu: &ArrayY<F, T>) {
+        if self.has_free() {
+            return self.coupled_with_free(mu);
+        }
         let moved: ArrayY<F, T> = Array::from_fn(|output| self.moved(output));
         for k in 0..F::Outputs::NY {
             let mut slope = self.at.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);

@@ -1,5 +1,6 @@
 //! Functions of a problem: dynamics, costs and constraints.
 
+pub(in crate::ocp) mod boundary;
 pub(in crate::ocp) mod constraint;
 pub(in crate::ocp) mod convex;
 pub(in crate::ocp) mod cost;

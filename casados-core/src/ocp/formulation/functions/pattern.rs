@@ -1,7 +1,7 @@
 //! Where derivatives of a problem may differ from zero: what the graphs of its functions know.
 
 use crate::function::Function;
-use crate::ocp::formulation::functions::point::position;
+use crate::ocp::formulation::free::Free;
 use crate::structure::Pattern;
 
 /// An entry of derivatives over `(x, u, z)`.
@@ -30,7 +30,7 @@ pub enum Origin {
 /// The entries of the Jacobian of a function.
 pub(in crate::ocp) fn slopes<F: Function>(visit: Entries<'_>) {
     for (row, variable) in F::STRUCTURE.jacobian.iter() {
-        if let Some(position) = position::<F::Shape>(variable) {
+        if let Some(position) = Free::default().position::<F::Shape>(variable) {
             visit(Entry::Slope(row, position));
         }
     }
@@ -39,7 +39,9 @@ pub(in crate::ocp) fn slopes<F: Function>(visit: Entries<'_>) {
 /// The entries of the Hessian of any sum of the outputs of a function.
 pub(in crate::ocp) fn curvature<F: Function>(visit: Entries<'_>) {
     for (one, other) in F::STRUCTURE.hessian.iter() {
-        if let (Some(one), Some(other)) = (position::<F::Shape>(one), position::<F::Shape>(other)) {
+        if let (Some(one), Some(other)) =
+            (Free::default().position::<F::Shape>(one), Free::default().position::<F::Shape>(other))
+        {
             visit(Entry::Curvature(one, other));
         }
     }
@@ -50,7 +52,9 @@ pub(in crate::ocp) fn squares<F: Function>(coupled: bool, visit: Entries<'_>) {
     let entries = || F::STRUCTURE.jacobian.iter();
     for (k, one) in entries() {
         for (_, other) in entries().filter(|&(l, _)| coupled || k == l) {
-            if let (Some(one), Some(other)) = (position::<F::Shape>(one), position::<F::Shape>(other)) {
+            if let (Some(one), Some(other)) =
+                (Free::default().position::<F::Shape>(one), Free::default().position::<F::Shape>(other))
+            {
                 visit(Entry::Curvature(one, other));
             }
         }

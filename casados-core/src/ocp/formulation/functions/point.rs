@@ -2,23 +2,9 @@
 
 use crate::function::{ArrayV, ArrayY, Function, FunctionStructure, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::Free;
 use crate::scalar::Real;
 use crate::shape::Shape;
-
-/// The index in `(x, u, z)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
-#[inline(always)]
-pub(in crate::ocp) fn position<S: Shape>(variable: usize) -> Option<usize> {
-    let (nx, nz, nu) = (S::NX, S::NZ, S::NU);
-    if (nx..2 * nx).contains(&variable) {
-        Some(variable - nx)
-    } else if (2 * nx..2 * nx + nz).contains(&variable) {
-        Some(variable - nx + nu)
-    } else if (2 * nx + nz..2 * nx + nz + nu).contains(&variable) {
-        Some(variable - nx - nz)
-    } else {
-        None
-    }
-}
 
 /// The index of a parameter among the variables.
 #[inline(always)]
@@ -86,12 +72,17 @@ pub struct There {
     pub(in crate::ocp) u: bool,
     /// The first stage of these.
     pub(in crate::ocp) stage: usize,
+    /// A time that has no derivatives: not where the end of the horizon is free.
+    pub(in crate::ocp) t: bool,
 }
 
 impl There {
     /// Whether a function depends on this only.
     pub(in crate::ocp) fn check<F: Function>(self) -> Result<(), OcpError> {
         let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
+        if F::IS_TIMED && !self.t {
+            return Err(OcpError::DependsOnTime { function });
+        }
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for &variable in variables {
             let Some(index) = (variable as usize).checked_sub(2 * nx) else { continue };
@@ -110,8 +101,11 @@ impl There {
     }
 }
 
-/// A gradient and the lower triangle of a Hessian over `(x, u)`, or `(x, u, z)`, to be added to.
+/// A gradient and the lower triangle of a Hessian over `(x, w, u)`, or `(x, w, u, z)`, to be added
+/// to.
 pub struct Terms<'a, T> {
+    /// Where variables are.
+    pub(in crate::ocp) free: Free<'a>,
     pub(in crate::ocp) gradient: &'a mut [T],
     pub(in crate::ocp) hessian: &'a mut [T],
     /// The distance of columns.
@@ -142,10 +136,12 @@ impl<T: Real> Terms<'_, T> {
         factor: T,
         hessian: &mut F::Hessian<T>,
     ) {
+        let free = self.free;
         each_entry::<F, T>(v, mu, hessian, |row, column, value| {
-            if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
+            let places = [row, column].map(|variable| free.position::<F::Shape>(variable));
+            if let [Some(row), Some(column)] = places {
                 // Controls come before algebraic states here, and behind them in a model.
-                let swap = F::Shape::NZ > 0 && row < column;
+                let swap = row < column;
                 let (row, column) = if swap { (column, row) } else { (row, column) };
                 self.curve(row, column, factor * value);
             }
@@ -153,10 +149,32 @@ impl<T: Real> Terms<'_, T> {
     }
 }
 
+impl<T: Real> Terms<'_, T> {
+    /// Adds what a duration `T`, the variable `place`, does to a cost `T l` beside what `l` does by
+    /// it: `l` to the gradient, `∇l` to its row and its column of an exact Hessian. The gradient
+    /// was `before`, and `∇(T l)` with `T` constant was added.
+    pub(in crate::ocp) fn add_duration(
+        &mut self,
+        place: usize,
+        [cost, duration]: [T; 2],
+        before: &[T],
+        exact: bool,
+    ) {
+        for (i, &before) in before.iter().enumerate().filter(|_| exact) {
+            let slope = (self.gradient.get(i).copied().unwrap_or(T::ZERO) - before) / duration;
+            self.curve(i.max(place), i.min(place), slope);
+            if i == place {
+                self.curve(i, i, slope);
+            }
+        }
+        self.slope(place, cost / duration);
+    }
+}
+
 /// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in
 /// `hessian`.
 #[inline(always)]
-fn each_entry<F: Function, T: Real>(
+pub(in crate::ocp) fn each_entry<F: Function, T: Real>(
     v: &ArrayV<F, T>,
     mu: &ArrayY<F, T>,
     hessian: &mut F::Hessian<T>,
@@ -175,6 +193,8 @@ fn each_entry<F: Function, T: Real>(
 
 /// Derivatives with respect to parameters, to be added to.
 pub struct Cross<'a, T> {
+    /// Where variables are.
+    pub(in crate::ocp) free: Free<'a>,
     /// Of a gradient over `(x, u)`, or `(x, u, z)`: a column for each parameter.
     pub(in crate::ocp) columns: &'a mut [T],
     /// The distance of columns.
@@ -216,7 +236,7 @@ impl<T: Real> Cross<'_, T> {
         each_entry::<F, T>(v, mu, hessian, |row, column, value| {
             // Parameters come after states and controls: they are rows of the lower triangle.
             let Some(p) = parameter::<F::Shape>(row) else { return };
-            if let Some(position) = position::<F::Shape>(column) {
+            if let Some(position) = self.free.position::<F::Shape>(column) {
                 self.add(position, p, factor * value);
             } else if let Some(q) = parameter::<F::Shape>(column) {
                 self.curve(p, q, factor * value);
@@ -241,7 +261,7 @@ impl<T: Real> Cross<'_, T> {
             self.slope(p, factor * mu[l] * b);
             for (&a, (k, variable)) in entries() {
                 let product = factor * outer[(k, l)] * a * b;
-                if let Some(i) = position::<F::Shape>(variable) {
+                if let Some(i) = self.free.position::<F::Shape>(variable) {
                     self.add(i, p, product);
                 } else if let Some(q) = parameter::<F::Shape>(variable) {
                     self.curve(q, p, product);
@@ -263,11 +283,17 @@ impl<T: Real> Cross<'_, T> {
     }
 }
 
-/// Adds blocks `xx`, `xu`, `uu`, column after column, to the lower triangle.
-pub(in crate::ocp) fn add_blocks<T: Real>(terms: &mut Terms<'_, T>, nx: usize, [xx, xu, uu]: [&[T]; 3]) {
+/// Adds blocks `xx`, `xu`, `uu` and `xp`, `up`, `pp`, column after column, to the lower triangle.
+pub(in crate::ocp) fn add_blocks<T: Real>(
+    terms: &mut Terms<'_, T>,
+    nx: usize,
+    [xx, xu, uu]: [&[T]; 3],
+    of_parameters: [&[T]; 3],
+) {
     if xx.is_empty() && uu.is_empty() {
         return;
     }
+    let first = nx + terms.free.count();
     for (j, column) in xx.chunks_exact(nx.max(1)).enumerate() {
         for (i, &value) in column.iter().enumerate().skip(j) {
             terms.curve(i, j, value);
@@ -275,13 +301,39 @@ pub(in crate::ocp) fn add_blocks<T: Real>(terms: &mut Terms<'_, T>, nx: usize, [
     }
     for (u, column) in xu.chunks_exact(nx.max(1)).enumerate() {
         for (x, &value) in column.iter().enumerate() {
-            terms.curve(nx + u, x, value);
+            terms.curve(first + u, x, value);
         }
     }
     let nu = xu.len() / nx.max(1);
     for (j, column) in uu.chunks_exact(nu.max(1)).enumerate() {
         for (i, &value) in column.iter().enumerate().skip(j) {
-            terms.curve(nx + i, nx + j, value);
+            terms.curve(first + i, first + j, value);
+        }
+    }
+    if terms.free.count() > 0 {
+        add_blocks_of_parameters(terms, [nx, nu], of_parameters);
+    }
+}
+
+/// Adds those of free parameters.
+fn add_blocks_of_parameters<T: Real>(
+    terms: &mut Terms<'_, T>,
+    [nx, nu]: [usize; 2],
+    [xp, up, pp]: [&[T]; 3],
+) {
+    let free = terms.free;
+    for (w, column) in free.columns(xp, nx) {
+        column.iter().enumerate().for_each(|(x, &value)| terms.curve(nx + w, x, value));
+    }
+    for (w, column) in free.columns(up, nu) {
+        for (u, &value) in column.iter().enumerate() {
+            terms.curve(nx + free.count() + u, nx + w, value);
+        }
+    }
+    let np = pp.len().isqrt();
+    for (w, column) in free.columns(pp, np) {
+        for (other, value) in free.elements(column).filter(|&(other, _)| other >= w) {
+            terms.curve(nx + other, nx + w, value);
         }
     }
 }

@@ -1,10 +1,12 @@
 //! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
 
+use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::point::read;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
-use crate::qp::{StageDims, pad, part};
+use crate::qp::{SolutionStage, StageDims, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -34,9 +36,17 @@ pub(in crate::ocp) struct Data<'a, T> {
     pub arrival: &'a mut [T],
 }
 
-/// `NX + NU`
-pub(in crate::ocp) const fn inputs<S: Shape>() -> usize {
-    S::NX + S::NU
+/// How large a problem is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub intervals: usize,
+    /// How many [free parameters](super::super::free) there are.
+    pub free: usize,
+}
+
+/// `NX + NU`, and the free parameters between these.
+pub(in crate::ocp) const fn inputs<S: Shape>(free: usize) -> usize {
+    S::NX + free + S::NU
 }
 
 /// Whether a cost or a constraint depends on algebraic states.
@@ -44,28 +54,40 @@ pub(in crate::ocp) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 10] {
+/// Rows of the path constraints, and of what links copies of elements of the first state to it.
+pub(in crate::ocp) const fn path_rows<P: Formulation<T>, T: Real>() -> usize {
+    P::Path::ROWS + P::Terminal::STARTS
+}
+
+const fn lengths<P: Formulation<T>, T: Real>(Layout { intervals, free }: Layout) -> [usize; 10] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-    let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
-    let n = inputs::<P::Shape>();
-    let constraints = if P::Path::ROWS > P::Terminal::ROWS { P::Path::ROWS } else { P::Terminal::ROWS };
+    let path = path_rows::<P, T>();
+    let rows = intervals * path + P::Terminal::ROWS;
+    let n = inputs::<P::Shape>(free);
+    let constraints = if path > P::Terminal::ROWS { path } else { P::Terminal::ROWS };
     [
         intervals + 1,
         (intervals + 1) * P::Shape::NP,
         references,
         rows,
         rows,
-        intervals * kept::<P::Shape>(),
+        intervals * kept::<P::Shape>(free),
         if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
-        extended::<P::Shape>(constraints),
-        (2 * n + 1) * pad::<T>(n),
+        extended::<P::Shape>(free, constraints),
+        scratch::<T>(n, P::Shape::NZ),
         P::Shape::NX * (P::Shape::NX + 1),
     ]
 }
 
+/// Two matrices and a vector over `(x, w, u)`, or a gradient over `(x, w, u, z)`.
+const fn scratch<T>(n: usize, nz: usize) -> usize {
+    let (matrices, gradient) = ((2 * n + 1) * pad::<T>(n), n + nz);
+    if matrices < gradient { gradient } else { matrices }
+}
+
 /// How many numbers it takes.
-pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
-    let mut rest: &[usize] = &lengths::<P, T>(intervals);
+pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
+    let mut rest: &[usize] = &lengths::<P, T>(layout);
     let mut sum = 0_usize;
     while let Some((&first, others)) = rest.split_first() {
         sum = sum.saturating_add(first);
@@ -75,10 +97,10 @@ pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(intervals: usize)
 }
 
 /// The parts.
-pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
+pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], layout: Layout) -> Data<'_, T> {
     let mut rest = memory;
     let [times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival] =
-        lengths::<P, T>(intervals).map(|length| {
+        lengths::<P, T>(layout).map(|length| {
             let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
             rest = behind;
             part
@@ -87,16 +109,16 @@ pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], interv
 }
 
 /// The lower and the upper bounds of all constraints.
-pub(in crate::ocp) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> [&[T]; 2] {
-    let [times, p, references, lower, upper, ..] = lengths::<P, T>(intervals);
+pub(in crate::ocp) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], layout: Layout) -> [&[T]; 2] {
+    let [times, p, references, lower, upper, ..] = lengths::<P, T>(layout);
     let begin = times + p + references;
     [part(memory, begin, lower), part(memory, begin + lower, upper)]
 }
 
 /// The weights of the arrival cost.
-pub(in crate::ocp) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> &[T] {
+pub(in crate::ocp) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], layout: Layout) -> &[T] {
     let nx = P::Shape::NX;
-    part(memory, length::<P, T>(intervals) - nx * nx, nx * nx)
+    part(memory, length::<P, T>(layout) - nx * nx, nx * nx)
 }
 
 /// What is given at a node.
@@ -129,30 +151,40 @@ impl<'a, T: Real> Node<'a, T> {
             factor: if running && is_stage { get(times, k + 1) - time } else { T::ONE },
         }
     }
-}
 
-/// The dimensions of a stage.
-pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(last: bool) -> StageDims {
-    if last {
-        StageDims::new(P::Shape::NX, 0, P::Terminal::ROWS)
-    } else {
-        StageDims::new(P::Shape::NX, P::Shape::NU, P::Path::ROWS)
+    /// Writes the variables there, with the algebraic states `z`.
+    #[inline(always)]
+    pub fn read<S: Shape>(&self, to: &mut S::ArrayV<T>, at: &SolutionStage<'_, T>, z: &[T], free: Free<'_>) {
+        let (w, u) = at.u.split_at_checked(free.count()).unwrap_or_default();
+        read::<S, T>(to, [at.x, z, u, self.p], self.time);
+        if free.count() > 0 {
+            free.write(part_mut(to.as_mut(), 2 * S::NX + S::NZ + S::NU, S::NP), w);
+        }
     }
 }
 
-/// `NX + NU` and `NZ`.
-pub(in crate::ocp) const fn sizes<S: Shape>() -> [usize; 2] {
-    [S::NX + S::NU, S::NZ]
+/// The dimensions of a stage.
+pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(free: usize, last: bool) -> StageDims {
+    if last {
+        StageDims::new(P::Shape::NX, free, P::Terminal::ROWS)
+    } else {
+        StageDims::new(P::Shape::NX, free + P::Shape::NU, path_rows::<P, T>())
+    }
 }
 
-/// How many numbers a stage keeps: `z`, and `∂z/∂(x, u)` row after row.
-pub(in crate::ocp) const fn kept<S: Shape>() -> usize {
-    let [n, nz] = sizes::<S>();
+/// As [`inputs`], and `NZ`.
+pub(in crate::ocp) const fn sizes<S: Shape>(free: usize) -> [usize; 2] {
+    [inputs::<S>(free), S::NZ]
+}
+
+/// How many numbers a stage keeps: `z`, and `∂z/∂(x, w, u)` row after row.
+pub(in crate::ocp) const fn kept<S: Shape>(free: usize) -> usize {
+    let [n, nz] = sizes::<S>(free);
     nz * (1 + n)
 }
 
 /// How many numbers `algebraic::Extended` takes, for stages with so many constraints.
-pub(in crate::ocp) const fn extended<S: Shape>(rows: usize) -> usize {
-    let [n, nz] = sizes::<S>();
+pub(in crate::ocp) const fn extended<S: Shape>(free: usize, rows: usize) -> usize {
+    let [n, nz] = sizes::<S>(free);
     if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
 }

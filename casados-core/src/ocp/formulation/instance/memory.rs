@@ -7,7 +7,7 @@ use crate::ocp::formulation::horizon::Horizon;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data;
+use crate::ocp::formulation::instance::data::{self, Layout};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Qp, Solution, StageDims};
 #[cfg(feature = "alloc")]
@@ -22,7 +22,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
-    /// [`OcpError::OutOfMemory`]
+    /// [`OcpError::OutOfMemory`]; of a free end time [`OcpError::FixedEndTime`],
+    /// [`OcpError::OutOfRange`], [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
@@ -32,15 +33,17 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
-        let intervals = horizon.intervals();
+        let (intervals, free) = (horizon.intervals(), H::STARTS);
         let mut dims = Vec::new();
         room(&mut dims, intervals.saturating_add(1))?;
-        dims.resize(intervals, data::stage::<Self, T>(false));
-        dims.push(data::stage::<Self, T>(true));
+        dims.resize(intervals, data::stage::<Self, T>(free, false));
+        dims.push(data::stage::<Self, T>(free, true));
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
-        let length = data::length::<Self, T>(intervals);
-        Ocp::build(self, horizon, qp, iterate, zeros(length)?)
+        let length = data::length::<Self, T>(Layout { intervals, free });
+        let mut ocp = Ocp::build(self, horizon, qp, iterate, zeros(length)?)?;
+        ocp.free_end(&horizon)?;
+        Ok(ocp)
     }
 
     /// The dimensions of the stages, of which there is one more than there are intervals.
@@ -49,9 +52,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        let mut dims = [data::stage::<Self, T>(false); STAGES];
+        let mut dims = [data::stage::<Self, T>(0, false); STAGES];
         if let Some(last) = dims.last_mut() {
-            *last = data::stage::<Self, T>(true);
+            *last = data::stage::<Self, T>(0, true);
         }
         dims
     }
@@ -62,9 +65,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        Qp::<T, (), ()>::memory(dims)
-            .saturating_add(Solution::<T, (), ()>::memory(dims))
-            .saturating_add(data::length::<Self, T>(dims.len().saturating_sub(1)))
+        Qp::<T, (), ()>::memory(dims).saturating_add(Solution::<T, (), ()>::memory(dims)).saturating_add(
+            data::length::<Self, T>(Layout { intervals: dims.len().saturating_sub(1), free: 0 }),
+        )
     }
 
     /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
@@ -73,7 +76,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// # Errors
     /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
     /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`];
-    /// [`OcpError::Length`] if memory or dimensions do not fit.
+    /// [`OcpError::Length`] if memory or dimensions do not fit; [`OcpError::Unsupported`] of a free
+    /// end time and boundary conditions.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,
@@ -88,13 +92,17 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
+        let what = "couplings of stages in given memory: take `Problem::on`";
+        if matches!(horizon, Horizon::Free { .. }) || H::STARTS > 0 {
+            return Err(OcpError::Unsupported { what });
+        }
         let intervals = horizon.intervals();
         let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));
         if dims.len() != expected {
             return Err(OcpError::Length { part, stage: 0, expected, found: dims.len() });
         }
         for (stage, &dims) in dims.iter().enumerate() {
-            let given = data::stage::<Self, T>(stage == intervals);
+            let given = data::stage::<Self, T>(0, stage == intervals);
             for (expected, found) in [(given.nx, dims.nx), (given.nu, dims.nu), (given.ng, dims.ng)] {
                 if expected != found {
                     return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });

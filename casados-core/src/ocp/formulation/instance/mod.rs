@@ -1,19 +1,21 @@
 //! A problem on a horizon, with its data, its iterate and its QP.
 
+mod check;
 pub(in crate::ocp) mod data;
 mod memory;
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::free::{Free, FreeParameters};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::horizon::Horizon;
-use crate::ocp::formulation::instance::data::{Data, split};
+use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
+use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 #[cfg(feature = "alloc")]
@@ -83,6 +85,7 @@ pub struct Ocp<P, T, D, M> {
     /// What was left of the equations of stages where intervals were evaluated last: the sum, and
     /// the largest.
     pub(in crate::ocp) stages: [T; 2],
+    pub(in crate::ocp) free: FreeParameters,
     /// See [`Nodes`].
     pub(in crate::ocp) step_length: Option<T>,
     /// Whether algebraic states of the last evaluation are those of the iterate.
@@ -136,21 +139,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
         let z = P::Dynamics::ALGEBRAIC;
-        let (inside, at_end) =
-            (There { z, u: true, stage: 0 }, There { z: false, u: false, stage: intervals });
+        let (inside, at_end) = (
+            There { z, u: true, stage: 0, t: true },
+            There { z: false, u: false, stage: intervals, t: true },
+        );
         dynamics.check()?;
         stage_cost.check(inside)?;
         terminal_cost.check(at_end)?;
         path.check(inside)?;
         terminal.check(at_end)?;
-        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
+        let Data { times, p, lower, upper, references, .. } =
+            split::<P, T>(data.as_mut(), Layout { intervals, free: P::Terminal::STARTS });
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.
         p.fill(T::from_f64(f64::NAN));
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let begin = k * P::Path::ROWS;
+            let (begin, starts) = (k * path_rows::<P, T>(), P::Path::ROWS);
             let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            if k < intervals && starts < path_rows::<P, T>() {
+                // Copies of the first state are equal to it, at its stage.
+                let bound = if k == 0 { T::ZERO } else { T::from_f64(f64::INFINITY) };
+                let links = [&mut *lower, &mut *upper].into_iter().zip([T::ZERO - bound, bound]);
+                links.for_each(|(to, bound)| {
+                    part_mut(to, begin + starts, path_rows::<P, T>() - starts).fill(bound);
+                });
+            }
             let bounds = stage.g_bounds_mut();
             let limits = [
                 part_mut(lower, begin, rows),
@@ -166,6 +180,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             assign(bounds.upper_linear, bounds.lower_linear);
             assign(bounds.upper_quadratic, bounds.lower_quadratic);
         }
+        for copy in 0..P::Terminal::STARTS {
+            qp.share(copy);
+        }
         Ok(Self {
             problem,
             initial: Initial::Unknown,
@@ -174,6 +191,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             data,
             objective: T::ZERO,
             stages: [T::ZERO; 2],
+            free: FreeParameters::with_starts(P::Terminal::STARTS),
             step_length: None,
             has_algebraic: false,
         })
@@ -203,6 +221,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[must_use]
     pub fn intervals(&self) -> usize {
         self.qp.dims().len().saturating_sub(1)
+    }
+
+    /// How large it is.
+    #[inline(always)]
+    pub(crate) fn layout(&self) -> Layout {
+        Layout { intervals: self.intervals(), free: self.free.count() }
     }
 
     /// The functions of the problem: weights of costs and options of integrators may be changed
@@ -239,7 +263,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::NoSuchStage`]
     pub fn stage(&self, stage: usize) -> Result<SolutionStage<'_, T>, OcpError> {
         let stages = self.intervals() + 1;
-        self.iterate.stage(stage).ok_or(OcpError::NoSuchStage { part: Part::States, stage, stages })
+        match self.iterate.stage(stage) {
+            Some(point) => Ok(without_free(point, self.free.count())),
+            None => Err(OcpError::NoSuchStage { part: Part::States, stage, stages }),
+        }
     }
 
     /// A state and a control as the iterate at every stage, and no multipliers: a start that is
@@ -262,14 +289,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess_stage(&mut self, stage: usize, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
-        let last = self.intervals();
+        let (last, free) = (self.intervals(), self.free.count());
         let Some(place) = self.iterate.stage_mut(stage) else {
             return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
         };
+        let own = place.u.get_mut(free..).unwrap_or_default();
         Labels::states::<P, T>(Part::States, stage).check_vector(x, place.x.len())?;
-        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, place.u.len())?;
+        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, own.len())?;
         assign(place.x, x);
-        assign(place.u, u);
+        assign(own, u);
         for multipliers in [
             place.dynamics,
             place.x_lower,
@@ -281,61 +309,37 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ] {
             multipliers.fill(T::ZERO);
         }
+        if stage == 0 {
+            self.copy_start();
+        }
         Ok(self)
     }
 
-    /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
-    /// finite.
-    ///
-    /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::InvalidWeight`], [`OcpError::InvalidValue`]
-    pub fn check(&mut self) -> Result<(), OcpError> {
-        let Problem { dynamics, stage_cost, terminal_cost, .. } = self.problem.parts();
-        dynamics.check()?;
-        stage_cost.check_weights()?;
-        terminal_cost.check_weights()?;
-        if self.initial == Initial::Unknown {
-            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
-        }
-        let np = P::Shape::NP;
-        let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
-        if let Some((index, _)) = crate::finite::not_finite(p) {
-            let stage = index.checked_div(np).unwrap_or(0);
-            return Err(OcpError::Missing { part: Part::Parameters, stage });
-        }
-        self.check_iterate()
-    }
-
-    /// # Errors
-    /// [`OcpError::InvalidValue`]
-    pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
-        // All numbers at once; names are looked for where one of these is not finite.
-        if crate::finite::not_finite(self.iterate.numbers()).is_some() {
-            self.name_not_finite()
-        } else {
-            Ok(())
+    /// Makes copies of the first state what it is.
+    pub(in crate::ocp) fn copy_start(&mut self) {
+        for copy in 0..P::Terminal::STARTS {
+            let first = self.iterate.stages().next();
+            let value = first.and_then(|first| first.x.get(P::Terminal::start(copy)).copied());
+            self.write_free(copy, value.unwrap_or(T::ZERO));
         }
     }
 
-    /// The first number of the iterate that is not finite.
-    fn name_not_finite(&self) -> Result<(), OcpError> {
-        let (last, part) = (self.intervals(), Part::Multipliers);
-        for (stage, point) in self.iterate.stages().enumerate() {
-            Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
-            Labels::controls::<P, T>(Part::Controls, stage).check_finite(point.u)?;
-            for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
-                Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
-            }
-            for multipliers in [point.u_lower, point.u_upper] {
-                Labels::controls::<P, T>(part, stage).check_finite(multipliers)?;
-            }
-            let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
-            let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
-            for multipliers in [point.g_lower, point.g_upper] {
-                of_constraints.check_finite(multipliers)?;
+    /// Writes a shared variable of the iterate.
+    pub(in crate::ocp) fn write_free(&mut self, w: usize, value: T) {
+        for k in 0..=self.intervals() {
+            if let Some(place) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(w)) {
+                *place = value;
             }
         }
-        Ok(())
+    }
+
+    /// What a free parameter is called; of a copy of an element of the first state, this element.
+    pub(in crate::ocp) fn name_of_free(&self, index: usize) -> &'static str {
+        if index < P::Terminal::STARTS {
+            return self.names().x.get(P::Terminal::start(index)).copied().unwrap_or("");
+        }
+        let parameter = self.free.parameter(index);
+        parameter.and_then(|parameter| self.names().p.get(parameter).copied()).unwrap_or("")
     }
 
     /// Everything of the iterate one interval earlier, as the start of the problem of the next
@@ -345,15 +349,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
+/// A stage with the controls of the model alone.
+pub(in crate::ocp) fn without_free<T>(stage: SolutionStage<'_, T>, free: usize) -> SolutionStage<'_, T> {
+    let [u, u_lower, u_upper] =
+        [stage.u, stage.u_lower, stage.u_upper].map(|list| list.get(free..).unwrap_or_default());
+    SolutionStage { u, u_lower, u_upper, ..stage }
+}
+
 /// The intervals at a point; weights of algebraic states may be empty.
 pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
     v: &'a [T],
     multipliers: &'a [T],
     weights: &'a [T],
-    p: &'a [T],
+    (p, free): (&'a [T], Free<'a>),
     times: &'a [T],
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
-    let ld = [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)];
-    Nodes { v, multipliers, weights, p, times, dims, ld, step_length: None }
+    let ld = [pad::<T>(inputs::<S>(free.count())), pad::<T>(S::NX)];
+    Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None }
 }

@@ -24,10 +24,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if warm {
             return Ok(());
         }
-        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
-        dynamics.begin_stages(&nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times))
+        let p = (&*data.p, self.free.view());
+        dynamics.begin_stages(&nodes::<P::Shape, T>(v, multipliers, &[], p, data.times))
     }
 
     /// The iterate is the best one again.
@@ -56,11 +58,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         for place in Places::<T>::new(iterate.qp.dims) {
             assign(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));
         }
-        let intervals = ocp.qp.dims().len().saturating_sub(1);
-        let data = split::<P, T>(ocp.data.as_mut(), intervals);
+        let layout = ocp.layout();
+        let data = split::<P, T>(ocp.data.as_mut(), layout);
         let Problem { dynamics, .. } = ocp.problem.parts();
         let (v, multipliers) = ocp.iterate.vectors();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, ocp.free.view()), data.times);
         let (step, _) = self.trial.vectors();
         dynamics.expand_stages(&nodes, &Nodes { v: step, ..nodes })
     }

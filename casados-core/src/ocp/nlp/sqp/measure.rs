@@ -14,8 +14,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
     /// change of `penalties`.
     pub(in crate::ocp) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let (from, _) = self.iterate.vectors();
         let (to, _) = solution.vectors();
         let (mut slope, mut begin) = (T::ZERO, 0);
@@ -47,8 +47,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
     pub(super) fn curvature(&mut self, solution: &Solution<T, D, M>) -> f64 {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let ((from, _), (to, _)) = (self.iterate.vectors(), solution.vectors());
         let (mut curvature, mut square, mut begin) = (T::ZERO, T::ZERO, 0);
         for stage in self.qp.view().stages() {

@@ -26,7 +26,7 @@ use core::fmt;
 /// The covariance of states and controls of an estimate; see
 /// [`Ocp::covariance`](crate::ocp::Ocp::covariance).
 ///
-/// Parameters that are estimated are states that do not change, or shared controls.
+/// Parameters that are estimated are [free](crate::ocp::HeapOcp), the same at all stages.
 ///
 /// ```
 /// # use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
@@ -51,7 +51,9 @@ use core::fmt;
 #[derive(Clone, Debug)]
 pub struct Covariance<T> {
     names: &'static Names,
-    /// `NX`, `NU`, intervals.
+    /// Names of free parameters, in front of the controls.
+    free: Vec<&'static str>,
+    /// `NX`, free parameters and `NU`, intervals.
     dims: [usize; 3],
     /// Rows of states and controls, stage after stage: those of `Z (Zᵀ H Z)^(−½)`.
     rows: Vec<T>,
@@ -162,10 +164,11 @@ impl<T: Real> Covariance<T> {
         let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
         let (index, part_of, stages, known) = match (position(self.names.x), position(self.names.u)) {
             (Some(i), _) => (i, Part::States, intervals + 1, self.names.x.get(i)),
-            (None, Some(j)) => (nx + j, Part::Controls, intervals, self.names.u.get(j)),
-            (None, None) => {
-                return Err(OcpError::UnknownName { name: Text::new(name), known: self.names });
-            }
+            (None, Some(j)) => (nx + self.free.len() + j, Part::Controls, intervals, self.names.u.get(j)),
+            (None, None) => match position(&self.free) {
+                Some(w) => (nx + w, Part::Parameters, intervals + 1, self.free.get(w)),
+                None => return Err(OcpError::UnknownName { name: Text::new(name), known: self.names }),
+            },
         };
         if stage >= stages {
             return Err(OcpError::NoSuchStage { part: part_of, stage, stages });
@@ -179,8 +182,8 @@ impl<T: Real> Covariance<T> {
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
-    /// The covariance of an estimate, which the iterate is: of all states and controls at all
-    /// stages.
+    /// The covariance of an estimate, which the iterate is: of all states, controls and free
+    /// parameters at all stages.
     ///
     /// ```text
     /// Cov(w) = Z (Zᵀ H Z)⁻¹ Zᵀ
@@ -274,7 +277,9 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 null.push(direction);
             }
         }
-        unknowns.covariance::<P>(&basis, &null, &units, rounding.sqrt())
+        let covariance = unknowns.covariance::<P>(&basis, &null, &units, rounding.sqrt())?;
+        let free = (0..self.layout().free).map(|w| self.name_of_free(w)).collect();
+        Ok(Covariance { free, ..covariance })
     }
 }
 
@@ -317,6 +322,7 @@ impl<T: Real> Unknowns<T> {
             directions.map(|(direction, &length)| self.named(direction, units, tolerance * length));
         Ok(Covariance {
             names: const { &<P::Dynamics as Dynamics<T>>::NAMES },
+            free: Vec::new(),
             dims: self.dims,
             rows,
             rank: basis.len(),

@@ -137,8 +137,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state;
-    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::InvalidOption`] of the
-    /// smoothing; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    /// [`OcpError::FreeParameters`]; [`OcpError::Length`] if the memory is of another problem;
+    /// [`OcpError::InvalidOption`] of the smoothing; [`OcpError::Qp`] if the reduced Hessian is not
+    /// positive definite.
     pub fn factorise<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -155,10 +156,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Checks memory and options, and what has to be found beside the recursion.
     ///
     /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`]
+    /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`],
+    /// [`OcpError::FreeParameters`]
     pub(super) fn prepare_factors(&self, factors: &mut SolutionFactors<T>) -> Result<(), OcpError> {
         if self.initial == Initial::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        if self.free.count() > 0 {
+            return Err(OcpError::FreeParameters);
         }
         let value = factors.smoothing.to_f64();
         if !(value >= 0.0 && value.is_finite()) {

@@ -3,10 +3,11 @@
 use crate::linalg::{axpy, dot};
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::IntervalResult;
-use crate::ocp::formulation::functions::point::{Cross, read};
+use crate::ocp::formulation::functions::point::Cross;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{Node, inputs, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
@@ -114,7 +115,8 @@ impl<T: Real> Parameters<T> {
         let columns = part_mut(&mut self.gradients, k * size * np, size * np);
         columns.fill(T::ZERO);
         let (slopes, square) = (&mut *self.slopes_of_value, &mut *self.square);
-        let mut cross = Cross { columns, ld: size, slopes, square };
+        let free = Free::default();
+        let mut cross = Cross { free, columns, ld: size, slopes, square };
         cross.add_blocks([nx, nu], step.hessian_p);
         cross.add_blocks([nx, nu], step.cost.hessian_p);
         step.cost.p.iter().enumerate().for_each(|(p, &slope)| cross.slope(p, slope));
@@ -129,11 +131,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result: &mut Parameters<T>,
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
-        let (np, size) = (P::Shape::NP, inputs::<P::Shape>());
+        let (layout, free) = (self.layout(), self.free.view());
+        let (np, size) = (P::Shape::NP, inputs::<P::Shape>(layout.free));
         if np == 0 {
             return Ok(());
         }
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = self.problem.parts();
         let Parameters {
             gradients,
@@ -150,13 +153,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
             let columns = part_mut(gradients, k * size * np, size * np);
             if k == intervals {
                 columns.fill(T::ZERO);
             }
-            let mut cross = Cross { columns, ld: size, slopes: of_value, square };
+            let mut cross = Cross { free, columns, ld: size, slopes: of_value, square };
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
                 *mu = upper - lower;
             }
@@ -175,14 +178,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             extended.fill(T::ZERO);
             let Cross { slopes: of_value, square, .. } = &mut cross;
-            let mut direct = Cross { columns: extended, ld: size + z.len(), slopes: of_value, square };
+            let mut direct = Cross { free, columns: extended, ld: size + z.len(), slopes: of_value, square };
             stage_cost.cross(&point, node.reference, place, &mut direct)?;
             path.cross(&point, mu, slopes, &mut direct);
-            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
+            let spot = Spot::new(k, free, &[]);
+            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
             stage_cost.add(&point, node.reference, place, &mut terms)?;
-            path.linearise(&point, values, columns, terms.ld, k)?;
+            path.linearise(&point, values, columns, terms.ld, spot)?;
             if let Some(mu) = mu {
-                path.curve(&point, mu, &mut terms);
+                path.curve(&point, mu, spot, &mut terms);
             }
             let dp = part(dz_dp, k * z.len() * np, z.len() * np);
             Extended { terms, columns }.fold_parameters::<P::Shape>([dz, dp], extended, &mut cross, slopes);

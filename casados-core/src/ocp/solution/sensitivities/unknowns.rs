@@ -4,6 +4,7 @@
 use crate::linalg::axpy;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::instance::data::Layout;
 use crate::ocp::formulation::instance::{HeapOcp, Initial};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::add;
@@ -12,10 +13,10 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// What the estimate is found by: elements of the first state, shared controls, controls of every
-/// stage; and how all variables follow from these.
+/// What the estimate is found by: elements of the first state, free parameters and shared controls,
+/// controls of every stage; and how all variables follow from these.
 pub(super) struct Unknowns<T> {
-    /// `NX`, `NU`, intervals.
+    /// `NX`, free parameters and `NU`, intervals.
     pub dims: [usize; 3],
     /// Name and stage of each.
     pub names: Vec<(&'static str, usize)>,
@@ -37,7 +38,8 @@ impl<T: Real> Unknowns<T> {
 
     /// Those of a problem that has been linearised.
     pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let (nx, nu, intervals) = (P::Shape::NX, P::Shape::NU, ocp.intervals());
+        let Layout { intervals, free } = ocp.layout();
+        let (nx, nu) = (P::Shape::NX, free + P::Shape::NU);
         let known = <P::Dynamics as Dynamics<T>>::NAMES;
         let qp = ocp.qp();
         let mut names = Vec::new();
@@ -45,10 +47,13 @@ impl<T: Real> Unknowns<T> {
             names.extend(known.x.iter().map(|&name| (name, 0)));
         }
         let is_shared = |j: usize| is_marked(qp.shared(), j);
-        names.extend(marked(qp.shared()).filter_map(|j| known.u.get(j)).map(|&name| (name, 0)));
+        let name = |j: usize| match j.checked_sub(free) {
+            None => ocp.name_of_free(j),
+            Some(j) => known.u.get(j).copied().unwrap_or_default(),
+        };
+        names.extend(marked(qp.shared()).map(|j| (name(j), 0)));
         for k in 0..intervals {
-            let own = known.u.iter().enumerate().filter(|&(j, _)| !is_shared(j));
-            names.extend(own.map(|(_, &name)| (name, k)));
+            names.extend((free..nu).filter(|&j| !is_shared(j)).map(|j| (name(j), k)));
         }
         let count = names.len();
         let rows = zeros((intervals + 1) * (nx + nu) * count)?;
@@ -56,6 +61,11 @@ impl<T: Real> Unknowns<T> {
         let first = if ocp.initial == Initial::Free { nx } else { 0 };
         for i in 0..first {
             let place = all.place(0, i) + i;
+            add(&mut all.rows, place, T::ONE);
+        }
+        // Free parameters are there at the last stage too.
+        for w in 0..free {
+            let place = all.place(intervals, nx + w) + first + w;
             add(&mut all.rows, place, T::ONE);
         }
         let shared = marked(qp.shared()).count();

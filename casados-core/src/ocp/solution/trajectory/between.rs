@@ -2,14 +2,13 @@
 
 use super::{Kind, Series, Trajectory};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult};
-use crate::ocp::formulation::functions::point::read;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{Node, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
-use crate::qp::{StageDims, part, part_mut, zeros};
+use crate::qp::{SolutionStage, StageDims, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -80,10 +79,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (intervals, points) = (self.intervals(), parts.len());
         let (nx, nz, np) = (P::Shape::NX, P::Shape::NZ, P::Shape::NP);
         let width = nx + nz + P::Path::ROWS;
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let (layout, free) = (self.layout(), self.free.view());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &IntervalResult<'_, T>| {
             let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
             to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
@@ -96,8 +96,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let (variables, g) = here.split_at_mut_checked(nx + nz).unwrap_or_default();
                 let (x, z) = variables.split_at_checked(nx).unwrap_or_default();
                 let p = part(data.p, k * np, np);
-                read::<P::Shape, T>(&mut point, [x, z, stage.u, p], start + along * (end - start));
-                path.value(&point, g, k)?;
+                let node = Node { time: start + along * (end - start), p, reference: &[], factor: T::ONE };
+                node.read::<P::Shape>(&mut point, &SolutionStage { x, ..stage }, z, free);
+                path.value(&point, g, Spot::new(k, free, &[]))?;
             }
         }
         Ok(is_there.then_some(Inside { points, values, width }))

@@ -5,7 +5,7 @@ use crate::ocp::assembly::algebraic;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::problem::{Formulation, Problem};
@@ -43,7 +43,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn solution(&mut self) -> Result<Trajectory<T>, OcpError> {
         self.check()?;
         let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let rows = intervals * path_rows::<P, T>() + P::Terminal::ROWS;
         let mut values = vec![T::ZERO; rows];
         if P::Shape::NZ > 0 && P::Dynamics::ALGEBRAIC {
             self.find_algebraic()?;
@@ -66,22 +66,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             series.push(state);
         }
         if P::Dynamics::ALGEBRAIC {
-            let all = split::<P, T>(self.data.as_mut(), intervals).algebraic;
+            let layout = self.layout();
+            let all = split::<P, T>(self.data.as_mut(), layout).algebraic;
             for (i, &name) in known.z.iter().enumerate() {
-                let values = (0..intervals).map(|k| get(algebraic::at::<P::Shape, T>(all, k).0, i)).collect();
+                let at = |k| get(algebraic::at::<P::Shape, T>(all, layout, k).0, i);
+                let values = (0..intervals).map(at).collect();
                 let algebraic = Series::new(Kind::Algebraic, name, 0, values);
                 series.push(algebraic.with_unit(unit(known.units.z, i)));
             }
         }
+        let free = self.free.count();
         for (i, &name) in known.u.iter().enumerate() {
-            let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, i)).collect();
+            let values = self.iterate.stages().take(intervals).map(|stage| get(stage.u, free + i)).collect();
             let control = Series::new(Kind::Control, name, 0, values).with_unit(unit(known.units.u, i));
-            series.push(self.bounded(control, i, &controls));
+            series.push(self.bounded(control, free + i, &controls));
         }
-        let data = split::<P, T>(self.data.as_mut(), intervals);
         for (i, &name) in known.p.iter().enumerate() {
-            let values = (0..=intervals).map(|k| get(data.p, k * P::Shape::NP + i)).collect();
-            let parameter = Series::new(Kind::Parameter, name, 0, values);
+            let parameter = match self.free.view().of(i) {
+                Some(w) => self.of_free(name, w, &controls),
+                None => {
+                    let p = self.data.as_ref().get(intervals + 1..).unwrap_or_default();
+                    let values = (0..=intervals).map(|k| get(p, k * P::Shape::NP + i)).collect();
+                    Series::new(Kind::Parameter, name, 0, values)
+                }
+            };
             series.push(parameter.with_unit(unit(known.units.p, i)));
         }
         for (row, name) in names::<P::Path, _, T>().enumerate() {
@@ -91,18 +99,37 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let terminal = self.of_constraint(Kind::Terminal, name, row, &values);
             series.push(terminal.with_unit(P::Terminal::unit(row)));
         }
+        let duration =
+            self.iterate.stages().next().map_or(T::ONE, |first| self.free.view().duration(first.u));
+        let times = self.times().iter().map(|&time| duration * time).collect();
         let (model, time_unit) = (known.model.into(), known.units.t.into());
-        Ok(Trajectory { model, times: self.times().to_vec(), time_unit, series })
+        Ok(Trajectory { model, times, time_unit, series })
     }
 
     /// Algebraic states of the iterate.
     pub(in crate::ocp) fn find_algebraic(&mut self) -> Result<(), OcpError> {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let (layout, free) = (self.layout(), self.free.view());
+        let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        dynamics.simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, k, step))
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
+        dynamics
+            .simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step))
+    }
+
+    /// A free parameter, with its bounds and multipliers at every node: it is one variable.
+    fn of_free(&self, name: &'static str, w: usize, places: &Places<T>) -> Series<T> {
+        let nodes = self.intervals() + 1;
+        let value = self.iterate.stages().next().map_or(T::ZERO, |stage| get(stage.u, w));
+        let one = self.bounded(Series::new(Kind::Parameter, name, 0, vec![value]), w, places);
+        let Series { lower, upper, lower_multipliers, upper_multipliers, .. } = one;
+        let mut series = Series::new(Kind::Parameter, name, 0, vec![value; nodes]);
+        let repeat = |list: Vec<Option<T>>| list.into_iter().cycle().take(nodes).collect();
+        (series.lower, series.upper) = (repeat(lower), repeat(upper));
+        let repeat = |list: Vec<T>| list.into_iter().cycle().take(nodes).collect();
+        (series.lower_multipliers, series.upper_multipliers) =
+            (repeat(lower_multipliers), repeat(upper_multipliers));
+        series
     }
 
     /// With the bounds and multipliers of states or controls.
@@ -124,8 +151,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn of_constraint(&mut self, kind: Kind, name: String, row: usize, values: &[T]) -> Series<T> {
         let intervals = self.intervals();
         let stages = if kind == Kind::Path { 0..intervals } else { intervals..intervals + 1 };
-        let data = split::<P, T>(self.data.as_mut(), intervals);
-        let all = |list: &[T]| stages.clone().map(|k| get(list, k * P::Path::ROWS + row)).collect::<Vec<_>>();
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
+        let all =
+            |list: &[T]| stages.clone().map(|k| get(list, k * path_rows::<P, T>() + row)).collect::<Vec<_>>();
         let finite = |bound: T| bound.is_finite().then_some(bound);
         let mut series = Series::new(kind, name, stages.start, all(values));
         series.lower = all(data.lower).into_iter().map(finite).collect();

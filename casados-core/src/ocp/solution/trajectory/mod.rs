@@ -230,6 +230,14 @@ fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
 }
 
 impl<T: Real> Trajectory<T> {
+    /// The last of the times: the end of the horizon, which may have been [found](Horizon::free).
+    ///
+    /// [Horizon::free]: crate::ocp::Horizon::free
+    #[must_use]
+    pub fn end_time(&self) -> T {
+        self.times.last().copied().unwrap_or(T::ZERO)
+    }
+
     /// The name of the model.
     #[must_use]
     pub fn model(&self) -> &str {

@@ -54,7 +54,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 };
                 let costates = if kind == Kind::State { intervals } else { 0 };
                 has(series, [count, count, count, costates])?;
+                let index = if kind == Kind::Control { self.free.count() + index } else { index };
                 found.push((index, first, series, places));
+            }
+        }
+        let mut free = Vec::new();
+        for (parameter, &name) in known.p.iter().enumerate() {
+            if let Some(w) = self.free.view().of(parameter) {
+                let series = trajectory.of(name, Kind::Parameter)?;
+                has(
+                    series,
+                    [intervals + 1, series.lower_multipliers.len(), series.upper_multipliers.len(), 0],
+                )?;
+                free.push((w, series));
+            }
+        }
+        for (w, series) in free {
+            self.write_free(w, get(&series.values, 0));
+            if let Some(first) = self.iterate.stage_mut(0) {
+                set(first.u_lower, w, get(&series.lower_multipliers, 0));
+                set(first.u_upper, w, get(&series.upper_multipliers, 0));
             }
         }
         for (index, first, series, places) in found {
@@ -71,13 +90,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
             }
         }
+        self.copy_start();
         self.has_algebraic = false;
         self.check_iterate()?;
         Ok(self)
     }
 
     /// Makes a trajectory the guess, with states between its points on straight lines and the
-    /// controls that hold there, and no multipliers: horizons may differ, as those of a coarse and
+    /// controls that hold there, free parameters where it has them, and no multipliers: horizons
+    /// may differ, as those of a coarse and
     /// a fine grid. Before its first time and after its last one the nearest values are taken.
     ///
     /// # Errors
@@ -115,7 +136,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (states, controls) = (all(known.x, Kind::State)?, all(known.u, Kind::Control)?);
         let (mut x, mut u) = (Vec::new(), Vec::new());
         for k in 0..=self.intervals() {
-            let time = get(self.times(), k);
+            let unit = if self.free.view().end().is_some() { trajectory.end_time() } else { T::ONE };
+            let time = unit * get(self.times(), k);
             let (before, along) = place(&trajectory.times, time);
             x.clear();
             u.clear();
@@ -128,6 +150,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             self.guess_stage(k, &x, &u)?;
         }
+        for (parameter, &name) in known.p.iter().enumerate() {
+            if let Some(w) = self.free.view().of(parameter)
+                && let Ok(series) = trajectory.of(name, Kind::Parameter)
+            {
+                self.write_free(w, get(&series.values, 0));
+            }
+        }
+        self.check_iterate()?;
         Ok(self)
     }
 }

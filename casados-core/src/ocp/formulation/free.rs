@@ -1,0 +1,174 @@
+//! Parameters of the model that are found with the states and controls.
+//!
+//! ```text
+//! variables of a stage   (x, w, u)        of the last one   (x, w)        w the same at all stages
+//! ```
+//!
+//! `w` are shared controls of the QP, in front of the controls of the model: the recursion carries
+//! each as one right-hand side. The parameters of the model are those that were set, with `w` in
+//! the places of the free ones.
+
+#[cfg(feature = "alloc")]
+use crate::qp::element::set;
+use crate::scalar::Real;
+use crate::shape::Shape;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// No free parameter.
+const NONE: u32 = u32::MAX;
+
+/// The free parameters of a problem.
+#[derive(Clone, Debug, Default)]
+pub(in crate::ocp) struct FreeParameters {
+    /// How many copies of elements of the first state are in front of them.
+    #[cfg(feature = "alloc")]
+    starts: usize,
+    /// Which parameter of the model each is.
+    #[cfg(feature = "alloc")]
+    parameters: Vec<usize>,
+    /// For every parameter of the model which one of these it is, or [`NONE`].
+    #[cfg(feature = "alloc")]
+    places: Vec<u32>,
+    /// Which one is the end of the horizon.
+    #[cfg(feature = "alloc")]
+    end: Option<usize>,
+}
+
+impl FreeParameters {
+    /// None, behind so many copies of elements of the first state.
+    pub fn with_starts(starts: usize) -> Self {
+        let _ = starts;
+        Self {
+            #[cfg(feature = "alloc")]
+            starts,
+            ..Self::default()
+        }
+    }
+
+    /// For the functions of a problem.
+    #[inline(always)]
+    pub fn view(&self) -> Free<'_> {
+        #[cfg(feature = "alloc")]
+        return Free { count: self.starts + self.parameters.len(), places: &self.places, end: self.end };
+        #[cfg(not(feature = "alloc"))]
+        Free { count: 0, places: &[], end: None }
+    }
+
+    /// How many variables there are for these and for copies of elements of the first state.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.view().count
+    }
+
+    /// Which parameter of the model one of them is.
+    pub fn parameter(&self, index: usize) -> Option<usize> {
+        #[cfg(feature = "alloc")]
+        return self.parameters.get(index.checked_sub(self.starts)?).copied();
+        #[cfg(not(feature = "alloc"))]
+        {
+            let _ = index;
+            None
+        }
+    }
+
+    /// The end of the horizon is a parameter that is free.
+    #[cfg(feature = "alloc")]
+    pub fn set_end(&mut self, parameter: usize) {
+        self.end = self.view().of(parameter);
+    }
+
+    /// Adds one of `np` parameters of the model: which one of these it is.
+    #[cfg(feature = "alloc")]
+    pub fn add(&mut self, parameter: usize, np: usize) -> usize {
+        self.places.resize(np, NONE);
+        let index = self.starts + self.parameters.len();
+        match self.places.get_mut(parameter) {
+            Some(place) if *place == NONE => *place = index as u32,
+            place => return place.map_or(index, |place| *place as usize),
+        }
+        self.parameters.push(parameter);
+        index
+    }
+}
+
+/// Where free parameters are among the variables `(x, w, u)` of a stage.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Free<'a> {
+    count: usize,
+    places: &'a [u32],
+    end: Option<usize>,
+}
+
+impl Free<'_> {
+    /// Which one is the end of the horizon.
+    #[inline(always)]
+    pub(in crate::ocp) fn end(self) -> Option<usize> {
+        self.end
+    }
+
+    /// How long the horizon is in units of its nodes' times: the end time, or one.
+    #[inline(always)]
+    pub(in crate::ocp) fn duration<T: Real>(self, w: &[T]) -> T {
+        self.end.and_then(|end| w.get(end).copied()).unwrap_or(T::ONE)
+    }
+
+    /// How many there are.
+    #[inline(always)]
+    pub(in crate::ocp) fn count(self) -> usize {
+        self.count
+    }
+
+    /// Which one a parameter of the model is.
+    #[inline(always)]
+    pub(in crate::ocp) fn of(self, parameter: usize) -> Option<usize> {
+        self.places.get(parameter).filter(|&&place| place != NONE).map(|&place| place as usize)
+    }
+
+    /// The index in `(x, w, u, z)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
+    #[inline(always)]
+    pub(in crate::ocp) fn position<S: Shape>(self, variable: usize) -> Option<usize> {
+        let (nx, nz, nu) = (S::NX, S::NZ, S::NU);
+        let after_u = 2 * nx + nz + nu;
+        if (nx..2 * nx).contains(&variable) {
+            Some(variable - nx)
+        } else if (2 * nx..2 * nx + nz).contains(&variable) {
+            Some(variable - nx + nu + self.count)
+        } else if (2 * nx + nz..after_u).contains(&variable) {
+            Some(variable - nx - nz + self.count)
+        } else {
+            self.of(variable.checked_sub(after_u)?).map(|w| nx + w)
+        }
+    }
+
+    /// Writes free parameters over those that were set.
+    #[inline(always)]
+    pub(in crate::ocp) fn write<T: Real>(self, p: &mut [T], w: &[T]) {
+        for (p, &place) in p.iter_mut().zip(self.places) {
+            if let Some(&value) = w.get(place as usize) {
+                *p = value;
+            }
+        }
+    }
+
+    /// The columns of a matrix over the parameters of the model that are of free ones, each with
+    /// which one it is; columns are `rows` long.
+    pub(in crate::ocp) fn columns<T>(self, matrix: &[T], rows: usize) -> impl Iterator<Item = (usize, &[T])> {
+        let columns = matrix.chunks_exact(rows.max(1)).enumerate();
+        columns.filter_map(move |(parameter, column)| Some((self.of(parameter)?, column)))
+    }
+
+    /// The elements of a gradient over the parameters of the model that are of free ones.
+    pub(in crate::ocp) fn elements<T: Copy>(self, gradient: &[T]) -> impl Iterator<Item = (usize, T)> {
+        let elements = gradient.iter().enumerate();
+        elements.filter_map(move |(parameter, &value)| Some((self.of(parameter)?, value)))
+    }
+
+    /// A step of the parameters of the model, from one of free ones.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn spread<T: Real>(self, step: &mut [T], w: &[T]) {
+        for (parameter, &place) in self.places.iter().enumerate().filter(|(_, place)| **place != NONE) {
+            set(step, parameter, w.get(place as usize).copied().unwrap_or(T::ZERO));
+        }
+    }
+}

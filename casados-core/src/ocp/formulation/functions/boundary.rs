@@ -1,0 +1,215 @@
+//! Conditions that connect the two ends of a horizon.
+
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::ocp::formulation::check::Labels;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
+use crate::ocp::formulation::functions::pattern::Entries;
+use crate::ocp::formulation::functions::point::{
+    Cross, Terms, There, each_entry, finite_outputs, parameter, read,
+};
+use crate::scalar::Real;
+use crate::shape::{Array, Outputs, Plain, Shape, plain};
+use bytemuck::Zeroable;
+
+/// `lower ≤ r(x₀, x_N, p) ≤ upper` of the outputs of a function of the first state `x0`, the last
+/// one, `x`, and the parameters of the last node. A side may be infinite; equal bounds are an
+/// equation.
+///
+/// It is a terminal constraint, alone or in a pair with others, and has its names, bounds and
+/// multipliers in solutions. For each element of `x0` that the function depends on the QP has a
+/// shared variable, which is equal to it. That a state is periodic has a shorter form,
+/// [`Ocp::periodic`](crate::ocp::Ocp::periodic).
+///
+/// # Example
+/// A car that comes back twice as fast as it left, a metre further on.
+/// ```
+/// use casados::ocp::{Boundary, GeneralCost, HeapIpm, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn car(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { u * u }
+/// #[function]
+/// fn twice(x0: [f64; 2], x: [f64; 2]) -> [f64; 2] { [x[0] - x0[0], x[1] - 2.0 * x0[1]] }
+///
+/// let mut ocp = Problem::new(Irk::<Car, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .terminal_constraints(Boundary::<Twice>::new([1.0, 0.0], [1.0, 0.0]))
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.free_initial_state().bound("x[0]", ..1, 0.0, 0.0)?.guess(&[0.0, 1.0], &[0.0])?;
+/// assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let speed = ocp.solution()?.state("x[1]")?.to_vec();
+/// assert!((speed[10] - 2.0 * speed[0]).abs() < 1e-6 && (speed[0] - 9.0 / 14.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Boundary<F: Function, T: Plain = f64> {
+    lower: ArrayY<F, T>,
+    upper: ArrayY<F, T>,
+    /// Penalties.
+    linear: ArrayY<F, T>,
+    quadratic: ArrayY<F, T>,
+    v: ArrayV<F, T>,
+    g: ArrayY<F, T>,
+    jacobian: F::Jacobian<T>,
+    hessian: F::Hessian<T>,
+}
+
+plain!([F: Function, T: Plain] Boundary<F, T> { lower, upper, linear, quadratic, v, g, jacobian, hessian });
+
+impl<F: Function, T: Real> Boundary<F, T> {
+    /// With these bounds.
+    #[must_use]
+    pub fn new(lower: ArrayY<F, T>, upper: ArrayY<F, T>) -> Self {
+        let linear = Array::from_fn(|_| T::from_f64(f64::INFINITY));
+        let mut boundary = Self { lower, upper, linear, ..Zeroable::zeroed() };
+        F::jacobian_constants::<T>(&mut boundary.jacobian);
+        boundary
+    }
+
+    /// Makes the bounds soft: a violation `e` costs `linear · e + ½ quadratic · e²`.
+    #[must_use]
+    pub fn soft(mut self, linear: T, quadratic: T) -> Self {
+        self.linear = Array::from_fn(|_| linear);
+        self.quadratic = Array::from_fn(|_| quadratic);
+        self
+    }
+
+    /// Writes the variables of the function: `x₀` in the place of algebraic states.
+    fn read<S: Shape>(&mut self, v: &S::ArrayV<T>, at: Spot<'_, T>) {
+        let (nx, rest) = (S::NX, 2 * S::NX + S::NZ + S::NU);
+        let variables = v.as_ref();
+        let x = crate::qp::part(variables, nx, nx);
+        let p = crate::qp::part(variables, rest, S::NP);
+        let t = variables.get(rest + S::NP).copied().unwrap_or(T::ZERO);
+        read::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
+        let first = self.v.as_mut().get_mut(2 * nx..).unwrap_or_default();
+        for (copy, &value) in at.starts.iter().enumerate().take(starts::<F>()) {
+            crate::qp::element::set(first, start::<F>(copy), value);
+        }
+    }
+
+    /// The index among `(x, w)` of a variable.
+    fn position<S: Shape>(variable: usize, at: Spot<'_, T>) -> Option<usize> {
+        let nx = S::NX;
+        if let Some(p) = parameter::<F::Shape>(variable) {
+            return at.free.of(p).map(|w| nx + w);
+        }
+        match variable.checked_sub(2 * nx) {
+            None => variable.checked_sub(nx),
+            Some(state) => {
+                (0..starts::<F>()).find(|&copy| start::<F>(copy) == state).map(|copy| nx + at.first + copy)
+            }
+        }
+    }
+}
+
+/// How many elements of the first state a function depends on.
+const fn starts<F: Function>() -> usize {
+    let (variables, nx) = (F::STRUCTURE.variables, F::Shape::NX);
+    let (mut index, mut count) = (0, 0);
+    while index < variables.len() {
+        let variable = variables[index] as usize;
+        if variable >= 2 * nx && variable < 3 * nx {
+            count += 1;
+        }
+        index += 1;
+    }
+    count
+}
+
+/// Which state one of these is.
+fn start<F: Function>(copy: usize) -> usize {
+    let nx = F::Shape::NX;
+    let of_start =
+        F::STRUCTURE.variables.iter().filter_map(|&variable| (variable as usize).checked_sub(2 * nx));
+    of_start.filter(|state| *state < nx).nth(copy).unwrap_or(0)
+}
+
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
+    const ROWS: usize = F::Outputs::NY;
+    const ALGEBRAIC: bool = false;
+    const STARTS: usize = {
+        let (nx, nz, nu, np) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU, F::Shape::NP);
+        assert!(
+            nx == S::NX && nz == S::NX && nu == 0 && np == S::NP,
+            "a boundary condition is a function of two states of the model, `x0` and `x`, and of its parameters `p`, \
+             if it has some"
+        );
+        starts::<F>()
+    };
+
+    fn start(copy: usize) -> usize {
+        start::<F>(copy)
+    }
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        if there.u {
+            let what = "a boundary condition at every node: it is a terminal constraint";
+            return Err(OcpError::Unsupported { what });
+        }
+        let name = <Self as Constraints<S, T>>::name;
+        let labels = Labels { part: Part::TerminalBounds, stage: there.stage, name };
+        for index in 0..F::Outputs::NY {
+            labels.check_bounds(index, self.lower[index], self.upper[index])?;
+            labels.check_penalty(index, self.linear[index], self.quadratic[index])?;
+        }
+        if F::IS_TIMED && !there.t {
+            return Err(OcpError::DependsOnTime { function: F::STRUCTURE.name });
+        }
+        Ok(())
+    }
+    fn pattern(&self, _: Entries<'_>) -> bool {
+        false
+    }
+    fn bounds(&self, limits: [&mut [T]; 4]) {
+        let given = [&self.lower, &self.upper, &self.linear, &self.quadratic];
+        for (to, from) in limits.into_iter().zip(given) {
+            crate::qp::assign(to, from.as_ref());
+        }
+    }
+    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
+        self.read::<S>(v, at);
+        F::value::<T>(&self.v, &mut self.g);
+        finite_outputs::<F, T>(&self.g, at.stage)?;
+        crate::qp::assign(values, self.g.as_ref());
+        Ok(())
+    }
+    fn linearise(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        columns: &mut [T],
+        ld: usize,
+        at: Spot<'_, T>,
+    ) -> Result<(), OcpError> {
+        self.read::<S>(v, at);
+        F::value_jacobian::<T>(&self.v, &mut self.g, &mut self.jacobian);
+        finite_outputs::<F, T>(&self.g, at.stage)?;
+        crate::qp::assign(values, self.g.as_ref());
+        for ((row, variable), &value) in F::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
+            if let Some(position) = Self::position::<S>(variable, at) {
+                crate::qp::element::set(columns, row * ld + position, value);
+            }
+        }
+        Ok(())
+    }
+    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>) {
+        self.read::<S>(v, at);
+        let mu: ArrayY<F, T> = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
+        each_entry::<F, T>(&self.v, &mu, &mut self.hessian, |row, column, value| {
+            let places = [row, column].map(|variable| Self::position::<S>(variable, at));
+            if let [Some(row), Some(column)] = places {
+                terms.curve(row.max(column), row.min(column), value);
+            }
+        });
+    }
+    /// There are shared variables, and with these no derivatives by parameters.
+    fn cross(&mut self, _: &S::ArrayV<T>, _: Option<&[T]>, _: &mut [T], _: &mut Cross<'_, T>) {}
+    fn name(row: usize) -> (&'static str, usize) {
+        (F::STRUCTURE.name, row)
+    }
+}

@@ -1,0 +1,97 @@
+//! What a problem is checked for before it is linearised.
+
+use crate::ocp::formulation::check::Labels;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::functions::point::There;
+use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::{StageDims, part};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
+    /// finite.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::InvalidWeight`], [`OcpError::InvalidValue`]
+    pub fn check(&mut self) -> Result<(), OcpError> {
+        let Problem { dynamics, stage_cost, terminal_cost, .. } = self.problem.parts();
+        dynamics.check()?;
+        stage_cost.check_weights()?;
+        terminal_cost.check_weights()?;
+        if self.initial == Initial::Unknown {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        let np = P::Shape::NP;
+        let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
+        if let Some((index, _)) = crate::finite::not_finite(p) {
+            let stage = index.checked_div(np).unwrap_or(0);
+            return Err(OcpError::Missing { part: Part::Parameters, stage });
+        }
+        self.check_iterate()
+    }
+
+    /// # Errors
+    /// [`OcpError::InvalidValue`]
+    pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
+        // All numbers at once; names are looked for where one of these is not finite.
+        if crate::finite::not_finite(self.iterate.numbers()).is_some() {
+            self.name_not_finite()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Finds functions of what has no derivatives where the end of the horizon is free.
+    ///
+    /// # Errors
+    /// [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn check_functions(&mut self) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        if P::Dynamics::INTEGRAL {
+            let what = "a free end time with `WithIntegral`: take a running cost";
+            return Err(OcpError::Unsupported { what });
+        }
+        let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
+        let inside = There { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
+        let at_end = There { z: false, u: false, stage: intervals, t: false };
+        stage_cost.check(inside)?;
+        terminal_cost.check(at_end)?;
+        path.check(inside)?;
+        terminal.check(at_end)
+    }
+
+    /// The first number of the iterate that is not finite.
+    fn name_not_finite(&self) -> Result<(), OcpError> {
+        let (last, part) = (self.intervals(), Part::Multipliers);
+        for (stage, point) in self.iterate.stages().enumerate() {
+            Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
+            for (part, values) in [(Part::Controls, point.u), (part, point.u_lower), (part, point.u_upper)] {
+                let (w, u) = values.split_at_checked(self.free.count()).unwrap_or_default();
+                Labels::controls::<P, T>(part, stage).check_finite(u)?;
+                self.check_free(part, w)?;
+            }
+            for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
+                Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
+            }
+            let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
+            let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
+            for multipliers in [point.g_lower, point.g_upper] {
+                of_constraints.check_finite(multipliers)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Free parameters, or their multipliers, by name.
+    fn check_free(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
+        let Some((index, value)) = crate::finite::not_finite(w) else { return Ok(()) };
+        let part = if part == Part::Controls { Part::Parameters } else { part };
+        Err(OcpError::InvalidValue { part, stage: 0, name: self.name_of_free(index), index, value })
+    }
+}

@@ -1,0 +1,315 @@
+//! What an iterate is worth between its nodes: an integrator with error control goes along it.
+
+use crate::integrator::Integrator;
+use crate::model::{Dae, VectorX};
+use crate::ocp::dynamics::begin::{Begin, at};
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, Interval, vector};
+use crate::ocp::formulation::instance::data::{Node, path_rows, split};
+use crate::ocp::formulation::instance::{HeapOcp, nodes};
+use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::element::get;
+use crate::qp::{Bounds, Side, SolutionStage, part, zeros};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+use core::cmp::Ordering;
+use core::fmt;
+
+/// Pieces of an interval at whose ends bounds are looked at.
+const PIECES: usize = 8;
+
+/// What an iterate is worth, by an integrator with error control: [`Ocp::verify`].
+///
+/// [`Ocp::verify`]: crate::ocp::Ocp::verify
+///
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u - 9.81 * x[0].sin()] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { u * u }
+///
+/// // One step of order two in each interval is too little.
+/// let mut ocp = Problem::new(Erk::<Pendulum, Heun>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(10, 0.2))?;
+/// ocp.fix_initial_state(&[1.0, 0.0])?.bound("x", 10.., 0.0, 0.0)?.guess(&[0.5, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let mut adaptive = Adaptive::<Pendulum, Radau>::new(AdaptiveOptions::default())?;
+/// let verification = ocp.verify(&mut adaptive)?;
+/// println!("{verification}");
+/// assert!(verification.largest_defect().ok_or("no defect")?.relative > 1e-3);
+/// assert!(!verification.intervals(1e-3).is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verification<T = f64> {
+    /// `φ(x_k, u_k) − x_{k+1}`, of one interval after the other, by size of the state.
+    defects: Vec<Defect<T>>,
+    violations: Vec<InnerViolation<T>>,
+    intervals: usize,
+}
+
+/// Where a state ends that an interval begins with, and where the next one begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Defect<T = f64> {
+    /// The state.
+    pub state: &'static str,
+    /// The interval.
+    pub interval: usize,
+    /// What the integrator with error control has at its end, less the state of the next node.
+    pub amount: T,
+    /// The size of this as a part of the largest value of the state at any node, or of one where
+    /// that is less than one.
+    pub relative: T,
+}
+
+/// A bound that is violated between two nodes.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct InnerViolation<T = f64> {
+    /// The state, or the output of a path constraint.
+    pub name: String,
+    /// The interval.
+    pub interval: usize,
+    /// The time.
+    pub time: T,
+    /// The side.
+    pub side: Side,
+    /// By how much: the most in this interval.
+    pub amount: T,
+    /// This as a part of the bound, or of one where that is less than one.
+    pub relative: T,
+}
+
+impl<T: Real> Verification<T> {
+    /// All defects: those of the states of an interval, one interval after the other.
+    #[must_use]
+    pub fn defects(&self) -> &[Defect<T>] {
+        &self.defects
+    }
+
+    /// The defect that is the largest part of its state.
+    #[must_use]
+    pub fn largest_defect(&self) -> Option<Defect<T>> {
+        self.defects.iter().copied().reduce(|a, b| if b.relative > a.relative { b } else { a })
+    }
+
+    /// The largest violation of each bound in each interval, between the nodes, the largest part of
+    /// its bound first.
+    #[must_use]
+    pub fn violations(&self) -> &[InnerViolation<T>] {
+        &self.violations
+    }
+
+    /// The intervals that ask for shorter ones: where a defect or a violation is a larger part than
+    /// this. Ascending; for [`Horizon::refined`](crate::ocp::Horizon::refined).
+    #[must_use]
+    pub fn intervals(&self, tolerance: T) -> Vec<usize> {
+        let of_defects = self.defects.iter().map(|defect| (defect.interval, defect.relative));
+        let of_bounds = self.violations.iter().map(|violation| (violation.interval, violation.relative));
+        let mut found: Vec<usize> =
+            of_defects.chain(of_bounds).filter(|(_, part)| *part > tolerance).map(|(k, _)| k).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
+
+impl<T: Real> fmt::Display for Verification<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.largest_defect() {
+            Some(Defect { state, interval, amount, relative }) => writeln!(
+                f,
+                "largest defect: {:.2e} of `{state}` in interval {interval} of {}, a part of {:.1e}",
+                amount.to_f64(),
+                self.intervals,
+                relative.to_f64()
+            )?,
+            None => writeln!(f, "no defects")?,
+        }
+        match self.violations.first() {
+            Some(InnerViolation { name, interval, time, side, amount, .. }) => {
+                let side = if *side == Side::Lower { "lower" } else { "upper" };
+                write!(
+                    f,
+                    "largest violation between nodes: {:.2e} of the {side} bound of `{name}` in interval {interval}, \
+                     t = {}",
+                    amount.to_f64(),
+                    time.to_f64()
+                )
+            }
+            None => write!(f, "no bound is violated between nodes"),
+        }
+    }
+}
+
+impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
+    /// Integrates every interval of the iterate from its node on, by an integrator of the same
+    /// model with error control, and says where that differs from the next node, and which bounds
+    /// of states and path constraints are violated at eighths between the nodes. A state has the
+    /// wider one of the bounds at both ends of an interval.
+    ///
+    /// Tolerances are those of the integrator: let them be a hundredth of what matters.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`], [`OcpError::NonFiniteFunction`]; [`OcpError::Unsupported`] of
+    /// maps and return maps, which are no flow of a model; those of
+    /// [`Ocp::check`](crate::ocp::Ocp::check)
+    pub fn verify<I>(&mut self, integrator: &mut I) -> Result<Verification<T>, OcpError>
+    where
+        I: Integrator<Model: Dae<Shape = P::Shape>, Number = T>,
+    {
+        self.check()?;
+        if !P::Dynamics::IS_FLOW {
+            return Err(OcpError::Unsupported { what: "the verification of maps, which have no flow" });
+        }
+        let (layout, free) = (self.layout(), self.free.view());
+        let data = split::<P, T>(&mut self.data, layout);
+        let Problem { path, .. } = self.problem.parts();
+        let (v, _) = self.iterate.vectors();
+        let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, free), data.times);
+        let sizes = largest_states::<T>(self.iterate.stages(), P::Shape::NX)?;
+        let mut inside = Inside::new::<P>()?;
+        let names = <P::Dynamics as Dynamics<T>>::NAMES.x;
+        let (mut defects, mut violations) = (Vec::new(), Vec::new());
+        let mut stages = self.qp.view().stages().zip(self.iterate.stages()).peekable();
+        for (k, interval) in nodes.iter().enumerate() {
+            let Some((stage, point)) = stages.next() else { break };
+            let next = stages.peek();
+            let mut x: VectorX<I::Model, T> = vector(interval.x);
+            inside.begin();
+            for piece in 1..=PIECES {
+                let h = interval.h / T::from_whole(PIECES);
+                let start = interval.t + T::from_whole(piece - 1) * h;
+                at(k, integrator.begin(&Interval { t: start, ..interval }))?;
+                let end = at(k, integrator.solve(&x, &vector(interval.u), h))?;
+                x = end.x;
+                if piece == PIECES {
+                    break;
+                }
+                let time = start + h;
+                let node = Node {
+                    time,
+                    p: part(data.p, k * P::Shape::NP, P::Shape::NP),
+                    reference: &[],
+                    factor: T::ONE,
+                };
+                let here = SolutionStage { x: x.as_slice(), ..point };
+                node.read::<P::Shape>(&mut inside.point, &here, end.z.as_slice(), free);
+                path.value(&inside.point, &mut inside.g, Spot::new(k, free, &[]))?;
+                let states = next.map(|(next, _)| [stage.x_bounds(), next.x_bounds()]);
+                inside.states(x.as_slice(), states, time);
+                let rows = |limits: &[T]| part(limits, k * path_rows::<P, T>(), P::Path::ROWS).to_vec();
+                inside.constraints([rows(data.lower), rows(data.upper)], time);
+            }
+            for (i, &end) in x.as_slice().iter().enumerate() {
+                let (state, size) = (names.get(i).copied().unwrap_or(""), get(&sizes, i));
+                let amount = end - next.map_or(end, |(_, next)| get(next.x, i));
+                defects.push(Defect { state, interval: k, amount, relative: amount.abs() / size });
+            }
+            let duration = free.duration(point.u);
+            inside.report::<P>(k, duration, &mut violations);
+        }
+        let by_part = |a: &InnerViolation<T>, b: &InnerViolation<T>| b.relative.partial_cmp(&a.relative);
+        violations.sort_by(|a, b| by_part(a, b).unwrap_or(Ordering::Equal));
+        Ok(Verification { defects, violations, intervals: layout.intervals })
+    }
+}
+
+/// The largest value of every state at any node, at least one.
+fn largest_states<'a, T: Real + 'a>(
+    stages: impl Iterator<Item = SolutionStage<'a, T>>,
+    nx: usize,
+) -> Result<Vec<T>, OcpError> {
+    let mut sizes = zeros(nx)?;
+    sizes.fill(T::ONE);
+    for stage in stages {
+        for (size, x) in sizes.iter_mut().zip(stage.x) {
+            *size = size.max(x.abs());
+        }
+    }
+    Ok(sizes)
+}
+
+/// The largest violations inside of an interval: of states, then of path constraints.
+struct Inside<V, T> {
+    point: V,
+    g: Vec<T>,
+    /// Amount of both sides, the time, and the bound.
+    worst: Vec<[Worst<T>; 2]>,
+    states: usize,
+}
+
+#[derive(Clone, Copy)]
+struct Worst<T> {
+    amount: T,
+    time: T,
+    bound: T,
+}
+
+impl<V: Zeroable, T: Real> Inside<V, T> {
+    fn new<P: Formulation<T>>() -> Result<Self, OcpError> {
+        Ok(Self { point: V::zeroed(), g: zeros(P::Path::ROWS)?, worst: Vec::new(), states: P::Shape::NX })
+    }
+
+    fn begin(&mut self) {
+        let none = Worst { amount: T::ZERO, time: T::ZERO, bound: T::ZERO };
+        self.worst.clear();
+        self.worst.resize(self.states + self.g.len(), [none; 2]);
+    }
+
+    /// A value beside its bounds.
+    fn note(&mut self, index: usize, value: T, [lower, upper]: [T; 2], time: T) {
+        let Some(worst) = self.worst.get_mut(index) else { return };
+        for (worst, (amount, bound)) in worst.iter_mut().zip([(lower - value, lower), (value - upper, upper)])
+        {
+            if amount > worst.amount {
+                *worst = Worst { amount, time, bound };
+            }
+        }
+    }
+
+    fn states(&mut self, x: &[T], bounds: Option<[Bounds<'_, T>; 2]>, time: T) {
+        let Some([here, next]) = bounds else { return };
+        for (i, &x) in x.iter().enumerate() {
+            let [low, other_low] = [here.lower, next.lower].map(|bounds| get(bounds, i));
+            let [high, other_high] = [here.upper, next.upper].map(|bounds| get(bounds, i));
+            let lower = if other_low < low { other_low } else { low };
+            let upper = if other_high > high { other_high } else { high };
+            self.note(i, x, [lower, upper], time);
+        }
+    }
+
+    fn constraints(&mut self, [lower, upper]: [Vec<T>; 2], time: T) {
+        for row in 0..self.g.len() {
+            let (value, bounds) = (get(&self.g, row), [get(&lower, row), get(&upper, row)]);
+            self.note(self.states + row, value, bounds, time);
+        }
+    }
+
+    /// Adds what was found, by name; times are multiplied by the duration of their unit.
+    fn report<P: Formulation<T>>(&self, interval: usize, duration: T, to: &mut Vec<InnerViolation<T>>) {
+        let states = <P::Dynamics as Dynamics<T>>::NAMES.x;
+        for (i, worst) in self.worst.iter().enumerate() {
+            for (&Worst { amount, time, bound }, side) in worst.iter().zip([Side::Lower, Side::Upper]) {
+                if amount > T::ZERO {
+                    let name = match i.checked_sub(self.states) {
+                        None => states.get(i).map_or_else(String::new, |name| name.to_string()),
+                        Some(row) => output::<P::Path, P::Shape, T>(row).to_string(),
+                    };
+                    let (time, relative) = (duration * time, amount / bound.abs().max(T::ONE));
+                    to.push(InnerViolation { name, interval, time, side, amount, relative });
+                }
+            }
+        }
+    }
+}

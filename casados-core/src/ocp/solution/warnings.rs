@@ -1,0 +1,204 @@
+//! What may be a mistake in a problem before it is solved.
+
+use crate::linalg::dot;
+use crate::ocp::assembly::curvature::Slopes;
+use crate::ocp::formulation::error::{ConstraintName, OcpError};
+use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::get;
+use crate::qp::{Bounds, Places, QpField, Side, part};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// A ratio of sizes of two variables that is too large for double precision and one tolerance.
+const WIDE_RATIO: f64 = 1e8;
+/// A gradient vanishes where the constraint changes by no more than this part of its violation, if
+/// a variable changes by its size or by one.
+const VANISHING_GRADIENT: f64 = 1e-8;
+
+/// What may be a mistake in a problem: [`Ocp::warnings`].
+///
+/// [`Ocp::warnings`]: crate::ocp::Ocp::warnings
+///
+/// ```
+/// use casados::ocp::{Constraint, Horizon, Map, Problem, Warning};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn square(x: f64, _u: f64) -> f64 { x * x }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .path_constraints(Constraint::<Square>::new([1.0], [1.0]))
+///     .on(Horizon::uniform(3, 1.0))?;
+/// ocp.free_initial_state().guess(&[0.0], &[2.0])?.bound("u", .., -1.0, 1.0)?;
+/// let warnings = ocp.warnings()?;
+/// for warning in &warnings {
+///     println!("{warning}");
+/// }
+/// assert!(matches!(warnings[0], Warning::GuessOutsideBounds { .. }));
+/// assert!(matches!(warnings[1], Warning::VanishingGradient { .. }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The guess of a variable violates its bounds; where it does so by most. Solvers move it.
+    GuessOutsideBounds {
+        /// The bound.
+        bound: ConstraintName,
+        /// The guess.
+        value: f64,
+        /// The value of the bound.
+        limit: f64,
+    },
+    /// A constraint is violated at the guess, and its gradient is zero there, at this stage first:
+    /// its linearisation does not say where it holds. Solvers begin beside such a guess.
+    VanishingGradient {
+        /// The constraint, with the side that is violated.
+        constraint: ConstraintName,
+        /// By how much it is violated.
+        violation: f64,
+    },
+    /// Sizes of two variables, by guesses and bounds, differ by more than 1e8: other units may
+    /// help.
+    FarUnits {
+        /// The name and the size of the smallest variable.
+        small: (&'static str, f64),
+        /// Those of the largest.
+        large: (&'static str, f64),
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::GuessOutsideBounds { bound, value, limit } => {
+                write!(f, "the guess {value:e} violates {bound}, {limit:e}: solvers move it there")
+            }
+            Self::VanishingGradient { constraint, violation } => write!(
+                f,
+                "{constraint} is violated by {violation:.1e} at the guess, where its gradient is zero: take a guess \
+                 beside this one"
+            ),
+            Self::FarUnits { small: (small, size), large: (large, other) } => write!(
+                f,
+                "`{small}` has the size {size:.0e} and `{large}` {other:.0e}, by guesses and bounds: other units may \
+                 help, of both near one"
+            ),
+        }
+    }
+}
+
+impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
+    /// What may be a mistake: guesses outside of their bounds, by name; constraints that are
+    /// violated at the guess and whose gradient is zero there; sizes of variables that differ by
+    /// more than 1e8. It writes the QP at the iterate.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise)
+    pub fn warnings(&mut self) -> Result<Vec<Warning>, OcpError> {
+        self.linearise(Slopes)?;
+        let mut found = Vec::new();
+        self.guesses_outside(&mut found);
+        self.vanishing_gradients(&mut found);
+        self.far_units(&mut found);
+        Ok(found)
+    }
+
+    /// A warning for each variable, of its worst stage.
+    fn guesses_outside(&self, found: &mut Vec<Warning>) {
+        // Beyond it by most: of every variable, by where it is in a stage.
+        let mut worst: Vec<(QpField, usize, f64, Warning)> = Vec::new();
+        let given = usize::from(self.initial == Initial::Fixed);
+        for (stage, (view, point)) in self.qp().stages().zip(self.iterate().stages()).enumerate() {
+            let states = (QpField::StateBounds, point.x, view.x_bounds());
+            let controls = (QpField::ControlBounds, point.u, view.u_bounds());
+            for (field, values, bounds) in [states, controls] {
+                if field == QpField::StateBounds && stage < given {
+                    continue;
+                }
+                for (index, &value) in values.iter().enumerate() {
+                    let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, index));
+                    let (side, limit, excess) = if value < lower {
+                        (Side::Lower, lower, lower - value)
+                    } else if value > upper {
+                        (Side::Upper, upper, value - upper)
+                    } else {
+                        continue;
+                    };
+                    let bound = self.name(field, stage, index, side);
+                    let (excess, value, limit) = (excess.to_f64(), value.to_f64(), limit.to_f64());
+                    let warning = Warning::GuessOutsideBounds { bound, value, limit };
+                    match worst.iter_mut().find(|(other, i, ..)| *other == field && *i == index) {
+                        Some(known) if known.2 >= excess => {}
+                        Some(known) => *known = (field, index, excess, warning),
+                        None => worst.push((field, index, excess, warning)),
+                    }
+                }
+            }
+        }
+        found.extend(worst.into_iter().map(|(.., warning)| warning));
+    }
+
+    /// A warning for each constraint, of its first stage.
+    fn vanishing_gradients(&self, found: &mut Vec<Warning>) {
+        let (qp, (v, _)) = (self.qp(), self.iterate().vectors());
+        for (place, stage) in Places::<T>::new(qp.dims()).zip(qp.stages()) {
+            let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
+            let Bounds { lower, upper, .. } = stage.g_bounds();
+            for (i, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
+                let row = part(view.matrix, (place.next + i) * place.ld, place.ld);
+                let value = dot(row, here);
+                let (side, violation) =
+                    if value < lower { (Side::Lower, lower - value) } else { (Side::Upper, value - upper) };
+                let changes = row.iter().zip(here).map(|(&g, &v)| g.abs() * v.abs().max(T::ONE));
+                let largest = changes.fold(T::ZERO, |largest, change| largest.max(change));
+                if violation > T::ZERO && largest <= T::from_f64(VANISHING_GRADIENT) * violation {
+                    let constraint = self.name(QpField::GeneralBounds, place.stage, i, side);
+                    let is_known = found.iter().any(|warning| {
+                        matches!(warning, Warning::VanishingGradient { constraint: known, .. }
+                            if known.name == constraint.name && known.output == constraint.output)
+                    });
+                    if !is_known {
+                        found.push(Warning::VanishingGradient { constraint, violation: violation.to_f64() });
+                    }
+                }
+            }
+        }
+    }
+
+    /// A warning of the smallest and the largest variable.
+    fn far_units(&self, found: &mut Vec<Warning>) {
+        let mut sizes: Vec<(&'static str, f64)> = Vec::new();
+        let mut add = |name: &'static str, values: &[T]| {
+            let sizes_of = values.iter().map(|value| value.abs().to_f64()).filter(|size| size.is_finite());
+            let size = sizes_of.fold(0.0, f64::max);
+            match sizes.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, known)) => *known = known.max(size),
+                None => sizes.push((name, size)),
+            }
+        };
+        for (stage, (view, point)) in self.qp().stages().zip(self.iterate().stages()).enumerate() {
+            let states = (QpField::StateBounds, point.x, view.x_bounds());
+            let controls = (QpField::ControlBounds, point.u, view.u_bounds());
+            for (field, values, bounds) in [states, controls] {
+                for (index, &value) in values.iter().enumerate() {
+                    let name = self.name(field, stage, index, Side::Lower).name;
+                    add(name, &[value, get(bounds.lower, index), get(bounds.upper, index)]);
+                }
+            }
+        }
+        // Of what is zero everywhere nothing is known.
+        let known = || sizes.iter().copied().filter(|(_, size)| *size > 0.0);
+        let small = known().reduce(|a, b| if b.1 < a.1 { b } else { a });
+        let large = known().reduce(|a, b| if b.1 > a.1 { b } else { a });
+        if let (Some(small), Some(large)) = (small, large)
+            && large.1 > WIDE_RATIO * small.1
+        {
+            found.push(Warning::FarUnits { small, large });
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! What may be a mistake before a problem is solved, by name.
+
+use crate::Test;
+use casados::ocp::{Constraint, Horizon, Problem, Warning};
+use casados::prelude::*;
+
+#[ode]
+fn cart(x: [f64; 2], u: f64, p: f64) -> [f64; 2] {
+    [x[1], u / p]
+}
+#[function]
+fn circle(x: [f64; 2], u: f64, _p: f64) -> [f64; 2] {
+    [u * u + x[0] * x[0], x[0] + u]
+}
+
+fn texts(warnings: &[Warning]) -> Vec<String> {
+    warnings.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn warnings_are_named() -> Test {
+    let circle = Constraint::<Circle>::new([1.0, -5.0], [1.0, 5.0]);
+    let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+        .path_constraints(circle)
+        .on(Horizon::uniform(3, 0.1))?;
+    ocp.free_initial_state().set_parameters(.., &[1.0])?.guess(&[0.5, 0.0], &[0.5])?;
+    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+
+    // Outside of bounds, where it is so by most; of the state at the start alone if that is free.
+    ocp.guess_stage(2, &[0.5, 3.0], &[0.5])?.bound("x[1]", 1.., -1.0, 1.0)?;
+    ocp.guess_stage(3, &[0.5, 1.5], &[])?;
+    let warnings = ocp.warnings()?;
+    let expected = "the guess 3e0 violates the upper bound of `x[1]` at stage 2, 1e0: solvers move it there";
+    assert_eq!(texts(&warnings), [expected]);
+
+    // At the origin nothing says where the circle is.
+    ocp.guess(&[0.0, 0.0], &[0.0])?;
+    let warnings = ocp.warnings()?;
+    assert!(
+        matches!(warnings[..], [Warning::VanishingGradient { constraint, violation }]
+            if constraint.name == "Circle" && constraint.output == 0 && constraint.stage == 0 && violation == 1.0),
+        "{:?}",
+        texts(&warnings)
+    );
+
+    // A mass in kg beside forces in giganewtons.
+    ocp.guess(&[0.1, 0.0], &[0.5])?.free("p", 1e-3..=1e-2, 5e-3)?.bound("u", .., -1e9, 1e9)?;
+    let warnings = ocp.warnings()?;
+    assert_eq!(
+        warnings,
+        [Warning::FarUnits { small: ("p", 1e-2), large: ("u", 1e9) }],
+        "{:?}",
+        texts(&warnings)
+    );
+    Ok(())
+}
+
+/// The first state is the one that is given, whatever its guess.
+#[test]
+fn given_states_have_no_guess() -> Test {
+    let mut ocp =
+        Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(2, 0.1))?;
+    ocp.fix_initial_state(&[1.0, 0.0])?.set_parameters(.., &[1.0])?.guess(&[0.0, 0.0], &[0.0])?;
+    assert_eq!(ocp.warnings()?, []);
+    Ok(())
+}
