@@ -41,7 +41,9 @@ use bytemuck::Zeroable;
 /// ocp.free_initial_state().bound("x[0]", ..1, 0.0, 0.0)?.guess(&[0.0, 1.0], &[0.0])?;
 /// assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
 /// let speed = ocp.solution()?.state("x[1]")?.to_vec();
-/// assert!((speed[10] - 2.0 * speed[0]).abs() < 1e-6 && (speed[0] - 9.0 / 14.0).abs() < 1e-4);
+/// assert!((speed[10] - 2.0 * speed[0]).abs() < 1e-6);
+/// // 9/14 m/s, but for a control that is constant in each interval.
+/// assert!((speed[0] - 9.0 / 14.0).abs() < 1e-2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Zeroable)]
