@@ -26,7 +26,8 @@ fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Opti
 
 /// `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of pivots,
 /// which their reciprocals have.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn eliminate<T: Real, E: Packed<T>>(
     g: &mut [T],
     panel: &[T],
@@ -83,7 +84,8 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
 }
 
 /// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     match u.len() {
         1 => substitute_all::<T, 1>(u, panel, ld, row, inverse),
@@ -150,7 +152,8 @@ pub struct Pivots<'a, T> {
 /// other rows of the panel are multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were
 /// replaced by something large: the solution then does not move in their direction. And the first
 /// of them that is negative, which may be rounding, and its index.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn cholesky<T: Real, E: Packed<T>>(
     panel: &mut [T],
     ld: usize,
@@ -248,13 +251,14 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
         let size = T::ONE / pivot.abs().sqrt();
         inverse[i] = if is_negative { -size } else { size };
         found.signed |= is_negative;
-        for j in i + 1..W {
-            block[i][j] = block[i][j] * size;
+        for l in block[i].iter_mut().skip(i + 1) {
+            *l = *l * size;
         }
-        for j in i + 1..W {
-            let factor = if is_negative { -block[i][j] } else { block[i][j] };
-            for k in j..W {
-                block[j][k] = block[j][k] - factor * block[i][k];
+        let column = block[i];
+        for (j, other) in block.iter_mut().enumerate().skip(i + 1) {
+            let factor = if is_negative { -column[j] } else { column[j] };
+            for (element, &l) in other.iter_mut().zip(&column).skip(j) {
+                *element = *element - factor * l;
             }
         }
     }
