@@ -31,8 +31,8 @@ pub struct QpInstance<T: Real = f64> {
 /// What became of a problem.
 type Status = Result<QpStatistics, QpError>;
 
-/// An [`InteriorPoint`](super::InteriorPoint) for many problems, each with its own data, dimensions,
-/// solution and status.
+/// An [`InteriorPoint`](super::InteriorPoint) for many problems, each with its own data,
+/// dimensions, solution and status.
 ///
 /// With the feature `parallel` consecutive problems are shared among the threads of rayon, as many
 /// for each. Solutions and statuses are those of single solves to the bit, whatever the number of
@@ -96,9 +96,9 @@ impl<T: Real> BatchInteriorPoint<T> {
         }
     }
 
-    /// Solves all problems: the status of each, as
-    /// [`QpSolver::solve`] of [`InteriorPoint`](super::InteriorPoint) has it. A warm start begins at
-    /// the solution that an instance holds.
+    /// Solves all problems: the status of each, as [`QpSolver::solve`] of
+    /// [`InteriorPoint`](super::InteriorPoint) has it. A warm start begins at the solution that an
+    /// instance holds.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`]: nothing was solved.
