@@ -198,6 +198,8 @@ pub fn cholesky<T: Real, E: Packed<T>>(
             indefinite,
         };
         let found = match width {
+            // Firmware has one copy: flash is dearer than passes over a column.
+            _ if cfg!(not(feature = "std")) => factor_columns::<T, E>(group, width, rows, noise, pivots),
             1 => factor_group::<T, E, 1>(group, rows, noise, pivots),
             2 => factor_group::<T, E, 2>(group, rows, noise, pivots),
             3 => factor_group::<T, E, 3>(group, rows, noise, pivots),
@@ -216,6 +218,34 @@ struct Found<T> {
     regularised: usize,
     negative: Option<(usize, T)>,
     signed: bool,
+}
+
+/// The columns of a group, one after the other.
+#[inline(always)]
+fn factor_columns<T: Real, E: Packed<T>>(
+    (group, ld, first): (&mut [T], usize, usize),
+    width: usize,
+    rows: usize,
+    noise: T,
+    Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
+) -> Found<T> {
+    let mut all = Found { regularised: 0, negative: None, signed: false };
+    let mut rest = group;
+    for (i, (inverse, added)) in inverse.chunks_mut(1).zip(added.chunks_mut(1)).enumerate() {
+        let (column, others) = rest.split_at_mut_checked(ld).unwrap_or_default();
+        let pivot = Pivots { inverse, added, largest, indefinite };
+        let found = factor_group::<T, E, 1>((&mut *column, ld, first + i), rows, noise, pivot);
+        let factors = column.get(first + i + 1..).unwrap_or_default();
+        let left = others.chunks_exact_mut(ld.max(1)).zip(factors).take(width.saturating_sub(i + 1));
+        for (other, &factor) in left {
+            subtract_column::<T, E>(other, if found.signed { -factor } else { factor }, column);
+        }
+        all.regularised += found.regularised;
+        all.signed |= found.signed;
+        all.negative = all.negative.or(found.negative.map(|(_, pivot)| (i, pivot)));
+        rest = others;
+    }
+    all
 }
 
 /// `W` columns of a panel, of which what is left of them was subtracted: their diagonal block
@@ -255,8 +285,8 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
             *l = *l * size;
         }
         let column = block[i];
-        for (j, other) in block.iter_mut().enumerate().skip(i + 1) {
-            let factor = if is_negative { -column[j] } else { column[j] };
+        for (j, (other, &own)) in block.iter_mut().zip(&column).enumerate().skip(i + 1) {
+            let factor = if is_negative { -own } else { own };
             for (element, &l) in other.iter_mut().zip(&column).skip(j) {
                 *element = *element - factor * l;
             }
