@@ -38,7 +38,7 @@ pub fn eliminate<T: Real, E: Packed<T>>(
 ) {
     let (mut panel, mut inverse, mut y, mut row) = (panel, inverse, y, row);
     while !inverse.is_empty() {
-        let width = inverse.len().min(GROUP);
+        let width = inverse.len().min(if cfg!(feature = "std") { GROUP } else { 1 });
         let last = inverse.len() == width;
         let size = if last { row } else { g.len() };
         match width {
@@ -88,6 +88,7 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     match u.len() {
+        _ if cfg!(not(feature = "std")) => substitute_many(u, panel, ld, row, inverse),
         1 => substitute_all::<T, 1>(u, panel, ld, row, inverse),
         2 => substitute_all::<T, 2>(u, panel, ld, row, inverse),
         3 => substitute_all::<T, 3>(u, panel, ld, row, inverse),
