@@ -1,7 +1,10 @@
 //! A solver of QPs allocates in its first call only.
 
 use crate::COUNT;
-use casados_core::qp::{Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
+use casados_core::qp::{
+    BatchInteriorPoint, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpInstance, QpSolver, QpStart,
+    StageDims,
+};
 
 #[test]
 fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
@@ -26,6 +29,17 @@ fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
         result.map(|_| COUNT.get() - before)
     };
     assert_eq!(count(QpStart::Cold)?, 2, "numbers and indices");
+    assert_eq!(count(QpStart::Cold)?, 0);
+    assert_eq!(count(QpStart::Warm)?, 0);
+    let mut batch = BatchInteriorPoint::new();
+    batch.threads = 1;
+    let mut instances = vec![QpInstance { qp: qp.clone(), solution: HeapSolution::new(&dims)? }; 5];
+    let mut count = |start| {
+        let before = COUNT.get();
+        let result = batch.solve(&mut instances, start);
+        result.map(|_| COUNT.get() - before)
+    };
+    assert!(count(QpStart::Cold)? > 0);
     assert_eq!(count(QpStart::Cold)?, 0);
     assert_eq!(count(QpStart::Warm)?, 0);
     let mut condensing = Condensing::new(3, HeapInteriorPoint::new());

@@ -9,7 +9,7 @@ use casados::qp::{Clarabel, HeapInteriorPoint, HeapQp, HeapSolution, QpError, Qp
 const TOLERANCE: f64 = 1e-8;
 
 /// Moves one or two bounds by 0.01 to 100, which other bounds may forbid.
-fn move_bounds(random: &mut Numbers, qp: &mut HeapQp<f64>) -> Test {
+pub fn move_bounds(random: &mut Numbers, qp: &mut HeapQp<f64>) -> Test {
     for _ in 0..1 + random.below(2) {
         let k = random.below(qp.dims().len());
         let (dims, up, distance) = (qp.dims()[k], random.chance(0.5), random.power(2.0));

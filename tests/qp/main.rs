@@ -6,6 +6,7 @@
 mod runs;
 
 mod absurd;
+mod batch;
 mod chain;
 mod classes;
 mod coupling;

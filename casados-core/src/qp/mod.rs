@@ -49,6 +49,8 @@ solver.solve(qp.view(), QpStart::Warm, solution.view_mut())?;
 "
 )]
 
+#[cfg(feature = "alloc")]
+mod batch;
 mod block;
 mod bounds;
 mod check;
@@ -73,6 +75,8 @@ mod stage;
 mod statistics;
 mod violation;
 
+#[cfg(feature = "alloc")]
+pub use batch::{BatchInteriorPoint, QpInstance};
 pub use block::{Block, BlockMut};
 pub use bounds::{Bounds, BoundsMut};
 pub use check::check;

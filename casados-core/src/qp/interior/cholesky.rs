@@ -26,7 +26,8 @@ fn triangle<T: Real, const W: usize>(panel: &[T], ld: usize, row: usize) -> Opti
 
 /// `y = L⁻¹ g_u`, and `g − (K; L) S y` for the elements before `row`; `S` are the signs of pivots,
 /// which their reciprocals have.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn eliminate<T: Real, E: Packed<T>>(
     g: &mut [T],
     panel: &[T],
@@ -37,7 +38,7 @@ pub fn eliminate<T: Real, E: Packed<T>>(
 ) {
     let (mut panel, mut inverse, mut y, mut row) = (panel, inverse, y, row);
     while !inverse.is_empty() {
-        let width = inverse.len().min(GROUP);
+        let width = inverse.len().min(if cfg!(feature = "std") { GROUP } else { 1 });
         let last = inverse.len() == width;
         let size = if last { row } else { g.len() };
         match width {
@@ -83,9 +84,11 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
 }
 
 /// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     match u.len() {
+        _ if cfg!(not(feature = "std")) => substitute_many(u, panel, ld, row, inverse),
         1 => substitute_all::<T, 1>(u, panel, ld, row, inverse),
         2 => substitute_all::<T, 2>(u, panel, ld, row, inverse),
         3 => substitute_all::<T, 3>(u, panel, ld, row, inverse),
@@ -150,7 +153,8 @@ pub struct Pivots<'a, T> {
 /// other rows of the panel are multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were
 /// replaced by something large: the solution then does not move in their direction. And the first
 /// of them that is negative, which may be rounding, and its index.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn cholesky<T: Real, E: Packed<T>>(
     panel: &mut [T],
     ld: usize,
@@ -195,6 +199,8 @@ pub fn cholesky<T: Real, E: Packed<T>>(
             indefinite,
         };
         let found = match width {
+            // Firmware has one copy: flash is dearer than passes over a column.
+            _ if cfg!(not(feature = "std")) => factor_columns::<T, E>(group, width, rows, noise, pivots),
             1 => factor_group::<T, E, 1>(group, rows, noise, pivots),
             2 => factor_group::<T, E, 2>(group, rows, noise, pivots),
             3 => factor_group::<T, E, 3>(group, rows, noise, pivots),
@@ -213,6 +219,34 @@ struct Found<T> {
     regularised: usize,
     negative: Option<(usize, T)>,
     signed: bool,
+}
+
+/// The columns of a group, one after the other.
+#[inline(always)]
+fn factor_columns<T: Real, E: Packed<T>>(
+    (group, ld, first): (&mut [T], usize, usize),
+    width: usize,
+    rows: usize,
+    noise: T,
+    Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
+) -> Found<T> {
+    let mut all = Found { regularised: 0, negative: None, signed: false };
+    let mut rest = group;
+    for (i, (inverse, added)) in inverse.chunks_mut(1).zip(added.chunks_mut(1)).enumerate() {
+        let (column, others) = rest.split_at_mut_checked(ld).unwrap_or_default();
+        let pivot = Pivots { inverse, added, largest, indefinite };
+        let found = factor_group::<T, E, 1>((&mut *column, ld, first + i), rows, noise, pivot);
+        let factors = column.get(first + i + 1..).unwrap_or_default();
+        let left = others.chunks_exact_mut(ld.max(1)).zip(factors).take(width.saturating_sub(i + 1));
+        for (other, &factor) in left {
+            subtract_column::<T, E>(other, if found.signed { -factor } else { factor }, column);
+        }
+        all.regularised += found.regularised;
+        all.signed |= found.signed;
+        all.negative = all.negative.or(found.negative.map(|(_, pivot)| (i, pivot)));
+        rest = others;
+    }
+    all
 }
 
 /// `W` columns of a panel, of which what is left of them was subtracted: their diagonal block
@@ -248,13 +282,14 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
         let size = T::ONE / pivot.abs().sqrt();
         inverse[i] = if is_negative { -size } else { size };
         found.signed |= is_negative;
-        for j in i + 1..W {
-            block[i][j] = block[i][j] * size;
+        for l in block[i].iter_mut().skip(i + 1) {
+            *l = *l * size;
         }
-        for j in i + 1..W {
-            let factor = if is_negative { -block[i][j] } else { block[i][j] };
-            for k in j..W {
-                block[j][k] = block[j][k] - factor * block[i][k];
+        let column = block[i];
+        for (j, (other, &own)) in block.iter_mut().zip(&column).enumerate().skip(i + 1) {
+            let factor = if is_negative { -own } else { own };
+            for (element, &l) in other.iter_mut().zip(&column).skip(j) {
+                *element = *element - factor * l;
             }
         }
     }

@@ -75,7 +75,8 @@ impl<T: Real> Iterate<'_, T> {
     }
 
     /// The same, where numbers may be `far` times as large.
-    #[inline(always)]
+    #[cfg_attr(feature = "std", inline(always))]
+    #[cfg_attr(not(feature = "std"), inline(never))]
     fn is_certificate<E: Packed<T>>(&mut self, far: T, multipliers: &mut [T]) -> bool {
         let _ = self.evaluate::<E>(multipliers);
         let count = self.sides.counts.sides();

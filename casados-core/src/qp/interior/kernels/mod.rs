@@ -1,7 +1,8 @@
 //! Products of small dense matrices and vectors, in registers.
 //!
 //! All matrices lie column after column, and columns are whole registers apart. Everything is
-//! inlined into the function that was compiled for `E`.
+//! inlined into the function that was compiled for `E`. Firmware has the machine that it was
+//! compiled for, and one copy of each kernel: flash is dearer than calls.
 
 mod product;
 mod vectors;

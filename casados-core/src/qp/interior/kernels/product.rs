@@ -229,7 +229,8 @@ fn tiles<T: Real, E: Packed<T>>(
 }
 
 /// `target − X y`, `rows` elements, over `depth` columns.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn subtract<T: Real, E: Packed<T>>(
     target: &mut [T],
     x: Columns<'_, T>,

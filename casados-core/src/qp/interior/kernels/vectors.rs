@@ -9,7 +9,8 @@ const HELD: usize = 4;
 
 /// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
 /// be zero in one of them.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn add_transposed<T: Real, E: Packed<T>>(
     target: &mut [T],
     x: Columns<'_, T>,
@@ -55,7 +56,8 @@ fn add_dots<T: Real, E: Packed<T>, const R: usize>(target: &mut [T], x: Columns<
 
 /// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything.
 /// Target and `v` are padded, `v` with zeros.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     let (last, mut begin) = (n.div_ceil(E::LANES), 0);
     while begin < last {
@@ -165,7 +167,8 @@ fn index<T: Real, E: Packed<T>>() -> E {
 }
 
 /// The upper triangle from the lower one.
-#[inline(always)]
+#[cfg_attr(feature = "std", inline(always))]
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
     if E::LANES > 1 && n <= E::LANES {
         return mirror_register::<T, E>(matrix, ld, n);
