@@ -8,19 +8,19 @@
 //! d²(λᵀ x_N)/dW² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ Φ_k) D_k        D_k = d(x_k, u_k, p)/dW
 //! ```
 
+mod columns;
+mod integrals;
 mod results;
 mod steps;
 
 pub use results::{PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
 
-use super::columns::Columns;
-use super::integrals::{Blocks, Spanning, Sums};
-use super::integrator::{Integrator, inside};
-use super::run::Span;
-use super::sealed::Engine;
-use super::segment::{Segment, add, dense, filled, refill};
-use super::sensitivities::{chain, dynamic};
-use super::statistics::AdaptiveStatistics;
+use crate::adaptive::engine::Engine;
+use crate::adaptive::integrator::{Integrator, inside};
+use crate::adaptive::segment::{Segment, add, dense, filled, refill};
+use crate::adaptive::sensitivities::{chain, dynamic};
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::step::Span;
 use crate::error::{Argument, Error};
 use crate::finite::{check_input, check_named, check_output};
 use crate::integrator::blocks::{element, fill};
@@ -32,6 +32,10 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
+use columns::Columns;
+use integrals::{Blocks, Sums};
+
+pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 
 /// An adaptive integrator over intervals, each with a control of its own.
 ///

@@ -1,7 +1,7 @@
 //! Rates of an explicit model: each equation has one derivative, `c ẋ_j + g(x, u, p, t) = 0`, and
 //! is solved for it by hand. No integrator is compiled for that.
 
-use super::point::{At, place_inputs};
+use crate::adaptive::point::{At, place_inputs};
 use crate::error::{Error, Place, Quantity};
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};

@@ -1,8 +1,8 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
-use crate::adaptive::branches::{Branches, DefectCheck};
-use crate::adaptive::stages::Convergence;
+use crate::adaptive::discontinuity::{Branches, DefectCheck};
+use crate::adaptive::newton_monitor::Convergence;
 
 /// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
 /// error.
@@ -14,7 +14,7 @@ const OVER_BRANCHES: f64 = 6.0;
 /// times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
 /// What follows a rough step may be shorter by this and still be a step.
-const SHORTEST: f64 = 0.01;
+const SHORTEST_AFTER_ROUGH: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
@@ -157,10 +157,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         stages: &mut dyn Stages<M, T>,
         state: &mut StepState<T>,
     ) -> Result<f64, Failure> {
-        let Workspace { point, u, parameters, estimator, rtol, atol, .. } = &*self.base;
+        let Workspace { point, u, parameters, tolerances, .. } = &*self.base;
         let start = self.base.step(state);
         let residuals = &mut self.statistics.residuals;
-        let solved = stages.solve(&start, self.base.newton_tolerance, &mut state.convergence, residuals);
+        let solved = stages.solve(&start, tolerances.newton, &mut state.convergence, residuals);
         self.statistics.iterations += state.convergence.iterations;
         solved?;
         let again = state.is_careful();
@@ -173,8 +173,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 let mut x = VectorX::<M, T>::zeroed();
                 x.as_mut_slice().copy_from_slice(&point.as_ref()[M::Shape::NX..2 * M::Shape::NX]);
                 let (at, level) = (At { x: &x, u, p: parameters, t: state.t }, state.order.level);
-                let tolerances = Tolerances { estimator, rtol, atol };
-                error.max(sensitivities.implicit(stages, at, level, &start, &tolerances, again)?)
+                error.max(sensitivities.implicit(stages, at, level, &start, tolerances, again)?)
             }
             _ => error,
         };
@@ -196,7 +195,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         state: &mut StepState<T>,
         error: f64,
     ) -> Result<(), Failure> {
-        let Workspace { tolerance_ratio, noise, .. } = &*self.base;
+        let Tolerances { tolerance_ratio, noise, .. } = &self.base.tolerances;
         let start = self.base.step(state);
         let (size, order) = (state.h.to_f64().abs(), stages.count() as f64 + 1.0);
         let counted = *tolerance_ratio / ROUGH_OVER_ERROR;
@@ -219,7 +218,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             // A derivative that jumps leaves an error like the fourth power of the step size, or a
             // lower one. Where times are no finer than that, the step is as good as can be.
             let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
-            let shorter = state.h * T::from_f64(SHORTEST * factor);
+            let shorter = state.h * T::from_f64(SHORTEST_AFTER_ROUGH * factor);
             if rough >= 1.0
                 && self.check_step(state.t, shorter, Refusal::Error).is_ok()
                 && (check >= DefectCheck::SplineKnot || state.discontinuities.refuses(size, seen, error))

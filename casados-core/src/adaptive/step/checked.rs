@@ -1,7 +1,7 @@
 //! What a step needs, and errors where it is not there: a finite Jacobian, a length.
 
 use super::cross::shortest;
-use super::step_state::StepState;
+use super::state::StepState;
 use super::*;
 use crate::error::Unsettled;
 use crate::irk::{eliminate, unknown_name};

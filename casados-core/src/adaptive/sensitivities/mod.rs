@@ -13,12 +13,12 @@ mod blocks;
 
 use blocks::in_step;
 
-use super::consistent::Consistent;
-use super::point::At;
-use super::replay::{AcceptedStep, StepDifferentiator};
-use super::run::{Span, Workspace};
-use super::sealed::Engine;
-use super::tape::Tape;
+use crate::adaptive::consistent::Consistent;
+use crate::adaptive::engine::Engine;
+use crate::adaptive::point::At;
+use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::step::{Span, Workspace};
+use crate::adaptive::tape::Tape;
 use crate::error::Error;
 use crate::finite::{check_forward, check_output};
 use crate::integrator::blocks::{Rows, Square, add, advance, algebraic, element, identity, split, states};

@@ -1,21 +1,21 @@
 //! The steps of an interval.
 
+mod attempt;
 mod checked;
 mod cross;
-mod step_state;
-mod steps;
-mod tolerances;
+mod start;
+mod state;
 
-use super::consistent::Consistent;
-use super::control::ORDER_REDUCTION_RATIO;
-use super::options::AdaptiveOptions;
-use super::orders::{Orders, interpolate};
-use super::point::At;
-use super::sealed::Family;
-use super::stages::{FAST, Failure, Stages, StepContext};
-use super::statistics::AdaptiveStatistics;
-use super::tape::Tape;
-use super::variational::{Tolerances, Variational};
+use crate::adaptive::consistent::Consistent;
+use crate::adaptive::newton_monitor::{FAST, Failure};
+use crate::adaptive::options::AdaptiveOptions;
+use crate::adaptive::order::{Family, Orders, interpolate};
+use crate::adaptive::point::At;
+use crate::adaptive::stages::{Stages, StepContext};
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::tape::Tape;
+use crate::adaptive::tolerances::Tolerances;
+use crate::adaptive::variational::Variational;
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::finite::not_finite;
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
@@ -23,7 +23,7 @@ use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
-use step_state::{Need, StepState};
+use state::{Need, StepState};
 
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
@@ -42,17 +42,7 @@ pub struct Workspace<M: Dae, T: Plain> {
     pub start: ArrayK<M, T>,
     /// Start values for them, as they were given.
     pub given: ArrayK<M, T>,
-    /// Tolerances of `(x, z)` as they were asked for,
-    pub rtol: ArrayK<M, T>,
-    pub atol: ArrayK<M, T>,
-    /// as the method needs them,
-    estimator: ArrayK<M, (T, T)>,
-    /// the reciprocals of the errors that they tolerate,
-    pub(super) scale: ArrayK<M, T>,
-    /// and how many times as large those of the tolerances are that were asked for.
-    user_ratio: ArrayK<M, T>,
-    /// The largest of these.
-    tolerance_ratio: f64,
+    pub tolerances: Tolerances<M, T>,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
@@ -61,21 +51,17 @@ pub struct Workspace<M: Dae, T: Plain> {
     pub u: VectorU<M, T>,
     /// Whether the constant entries of the Jacobian are there.
     pub(super) ready: bool,
-    /// Where Newton's method may stop.
-    newton_tolerance: f64,
-    /// Estimated errors that are smaller are of rounding.
-    noise: f64,
 }
 
 impl<M: Dae, T: Real> Workspace<M, T> {
     /// The step that is tried, from where the run is.
     fn step(&self, state: &StepState<T>) -> StepContext<'_, M, T> {
-        let Self { point, scale, user_ratio, tolerance_ratio, .. } = self;
+        let Self { point, tolerances, .. } = self;
         StepContext {
             point,
-            scale,
-            user_ratio,
-            tolerance_ratio: *tolerance_ratio,
+            scale: &tolerances.scale,
+            user_ratio: &tolerances.user_ratio,
+            tolerance_ratio: tolerances.tolerance_ratio,
             known: state.accepted.is_some(),
             h: state.h,
         }
@@ -132,6 +118,28 @@ pub struct Accepted<'a, M: Dae, T: Real> {
 }
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
+    /// The identity, if derivatives take part.
+    ///
+    /// # Errors
+    /// As [`Consistent::forward`].
+    pub(super) fn begin_sensitivities(&mut self, x0: &VectorX<M, T>, t: T) -> Result<(), Error> {
+        let Some(sensitivities) = &mut self.sensitivities else { return Ok(()) };
+        let Workspace { u, parameters, start, magnitudes, .. } = &*self.base;
+        sensitivities.begin(&At { x: x0, u, p: parameters, t }, start, magnitudes, self.consistent)
+    }
+
+    /// What is tolerated by a method with so many stages.
+    fn tighten<B: Family>(&mut self, stages: usize) {
+        self.base.tolerances.tighten(stages, B::ENDS_ON_STAGE);
+        self.measure();
+    }
+
+    /// What is tolerated at the time that was reached.
+    fn measure(&mut self) {
+        let Workspace { tolerances, point, .. } = &mut *self.base;
+        tolerances.measure(&point.as_ref()[M::Shape::NX..]);
+    }
+
     /// Integrates the interval from `x0`; `after` is called after each accepted step.
     ///
     /// # Errors

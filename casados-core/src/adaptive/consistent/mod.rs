@@ -3,8 +3,9 @@
 //! It is one stage of the explicit Euler method, whose stage is at the start of the step. Explicit
 //! models have their [`Rates`].
 
-use super::point::At;
-use super::rates::Rates;
+mod rates;
+
+use crate::adaptive::point::At;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
@@ -17,6 +18,7 @@ use crate::shape::Shape;
 use crate::tableau::{Custom, Euler, Method};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
+use rates::Rates;
 
 /// One stage at the start of a step.
 type EulerStep<M, T> = Integrator<M, Custom<1>, 1, T, Heap<OneStep>>;

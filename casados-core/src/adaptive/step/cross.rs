@@ -2,9 +2,9 @@
 //! side, and Newton's method, which has one for all stages, converges in no step over the border,
 //! however short it is.
 
-use super::step_state::StepState;
+use super::state::StepState;
 use super::*;
-use crate::adaptive::branches::Branches;
+use crate::adaptive::discontinuity::Branches;
 use crate::adaptive::point::variable;
 
 /// A step of so many roundoff errors of the interval is as short as any: what an Euler step misses
@@ -37,7 +37,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let over = T::from_f64(4.0) * shortest;
         let end = state.t + if span.end < span.start { -over } else { over };
         let before = self.base.point;
-        if self.settle_behind(end).is_err() {
+        if self.euler_step(end).is_err() {
             self.base.point = before;
             return Ok(());
         }
@@ -52,7 +52,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// The point that an explicit Euler step leads to, with consistent `(ẋ, z)`.
-    fn settle_behind(&mut self, end: T) -> Result<(), Error> {
+    fn euler_step(&mut self, end: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
         let Workspace { point, start, u, parameters, .. } = &mut *self.base;
         let h = end - point.as_ref().last().copied().unwrap_or(end);

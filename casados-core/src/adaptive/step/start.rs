@@ -1,9 +1,9 @@
 //! Where a run begins: consistent states, and the length of the first step.
 
-use super::control::power;
-use super::norm::norm;
-use super::point::{At, place_inputs, variable};
-use super::run::{Run, Span, Workspace};
+use crate::adaptive::point::{At, place_inputs, variable};
+use crate::adaptive::step::{Run, Span, Workspace};
+use crate::adaptive::step_size::first_length;
+use crate::adaptive::tolerances::norm;
 use crate::error::Error;
 use crate::model::{ArrayK, Dae, VectorX};
 use crate::scalar::Real;
@@ -87,16 +87,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             return Ok(step.min(longest));
         }
         let nx = M::Shape::NX;
-        let Workspace { point, rtol, atol, scale, parameters, u, start, .. } = &mut *self.base;
-        let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
+        let Workspace { point, tolerances, parameters, u, start, .. } = &mut *self.base;
         let states = &point.as_ref()[nx..2 * nx];
-        for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tolerances).zip(states) {
-            *scale = T::ONE / (*atol + *rtol * state.abs());
-        }
-        let scale = &scale.as_ref()[..nx];
+        tolerances.measure_user(states);
+        let scale = &tolerances.scale.as_ref()[..nx];
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let length = first_length([size, slope], longest, 0.25, |step| {
+        let length = first_length([size, slope], longest, 1.0 / tolerances.estimate_order, |step| {
             // A second point, if there is a consistent one.
             let h = T::from_f64(if span.end < span.start { -step } else { step });
             let mut x = VectorX::<M, T>::zeroed();
@@ -118,23 +115,4 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.measure();
         Ok(length)
     }
-}
-
-/// The length of a first step, at most the longest: that in which an explicit Euler step changes
-/// the solution, and its derivative, by a hundredth of their size (E. Hairer, S. P. Nørsett,
-/// G. Wanner, Solving Ordinary Differential Equations I, section II.4). `change` is that of the
-/// slope over such a step. Where sizes overflow beside a tiny absolute tolerance nothing is
-/// foreseen: then a short one.
-pub(super) fn first_length(
-    [size, slope]: [f64; 2],
-    longest: f64,
-    exponent: f64,
-    change: impl FnOnce(f64) -> f64,
-) -> f64 {
-    let step = if size < 1e-5 || slope < 1e-5 { 1e-6 } else { 0.01 * size / slope };
-    let step = step.min(longest);
-    let largest = slope.max(change(step) / step);
-    let second = if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { power(0.01 / largest, exponent) };
-    let step = (100.0 * step).min(second);
-    if step > 0.0 { step.min(longest) } else { 1e-8 * longest }
 }

@@ -4,15 +4,15 @@ mod calls;
 mod derivatives;
 mod settings;
 
-use super::consistent::Consistent;
-use super::options::{AdaptiveOptions, check_absolute, check_relative};
-use super::point::place_inputs;
-use super::run::{Accepted, Run, Span, Workspace};
-use super::sealed::{Engine, Kind};
-use super::sensitivities::{Frozen, Memory};
-use super::statistics::AdaptiveStatistics;
-use super::tape::Tape;
-use super::variational::Variational;
+use crate::adaptive::consistent::Consistent;
+use crate::adaptive::engine::{Engine, Kind, Replays};
+use crate::adaptive::options::{AdaptiveOptions, check_absolute, check_relative};
+use crate::adaptive::point::place_inputs;
+use crate::adaptive::sensitivities::{Frozen, Memory};
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::step::{Accepted, Run, Span, Workspace};
+use crate::adaptive::tape::Tape;
+use crate::adaptive::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
 use crate::finite::{check_input, check_named};
 use crate::integrator::{self, Integrator as _};
@@ -94,8 +94,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
         options.check::<T>()?;
         let mut base: Box<Workspace<M, T>> = allocate()?;
-        base.rtol.as_mut().fill(T::from_f64(options.rtol));
-        base.atol.as_mut().fill(T::from_f64(options.atol));
+        base.tolerances.rtol.as_mut().fill(T::from_f64(options.rtol));
+        base.tolerances.atol.as_mut().fill(T::from_f64(options.atol));
         for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
             *given = T::from_f64(*start);
         }

@@ -8,7 +8,7 @@
 //! ```
 
 use super::columns::Columns;
-use super::segment::filled;
+use crate::adaptive::segment::filled;
 use crate::error::Error;
 use crate::function::{Function, MatrixYP, MatrixYU, MatrixYX};
 use crate::integrator::blocks::fill;

@@ -1,16 +1,16 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
-use super::control::{ExplicitStep, PiController};
-use super::explicit_step::{Stepper, Take};
-use super::norm::{mean, norm};
-use super::pairs::Pair;
-use super::point::At;
-use super::replay::{AcceptedStep, StepDifferentiator};
-use super::run::{Accepted, After, Run, Span, Workspace};
-use super::sealed::{Engine, Kind};
-use super::start::first_length;
-use super::tape::Entry;
+mod stepper;
+
+use crate::adaptive::engine::{Engine, Kind};
+use crate::adaptive::pairs::Pair;
+use crate::adaptive::point::At;
+use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::step::{Accepted, After, Run, Span, Workspace};
+use crate::adaptive::step_size::{ExplicitStep, PiController, first_length};
+use crate::adaptive::tape::Entry;
+use crate::adaptive::tolerances::{Tolerances, mean, norm};
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
 use crate::integrator::Integrator as _;
@@ -26,6 +26,7 @@ use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use core::any::Any;
 use core::marker::PhantomData;
+use stepper::{Stepper, Take};
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
@@ -171,8 +172,8 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let error = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
-        if !error.is_finite() {
+        let [error, of_derivatives] = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
+        if !(error + of_derivatives).is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
             h = h * T::from_f64(0.5);
@@ -181,7 +182,7 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         let tried_step =
             ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
-        let error = controller.error_of_difference::<T>(tried_step, error);
+        let error = controller.error_of_difference::<T>(tried_step, error).max(of_derivatives);
         let factor = controller.factor::<T>(tried_step, error);
         if error > 1.0 {
             run.statistics.rejected += 1;
@@ -222,7 +223,7 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
 }
 
 /// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
-/// of derivatives too if they take part; NaN if there is none.
+/// and that of derivatives if they take part; NaN if there is none.
 fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
@@ -230,22 +231,22 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     t: T,
     h: T,
     steps: f64,
-) -> f64 {
+) -> [f64; 2] {
     let error = step.take(t, h).and_then(|()| {
-        let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
+        let (rtol, atol) = (run.base.tolerances.rtol.as_ref(), run.base.tolerances.atol.as_ref());
         step.error(t, h, steps, rtol, atol)
     });
     let error = error.unwrap_or(f64::NAN);
     match &mut run.sensitivities {
         Some(sensitivities) if error <= 1.0 => {
-            let Workspace { point, u, parameters, rtol, atol, .. } = &*run.base;
+            let Workspace { point, u, parameters, tolerances: Tolerances { rtol, atol, .. }, .. } =
+                &*run.base;
             let taken = AcceptedStep { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
             let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
             let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
-            // Written so that NaN stays.
-            other.map_or(f64::NAN, |other| if error >= other { error } else { other })
+            [error, other.unwrap_or(f64::NAN)]
         }
-        _ => error,
+        _ => [error, 0.0],
     }
 }
 
@@ -264,7 +265,8 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         return Ok(given.min(longest));
     }
     let mut scale = VectorX::<M, T>::zeroed();
-    let tolerances = run.base.rtol.as_ref().iter().zip(run.base.atol.as_ref());
+    let Tolerances { rtol, atol, .. } = &run.base.tolerances;
+    let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
     for ((scale, (rtol, atol)), x) in scale.as_mut_slice().iter_mut().zip(tolerances).zip(x.as_slice()) {
         *scale = T::ONE / (*atol + *rtol * x.abs());
     }

@@ -1,9 +1,9 @@
 //! A family of implicit methods as one engine.
 
-use super::orders::{Orders, interpolate};
-use super::run::{After, Run, Span};
-use super::sealed::{Engine, Family, Kind};
-use super::tape::Entry;
+use crate::adaptive::engine::{Engine, Kind};
+use crate::adaptive::order::{Family, Orders, interpolate};
+use crate::adaptive::step::{After, Run, Span};
+use crate::adaptive::tape::Entry;
 use crate::error::Error;
 use crate::model::{Dae, VectorX};
 use crate::result::Dense;

@@ -1,8 +1,8 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
-use super::branches::{Branches, DefectCheck};
-use super::norm::norm;
-use super::pairs::Pair;
+use crate::adaptive::discontinuity::{Branches, DefectCheck};
+use crate::adaptive::pairs::Pair;
+use crate::adaptive::tolerances::norm;
 use crate::erk::{Grid, Own, Point, Record, Scheme};
 use crate::error::{Error, Place};
 use crate::finite::check_output;

@@ -1,17 +1,11 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{DiscontinuityDetector, ErrorHistory, GustafssonController, RejectionHistory};
-use crate::adaptive::stages::Convergence;
+use crate::adaptive::discontinuity::{DiscontinuityDetector, ErrorHistory, RejectionHistory};
+use crate::adaptive::newton_monitor::Convergence;
+use crate::adaptive::order::Order;
+use crate::adaptive::step_size::GustafssonController;
 
-/// The number of stages grows where Newton's method converges at this rate or faster,
-const EASY: f64 = 0.01;
-/// and falls where it converges at this rate or slower,
-const HARD: f64 = 0.8;
-/// but grows only if the step size hardly changes,
-const STEADY: (f64, f64) = (0.8, 1.2);
-/// and not before so many steps have been taken with it.
-const SETTLED: usize = 5;
 /// A step is not made longer by less than this: the factors of its matrix are worth more.
 const WORTHWHILE: f64 = 1.2;
 /// A run still looks for its step size while each step is longer than the last by this factor.
@@ -23,43 +17,6 @@ pub(super) enum Need {
     Nothing,
     Factors,
     Jacobian,
-}
-
-/// The number of stages, and what speaks for another one.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Order {
-    pub level: usize,
-    /// How fast Newton's method converged.
-    rate: f64,
-    /// How many steps were taken with it.
-    settled: usize,
-    /// Whether an iteration did not converge, or a matrix was singular,
-    pub unexpected: bool,
-    /// or converged only with a much shorter step.
-    much_shorter: bool,
-}
-
-impl Order {
-    /// The level for the next matrix, for a step that is `ratio` times as long as the last one.
-    pub fn next(&mut self, convergence: &Convergence, ratio: f64, levels: usize) -> usize {
-        self.settled += 1;
-        self.rate = convergence.rate.max(0.5 * self.rate).min(10.0);
-        let steady = ratio > STEADY.0 && ratio < STEADY.1;
-        let easy = convergence.iterations > 1 && self.rate <= EASY;
-        let hard = self.rate >= HARD || self.unexpected || self.much_shorter;
-        (self.unexpected, self.much_shorter) = (false, false);
-        if hard {
-            self.level.saturating_sub(1)
-        } else if easy && steady && self.settled > SETTLED {
-            (self.level + 1).min(levels - 1)
-        } else {
-            self.level
-        }
-    }
-
-    pub fn change(&mut self, level: usize) {
-        (self.level, self.settled) = (level, 1);
-    }
 }
 
 /// A run on its way.
@@ -171,8 +128,7 @@ impl<T: Real> StepState<T> {
         if !core::mem::take(&mut self.same_matrix) {
             return false;
         }
-        self.order.settled += 1;
-        let grows = self.order.settled >= SETTLED && self.order.level + 1 < levels;
+        let grows = self.order.keeps(levels);
         if grows {
             self.need = Need::Factors;
         }

@@ -25,7 +25,8 @@
 //! solve with the factors that Newton's method has gives it. The same solve gives `r(z)/z²`: of an
 //! oscillation it points against the error, of a decay along it.
 
-use super::control::{ORDER_REDUCTION_RATIO, power};
+use super::step_size::power;
+use super::tolerances::ORDER_REDUCTION_RATIO;
 use crate::linalg::{Complex, PARTS};
 use crate::scalar::Scalar;
 
