@@ -1,6 +1,6 @@
 //! What a run asks of a step with any number of stages.
 
-use super::discontinuity::DefectCheck;
+use super::discontinuity::BranchChange;
 use super::error_estimate::DefectFilter;
 use super::newton_monitor::{Convergence, Culprit, Failure};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
@@ -77,22 +77,18 @@ pub trait Stages<M: Dae, T: Real> {
         again: bool,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
-    /// The estimated error where the defect of a step is not that of a smooth solution, relative to
-    /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
-    /// error is as foreseen.
+    /// The largest defect at further points of a step in which the model changes its branch,
+    /// relative to what the estimate tolerates.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
-    fn roughness(
+    fn largest_defect(
         &mut self,
         start: &StepContext<'_, M, T>,
-        growth: f64,
-        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure>;
-    /// How its defect is to be looked at where the model is not that of its start inside of the
-    /// step.
-    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck>;
+    /// How the model inside of the step is not that of its start.
+    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange>;
     /// The variables where the estimate compares the derivative of the polynomial with the
     /// solution; whether that is the end of the step, and not its start.
     fn estimates(&self, start: &StepContext<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;

@@ -4,7 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use super::discontinuity::{DefectCheck, STRONG_REJECTION};
+use super::discontinuity::{BranchChange, STRONG_REJECTION};
 use crate::scalar::{Real, Scalar};
 
 /// A step of an implicit method is this much shorter than the one that would just be accepted,
@@ -83,7 +83,7 @@ pub struct ExplicitStep {
     /// its length,
     pub h: f64,
     /// and how it changes the branches of the model, if it does.
-    pub change: Option<DefectCheck>,
+    pub change: Option<BranchChange>,
 }
 
 impl ExplicitStep {
@@ -115,7 +115,7 @@ impl PiController {
         }
         let count = match step.change {
             _ if !step.is_above_rounding::<T>(1.0) => 1.0,
-            Some(DefectCheck::Switch) => Self::OVER_BRANCH,
+            Some(BranchChange::Switch) => Self::OVER_BRANCH,
             None if !is_over_jump => 1.0,
             _ => Self::OVER_DIFFERENCE,
         };
@@ -130,7 +130,7 @@ impl PiController {
         let present = power(error, exponent - 0.75 * memory);
         if error > 1.0 {
             let over_branch = (0.9 / Scalar::cbrt(error)).clamp(0.1, 0.9);
-            let is_over_branch = step.change == Some(DefectCheck::Switch);
+            let is_over_branch = step.change == Some(BranchChange::Switch);
             return if is_over_branch && step.is_above_rounding::<T>(over_branch) {
                 over_branch
             } else {

@@ -1,17 +1,17 @@
 //! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
 
 use super::*;
-use crate::adaptive::discontinuity::{Branches, DefectCheck};
+use crate::adaptive::discontinuity::{BranchChange, Branches};
 use crate::adaptive::newton_monitor::Convergence;
 
-/// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
-/// error.
-const ROUGH_OVER_ERROR: f64 = 3.0;
+/// The estimate of a step in which the highest derivative of a spline jumps is about so many times
+/// its error.
+const OVER_SPLINE_KNOT: f64 = 3.0;
 /// Where the model changes its branch the error is held below the tolerance that was asked for by
 /// this: there may be many such steps, and what follows makes more of them.
-const OVER_BRANCHES: f64 = 6.0;
-/// Rounding errors are rough too: jumps are looked for where the least error that counts is so many
-/// times as large, of `f64` with relative tolerances of 3e-11 and more.
+const OVER_SWITCH: f64 = 6.0;
+/// Rounding errors are like jumps: these are looked for where the least error that counts is so
+/// many times as large, of `f64` with relative tolerances of 3e-11 and more.
 const ABOVE_NOISE: f64 = 1e4;
 /// What follows a rough step may be shorter by this and still be a step.
 const SHORTEST_AFTER_ROUGH: f64 = 0.01;
@@ -35,7 +35,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 levels.change::<B>(level, next)?;
                 state.order.change(next);
                 state.controller.forget();
-                state.error_history.forget();
                 self.tighten::<B>(levels.get::<B>(next)?.count());
             }
         }
@@ -179,55 +178,41 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         };
         let weighted = error * state.rejections.weight(start.tolerance_ratio);
         if weighted < 1.0 {
-            self.refuse_rough(stages, state, error)?;
+            self.refuse_over_branches(stages, state, error)?;
         }
         Ok(weighted)
     }
 
-    /// Refuses a step that is not smooth where its error would be above the tolerance that was
-    /// asked for.
+    /// Refuses a step in which the model changes its branch where its error would be above the
+    /// tolerance that was asked for.
     ///
     /// # Errors
     /// [`Failure::Rough`], and a value that is not finite.
-    fn refuse_rough(
+    fn refuse_over_branches(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        state: &mut StepState<T>,
+        state: &StepState<T>,
         error: f64,
     ) -> Result<(), Failure> {
-        let Tolerances { tolerance_ratio, noise, .. } = &self.base.tolerances;
         let start = self.base.step(state);
-        let (size, order) = (state.h.to_f64().abs(), stages.count() as f64 + 1.0);
-        let counted = *tolerance_ratio / ROUGH_OVER_ERROR;
-        let is_above_rounding = ABOVE_NOISE * *noise * counted <= 1.0;
-        let otherwise = if state.rejections.is_after_rejection() {
-            DefectCheck::AfterRejection
-        } else {
-            DefectCheck::Suspicious
-        };
-        let check = stages.change(&start).unwrap_or(otherwise);
-        let unusual = error * counted >= 1.0 && state.discontinuities.may_be(error);
-        if is_above_rounding && (check != DefectCheck::Suspicious || unusual) {
-            let growth = state.error_history.growth(size, error, order);
-            let seen = stages.roughness(&start, growth, check, &mut self.statistics.residuals)?;
-            let rough = match check {
-                DefectCheck::Switch => OVER_BRANCHES * *tolerance_ratio * seen.max(error),
-                DefectCheck::SplineKnot => counted * seen.max(error),
-                DefectCheck::AfterRejection | DefectCheck::Suspicious => counted * seen,
-            };
-            // A derivative that jumps leaves an error like the fourth power of the step size, or a
-            // lower one. Where times are no finer than that, the step is as good as can be.
-            let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
-            let shorter = state.h * T::from_f64(SHORTEST_AFTER_ROUGH * factor);
-            if rough >= 1.0
-                && self.check_step(state.t, shorter, Refusal::Error).is_ok()
-                && (check >= DefectCheck::SplineKnot || state.discontinuities.refuses(size, seen, error))
-            {
-                return Err(Failure::Rough(factor));
-            }
+        let Tolerances { tolerance_ratio, noise, .. } = &self.base.tolerances;
+        let over_knot = *tolerance_ratio / OVER_SPLINE_KNOT;
+        let Some(change) = stages.change(&start) else { return Ok(()) };
+        if ABOVE_NOISE * *noise * over_knot > 1.0 {
+            return Ok(());
         }
-        state.error_history.accepted(size, error, order, *noise);
-        state.discontinuities.accepted();
+        let factor = match change {
+            BranchChange::Switch => OVER_SWITCH * *tolerance_ratio,
+            BranchChange::SplineKnot => over_knot,
+        };
+        let rough = factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
+        // A derivative that jumps leaves an error like the fourth power of the step size, or a
+        // lower one. Where times are no finer than that, the step is as good as can be.
+        let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
+        let shorter = state.h * T::from_f64(SHORTEST_AFTER_ROUGH * factor);
+        if rough >= 1.0 && self.check_step(state.t, shorter, Refusal::Error).is_ok() {
+            return Err(Failure::Rough(factor));
+        }
         Ok(())
     }
 

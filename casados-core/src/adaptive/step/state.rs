@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::discontinuity::{DiscontinuityDetector, ErrorHistory, RejectionHistory};
+use crate::adaptive::discontinuity::RejectionHistory;
 use crate::adaptive::newton_monitor::Convergence;
 use crate::adaptive::order::Order;
 use crate::adaptive::step_size::GustafssonController;
@@ -47,8 +47,6 @@ pub(super) struct StepState<T> {
     pub convergence: Convergence,
     pub controller: GustafssonController,
     pub rejections: RejectionHistory,
-    pub error_history: ErrorHistory,
-    pub discontinuities: DiscontinuityDetector,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
@@ -82,8 +80,6 @@ impl<T: Real> StepState<T> {
             convergence: Convergence::default(),
             controller: GustafssonController::default(),
             rejections: RejectionHistory::default(),
-            error_history: ErrorHistory::default(),
-            discontinuities: DiscontinuityDetector::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,

@@ -6,7 +6,7 @@ use super::*;
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// How the model at a stage or at the end of the step differs from that at its start: by a
     /// branch, or by no more than the pieces of its splines.
-    pub(super) fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck> {
+    pub(super) fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange> {
         if const { M::BRANCHES == 0 } {
             return None;
         }
@@ -34,8 +34,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
             take(self.memory.points[stage / GROUP].as_ref(), stage % GROUP, point.as_mut());
             let at = Branches::of::<M, T>(&point);
             let before = core::mem::replace(&mut self.memory.branches[stage], at);
-            sides.passed |= before.change(at) == Some(DefectCheck::Switch);
-            sides.beyond |= jacobian.change(at) == Some(DefectCheck::Switch);
+            sides.passed |= before.change(at) == Some(BranchChange::Switch);
+            sides.beyond |= jacobian.change(at) == Some(BranchChange::Switch);
         }
         sides
     }

@@ -11,10 +11,10 @@ mod branches;
 mod estimate;
 mod points;
 mod rate;
-mod roughness;
 mod scheme;
+mod switches;
 
-use crate::adaptive::discontinuity::{Branches, DefectCheck};
+use crate::adaptive::discontinuity::{BranchChange, Branches};
 use crate::adaptive::error_estimate::{DefectFilter, RelativeErrors};
 use crate::adaptive::methods::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use crate::adaptive::newton_monitor::{Convergence, Culprit, Failure, Sides};
@@ -28,7 +28,7 @@ use crate::irk::dot;
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape};
 use crate::tableau::Tableau;
 use alloc::boxed::Box;
@@ -304,23 +304,21 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
         // What the model is on the other side of a border says nothing of this one.
         let branches = Branches::of::<M, T>(start.point);
-        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(DefectCheck::Switch) {
+        if branches.change(Branches::of::<M, T>(&self.memory.point)) == Some(BranchChange::Switch) {
             return Ok(error);
         }
         self.estimate(start, at_end, residuals)
     }
 
-    fn roughness(
+    fn largest_defect(
         &mut self,
         start: &StepContext<'_, M, T>,
-        growth: f64,
-        check: DefectCheck,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        self.roughness(start, growth, check, residuals)
+        self.largest_defect(start, residuals)
     }
 
-    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<DefectCheck> {
+    fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange> {
         self.change(start)
     }
 

@@ -90,11 +90,6 @@ impl<T: Real, const S: usize, const G: usize> Scheme<T, S, G> {
         0.5 * (self.tableau.c()[stage - 1] + self.tableau.c()[stage])
     }
 
-    /// `Π_i (τ − c_i)`
-    pub(super) fn nodes(&self, tau: f64) -> f64 {
-        self.tableau.c().iter().fold(1.0, |product, c| product * (tau - c))
-    }
-
     /// The Lagrange polynomials at the nodes of a step that follows on this one, `ratio` times as
     /// long: a column for each node of this one.
     pub(super) fn continued(&self, ratio: f64) -> [Groups<T, G>; S] {

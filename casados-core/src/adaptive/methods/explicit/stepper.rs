@@ -1,6 +1,6 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
-use crate::adaptive::discontinuity::{Branches, DefectCheck};
+use crate::adaptive::discontinuity::{BranchChange, Branches};
 use crate::adaptive::pairs::Pair;
 use crate::adaptive::tolerances::norm;
 use crate::erk::{Grid, Own, Point, Record, Scheme};
@@ -58,7 +58,7 @@ pub trait Take<M: Dae, T: Real> {
     /// A value that is not finite.
     fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// How the step that was taken changes the branches of the model, if it does.
-    fn change(&self) -> Option<DefectCheck>;
+    fn change(&self) -> Option<BranchChange>;
     /// The state at the end.
     fn end(&self) -> &[T];
     /// The end is the next start.
@@ -79,7 +79,7 @@ pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
     memory: Box<Memory<M, T, S>>,
     /// How the step that was taken changes the branches of the model, if it does.
-    change: Option<DefectCheck>,
+    change: Option<BranchChange>,
     /// Steps at the bound of stability less those that are not.
     at_bound: i64,
     method: PhantomData<fn() -> B>,
@@ -230,7 +230,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Ok(error * self.global_error_factor(steps))
     }
 
-    fn change(&self) -> Option<DefectCheck> {
+    fn change(&self) -> Option<BranchChange> {
         self.change
     }
 
