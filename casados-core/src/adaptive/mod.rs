@@ -18,8 +18,8 @@
 //! derivatives; `order` the methods of a family and the choice among them; `consistent` derivatives
 //! at a point and `variational` errors of derivatives; `step` the loop over the steps of implicit
 //! methods, `engine` the trait of a method as a whole and `methods` all of them; `sensitivities`
-//! derivatives of runs, `integrator` what users see, `segment` one of several intervals, `piecewise`
-//! those with controls of their own, `events`, and `along` integrands.
+//! derivatives of runs, `integrator` what users see, `segment` one of several intervals,
+//! `piecewise` those with controls of their own, `events`, and `along` integrands.
 
 mod along;
 mod consistent;

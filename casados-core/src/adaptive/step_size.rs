@@ -4,7 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use super::discontinuity::{BranchChange, STRONG_REJECTION};
+use super::discontinuity::BranchChange;
 use crate::scalar::{Real, Scalar};
 
 /// A step of an implicit method is this much shorter than the one that would just be accepted,
@@ -61,6 +61,9 @@ pub struct Control {
     /// By how much a step size may shrink and grow.
     pub range: (f64, f64),
 }
+
+/// An error that is refused by much.
+const STRONG_REJECTION: f64 = 8.0;
 
 /// The controller of explicit methods: what the error of the last step was takes part (K.
 /// Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods,

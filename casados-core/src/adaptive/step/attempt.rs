@@ -176,11 +176,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             _ => error,
         };
-        let weighted = error * state.rejections.weight(start.tolerance_ratio);
-        if weighted < 1.0 {
+        if error < 1.0 {
             self.refuse_over_branches(stages, state, error)?;
         }
-        Ok(weighted)
+        Ok(error)
     }
 
     /// Refuses a step in which the model changes its branch where its error would be above the
@@ -230,7 +229,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let (t, h, nx) = (state.t, state.h, M::Shape::NX);
         self.statistics.steps += 1;
         state.pivoted = false;
-        state.rejections.accepted();
         stages.accept();
         if let Some(sensitivities) = &mut self.sensitivities {
             sensitivities.accept();

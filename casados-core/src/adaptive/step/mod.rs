@@ -191,7 +191,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     let factor = state.factor(error, stages.count());
                     if error >= 1.0 {
                         self.statistics.rejected += 1;
-                        state.refuse(error, factor);
+                        state.refuse(factor);
                     } else if self.accept(stages, &mut state, factor, &mut *after)? {
                         return Ok(());
                     }

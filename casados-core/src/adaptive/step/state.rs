@@ -1,7 +1,6 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::discontinuity::RejectionHistory;
 use crate::adaptive::newton_monitor::Convergence;
 use crate::adaptive::order::Order;
 use crate::adaptive::step_size::GustafssonController;
@@ -46,7 +45,6 @@ pub(super) struct StepState<T> {
     pub order: Order,
     pub convergence: Convergence,
     pub controller: GustafssonController,
-    pub rejections: RejectionHistory,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
@@ -79,7 +77,6 @@ impl<T: Real> StepState<T> {
             order: Order::default(),
             convergence: Convergence::default(),
             controller: GustafssonController::default(),
-            rejections: RejectionHistory::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
@@ -179,9 +176,8 @@ impl<T: Real> StepState<T> {
     }
 
     /// The error is too large.
-    pub fn refuse(&mut self, error: f64, factor: f64) {
+    pub fn refuse(&mut self, factor: f64) {
         self.refusal = Refusal::Error;
-        self.rejections.refused(error);
         self.again(if self.accepted.is_none() { 0.1 } else { factor });
     }
 

@@ -1,7 +1,7 @@
 //! The defect of a step in which the model changes its branch.
 //!
-//! The polynomial `u` of a step leaves the defect `d(τ) = u̇ − f(u)`, which is zero at the nodes. The
-//! error at the end of a smooth step is the integral of the defect, in which all but high terms
+//! The polynomial `u` of a step leaves the defect `d(τ) = u̇ − f(u)`, which is zero at the nodes.
+//! The error at the end of a smooth step is the integral of the defect, in which all but high terms
 //! cancel: so it is of order `2s − 1` or `2s`, and the estimate, of order `s`, may be a thousand
 //! tolerances. Where a force jumps inside the step, or one of its derivatives, nothing cancels, and
 //! the estimate may be close to the error, or below it: further points of the defect tell.
