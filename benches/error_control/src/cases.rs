@@ -140,8 +140,12 @@ pub fn quadratic(number: u64) -> Case {
             (ones, 20.0)
         }
         1 => {
-            let rows =
-                [[-1e4, 100.0, -10.0, 1.0], [0.0, -1e3, 10.0, -10.0], [0.0, 0.0, -1.0, 10.0], [0.0, 0.0, 0.0, -0.1]];
+            let rows = [
+                [-1e4, 100.0, -10.0, 1.0],
+                [0.0, -1e3, 10.0, -10.0],
+                [0.0, 0.0, -1.0, 10.0],
+                [0.0, 0.0, 0.0, -0.1],
+            ];
             for (i, row) in rows.into_iter().enumerate() {
                 for (j, value) in row.into_iter().enumerate() {
                     of.linear(i, j, value);
@@ -341,5 +345,12 @@ pub fn splined(number: u64) -> Case {
     let n = number as f64;
     let t = 5.0 + 0.8 * n;
     let breaks = knots().into_iter().filter(|b| *b > 0.0 && *b < t).collect();
-    Case { breaks, ..Case::new(vec![1.0, -0.5 + 0.1 * n], vec![1.0 + n * n, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f64::MAX, 1.0, 1.0], t) }
+    Case {
+        breaks,
+        ..Case::new(
+            vec![1.0, -0.5 + 0.1 * n],
+            vec![1.0 + n * n, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f64::MAX, 1.0, 1.0],
+            t,
+        )
+    }
 }

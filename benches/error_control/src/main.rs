@@ -14,6 +14,9 @@
 
 mod cases;
 mod models;
+#[path = "../../../tests/ivp/algebraic/plants.rs"]
+#[allow(dead_code)]
+mod plants;
 #[path = "../../src/bin/random_problems/problems.rs"]
 mod problems;
 #[path = "../../src/bin/random_problems/models.rs"]
@@ -21,9 +24,6 @@ mod problems;
 mod random;
 #[path = "../../../examples/models/ivp/mod.rs"]
 mod set;
-#[path = "../../../tests/ivp/algebraic/plants.rs"]
-#[allow(dead_code)]
-mod plants;
 
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Gauss, Irk, Options, Radau};
 use cases::Case;
@@ -97,7 +97,10 @@ macro_rules! family {
 }
 macro_rules! reference_by {
     ($model:ty, $nx:literal, $np:literal, $case:ident, $pieces:ident) => {{
-        let (mut x, p) = (SVector::<f64, $nx>::from_column_slice(&$case.x0), SVector::<f64, $np>::from_column_slice(&$case.p));
+        let (mut x, p) = (
+            SVector::<f64, $nx>::from_column_slice(&$case.x0),
+            SVector::<f64, $np>::from_column_slice(&$case.p),
+        );
         let mut adaptive = Adaptive::<$model, Radau>::new(options($case, 1e-10))?;
         let mut irk = Irk::<$model, Gauss<9>>::new(Options { steps: $pieces, ..Default::default() })?;
         if $np > 0 {
@@ -162,7 +165,14 @@ fn sets(problems: u64) -> Vec<Set> {
         random!("contact", ode!(Contact, 2, 4)),
         ("quadratic", "detest", 17, cases::quadratic, ode!(Quadratic, 5, 105)),
         of_set!("akzo", "ivp/ends.json", "akzo_nobel", 5, 1e-3, dae!(AkzoNobel, 5, 9)),
-        of_set!("amplifier", "ivp/ends.json", "transistor_amplifier", 8, 1e-2, dae!(TransistorAmplifier, 8, 0)),
+        of_set!(
+            "amplifier",
+            "ivp/ends.json",
+            "transistor_amplifier",
+            8,
+            1e-2,
+            dae!(TransistorAmplifier, 8, 0)
+        ),
         of_set!("beam", "ivp/vibrations.json", "beam_10", 20, 1.0, dae!(Beam<20, 10, 30>, 20, 0)),
         of_set!("tanks", "ivp/algebraic.json", "tanks", 12, 1.0, dae!(Tanks, 12, 0)),
         ("two springs", "kinks", 20, cases::two_springs, ode!(Contact, 2, 4)),
@@ -197,7 +207,11 @@ fn switch_off(mechanisms: u64) {
 }
 
 /// All runs of a family, in order.
-fn runs(family: &Family, cases: &[(Case, Vec<f64>)], explicit: Option<bool>) -> Vec<(&'static str, f64, Option<Made>)> {
+fn runs(
+    family: &Family,
+    cases: &[(Case, Vec<f64>)],
+    explicit: Option<bool>,
+) -> Vec<(&'static str, f64, Option<Made>)> {
     let mut all = Vec::new();
     for (case, exact) in cases {
         for method in family.methods {
@@ -225,8 +239,11 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--problems" => problems = arguments.next().and_then(|count| count.parse().ok()).unwrap_or(problems),
-            list => mechanisms.push(list.split('+').map(|m| m.parse::<u32>().expect("a number")).collect::<Vec<_>>()),
+            "--problems" => {
+                problems = arguments.next().and_then(|count| count.parse().ok()).unwrap_or(problems)
+            }
+            list => mechanisms
+                .push(list.split('+').map(|m| m.parse::<u32>().expect("a number")).collect::<Vec<_>>()),
         }
     }
     let start = ProcessTime::now();
@@ -236,7 +253,9 @@ fn main() {
         let mut cases = Vec::new();
         for number in 0..*count {
             let case = case(number);
-            let (Ok(other), Ok(exact)) = ((family.reference)(&case, 2), (family.reference)(&case, 3)) else { continue };
+            let (Ok(other), Ok(exact)) = ((family.reference)(&case, 2), (family.reference)(&case, 3)) else {
+                continue;
+            };
             let unlike = difference(&other, &exact, case.atol);
             if unlike.is_nan() || unlike > TRUSTED {
                 continue;
@@ -256,7 +275,13 @@ fn main() {
             let of: Vec<_> = all.iter().filter(|run| run.0 == *method).collect();
             let (misses, failed, worst) = verdict(&of);
             let sum = |f: fn(&Made) -> f64| of.iter().filter_map(|run| run.2.as_ref().map(f)).sum::<f64>();
-            println!("base; {group}; {name}; {method}; {}; {misses}; {failed}; {worst:.3}; {}; {}; {}; {time:.3}", of.len(), sum(|m| m.steps), sum(|m| m.evaluations), sum(|m| m.matrices));
+            println!(
+                "base; {group}; {name}; {method}; {}; {misses}; {failed}; {worst:.3}; {}; {}; {}; {time:.3}",
+                of.len(),
+                sum(|m| m.steps),
+                sum(|m| m.evaluations),
+                sum(|m| m.matrices)
+            );
         }
         base.push(all);
     }
@@ -272,20 +297,33 @@ fn main() {
             let before: Vec<_> =
                 before.iter().filter(|run| run.0.starts_with("Dormand") == explicit).collect();
             for method in family.methods {
-                let (old, new): (Vec<_>, Vec<_>) =
-                    (before.iter().copied().filter(|run| run.0 == *method).collect(), after.iter().filter(|run| run.0 == *method).collect());
+                let (old, new): (Vec<_>, Vec<_>) = (
+                    before.iter().copied().filter(|run| run.0 == *method).collect(),
+                    after.iter().filter(|run| run.0 == *method).collect(),
+                );
                 if new.is_empty() {
                     continue;
                 }
                 let (old_verdict, new_verdict) = (verdict(&old), verdict(&new));
-                let pairs: Vec<_> = old.iter().zip(&new).filter_map(|(old, new)| Some((old.2?, new.2?))).collect();
+                let pairs: Vec<_> =
+                    old.iter().zip(&new).filter_map(|(old, new)| Some((old.2?, new.2?))).collect();
                 let ratio = |f: fn(&Made) -> f64| {
-                    (pairs.iter().map(|(old, new)| ((f(new) + 1.0) / (f(old) + 1.0)).ln()).sum::<f64>() / pairs.len().max(1) as f64).exp()
+                    (pairs.iter().map(|(old, new)| ((f(new) + 1.0) / (f(old) + 1.0)).ln()).sum::<f64>()
+                        / pairs.len().max(1) as f64)
+                        .exp()
                 };
                 println!(
                     "{list:?}; {group}; {name}; {method}; {}; {}; {}; {}; {}; {:.3}; {:.3}; {:.4}; {:.4}; {:.4}",
-                    new.len(), old_verdict.0, new_verdict.0, old_verdict.1, new_verdict.1, old_verdict.2, new_verdict.2,
-                    ratio(|m| m.steps), ratio(|m| m.evaluations), ratio(|m| m.matrices)
+                    new.len(),
+                    old_verdict.0,
+                    new_verdict.0,
+                    old_verdict.1,
+                    new_verdict.1,
+                    old_verdict.2,
+                    new_verdict.2,
+                    ratio(|m| m.steps),
+                    ratio(|m| m.evaluations),
+                    ratio(|m| m.matrices)
                 );
             }
         }

@@ -5,21 +5,21 @@
 //! cargo run --release --manifest-path benches/Cargo.toml -p error_control --bin index_one -- [part of a name]
 //! ```
 
+#[path = "../../../../examples/models/ivp/mod.rs"]
+mod models;
+#[path = "../more_plants.rs"]
+mod more_plants;
 #[path = "../../../../tests/ivp/algebraic/plants.rs"]
 #[allow(dead_code)]
 mod plants;
-#[path = "../../../../examples/models/ivp/mod.rs"]
-mod models;
 
 use casados::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Radau};
 use cpu_time::ProcessTime;
 use models::chemistry::AkzoNobel;
 use models::vibrations::{Beam, ExplicitBeam};
+use more_plants::{AkzoEliminated, Fekete, FeketeEliminated};
 use nalgebra::SVector;
-use plants::{
-    AkzoEliminated, Exchanger, ExchangerEliminated, Fekete, FeketeEliminated, Pipes,
-    PipesEliminated, Tanks, TanksEliminated,
-};
+use plants::{Exchanger, ExchangerEliminated, Pipes, PipesEliminated, Tanks, TanksEliminated};
 use reference_data::Record;
 
 /// The time of a call, its result and its work.
@@ -53,8 +53,20 @@ fn show(name: &str, tolerance: f64, atol: f64, (algebraic, ordinary): (Made, Mad
     let difference = difference.fold(0.0, f64::max) / tolerance;
     print!("| {name} | {tolerance:e} | {:.2} | {difference:.2} |", algebraic.0 / ordinary.0);
     for (time, _, work) in [algebraic, ordinary] {
-        let AdaptiveStatistics { steps, rejected, failed, residuals, jacobians, factorizations, iterations, .. } = work;
-        print!(" {:.3} ms: {steps}+{rejected}+{failed}, {residuals}, {jacobians}, {factorizations}, {iterations} |", 1e3 * time);
+        let AdaptiveStatistics {
+            steps,
+            rejected,
+            failed,
+            residuals,
+            jacobians,
+            factorizations,
+            iterations,
+            ..
+        } = work;
+        print!(
+            " {:.3} ms: {steps}+{rejected}+{failed}, {residuals}, {jacobians}, {factorizations}, {iterations} |",
+            1e3 * time
+        );
     }
     println!();
 }
@@ -72,7 +84,9 @@ fn spiral() -> Vec<f64> {
 
 fn main() {
     let part = std::env::args().nth(1).unwrap_or_default();
-    println!("| model | tolerance | time, DAE/ODE | difference in tolerances | DAE: steps+rejected+failed, evaluations, Jacobians, factorisations, iterations | ODE |");
+    println!(
+        "| model | tolerance | time, DAE/ODE | difference in tolerances | DAE: steps+rejected+failed, evaluations, Jacobians, factorisations, iterations | ODE |"
+    );
     println!("| --- | --- | --- | --- | --- | --- |");
     let set = Record::load("ivp/algebraic.json").expect("the reference is there");
     for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
@@ -81,38 +95,60 @@ fn main() {
                 if $name.contains(part.as_str()) {
                     let record = set.record($name).expect("a problem");
                     let (x0, t) = (record.list("x0").expect("states"), record.number("t").expect("a time"));
-                    show($name, tolerance, 1.0, (
-                        solve!($dae, 0, x0, [], t, tolerance, 1.0),
-                        solve!($ode, 0, x0, [], t, tolerance, 1.0),
-                    ));
+                    show(
+                        $name,
+                        tolerance,
+                        1.0,
+                        (
+                            solve!($dae, 0, x0, [], t, tolerance, 1.0),
+                            solve!($ode, 0, x0, [], t, tolerance, 1.0),
+                        ),
+                    );
                 }
             };
         }
         if "beam".contains(part.as_str()) {
-            let record = Record::load("ivp/vibrations.json").and_then(|set| set.record("beam_10")).expect("a problem");
+            let record =
+                Record::load("ivp/vibrations.json").and_then(|set| set.record("beam_10")).expect("a problem");
             let x0 = record.list("x0").expect("states");
-            show("beam", tolerance, 1.0, (
-                solve!(Beam<20, 10, 30>, 0, x0, [], 5.0, tolerance, 1.0),
-                solve!(ExplicitBeam<20>, 0, x0, [], 5.0, tolerance, 1.0),
-            ));
+            show(
+                "beam",
+                tolerance,
+                1.0,
+                (
+                    solve!(Beam<20, 10, 30>, 0, x0, [], 5.0, tolerance, 1.0),
+                    solve!(ExplicitBeam<20>, 0, x0, [], 5.0, tolerance, 1.0),
+                ),
+            );
         }
         compare!("pipes", Pipes, PipesEliminated);
         compare!("tanks", Tanks, TanksEliminated);
         compare!("exchanger", Exchanger, ExchangerEliminated);
         if "fekete".contains(part.as_str()) {
             let x0 = spiral();
-            show("fekete", tolerance, 1.0, (
-                solve!(Fekete, 0, x0, [], 10.0, tolerance, 1.0),
-                solve!(FeketeEliminated, 0, x0, [], 10.0, tolerance, 1.0),
-            ));
+            show(
+                "fekete",
+                tolerance,
+                1.0,
+                (
+                    solve!(Fekete, 0, x0, [], 10.0, tolerance, 1.0),
+                    solve!(FeketeEliminated, 0, x0, [], 10.0, tolerance, 1.0),
+                ),
+            );
         }
         if "akzo".contains(part.as_str()) {
-            let record = Record::load("ivp/ends.json").and_then(|set| set.record("akzo_nobel")).expect("a problem");
+            let record =
+                Record::load("ivp/ends.json").and_then(|set| set.record("akzo_nobel")).expect("a problem");
             let (x0, p) = (record.list("x0").expect("states"), record.list("p").expect("parameters"));
-            show("akzo", tolerance, 1e-3, (
-                solve!(AkzoNobel, 9, x0, p, 180.0, tolerance, 1e-3),
-                solve!(AkzoEliminated, 9, x0, p, 180.0, tolerance, 1e-3),
-            ));
+            show(
+                "akzo",
+                tolerance,
+                1e-3,
+                (
+                    solve!(AkzoNobel, 9, x0, p, 180.0, tolerance, 1e-3),
+                    solve!(AkzoEliminated, 9, x0, p, 180.0, tolerance, 1e-3),
+                ),
+            );
         }
     }
 }
