@@ -212,6 +212,12 @@ fn rooms_import_what_the_list_says() {
 fn engines_have_no_circles() {
     let engines = [
         "adaptive",
+        "adaptive/integrator",
+        "adaptive/methods",
+        "adaptive/methods/collocation",
+        "adaptive/methods/explicit",
+        "adaptive/piecewise",
+        "adaptive/step",
         "batch",
         "erk",
         "irk",

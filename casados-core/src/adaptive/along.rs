@@ -1,10 +1,9 @@
 //! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
 
+use super::engine::Engine;
 use super::events::{Hybrid, HybridAdjoint, HybridForward, Solution};
-use super::integrals::Spanning;
 use super::integrator::Integrator;
-use super::piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
-use super::sealed::Engine;
+use super::piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian, Spanning};
 use crate::error::Error;
 use crate::integrator::With;
 use crate::model::{Dae, VectorU, VectorX};

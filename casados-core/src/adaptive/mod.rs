@@ -11,65 +11,58 @@
 //! the step, is from the solution there, through the matrix of one eigenvalue. Explicit pairs of
 //! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that are not stiff.
 //!
-//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels`
-//! its loops, `defect_filter` the second estimate of its error, `orders` the methods of a family
-//! and `implicit` the engine of them, `control` the step size, `start` where a run begins and
-//! `consistent` at which derivatives, those of explicit models by `rates`, at a `point`, `run` the
-//! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit`
-//! the explicit methods, `replay` and `sensitivities` derivatives of runs, `variational`
-//! derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of
-//! several intervals, `piecewise` those with controls of their own, `columns` their derivatives and
-//! `integrals` those of an integrand, `events`, `integrator` what users see.
+//! From the bottom up: `options`, `statistics`, `point` and `tape` are data; `tolerances` what is
+//! asked of each part, `discontinuity` what is known of branches, `newton_monitor` how an iteration
+//! goes, `error_estimate` the second estimate, `step_size` the controllers and `pairs` the
+//! coefficients of explicit methods; `stages` and `replay` the traits of a step and of its
+//! derivatives; `order` the methods of a family and the choice among them; `consistent` derivatives
+//! at a point and `variational` errors of derivatives; `step` the loop over the steps of implicit
+//! methods, `engine` the trait of a method as a whole and `methods` all of them; `sensitivities`
+//! derivatives of runs, `integrator` what users see, `segment` one of several intervals,
+//! `piecewise` those with controls of their own, `events`, and `along` integrands.
 
 mod along;
-mod branches;
-mod collocation;
-mod columns;
 mod consistent;
-mod control;
-mod defect_filter;
+mod discontinuity;
+mod engine;
+mod error_estimate;
 mod events;
-mod explicit;
-mod explicit_step;
-mod implicit;
-mod integrals;
 mod integrator;
-mod kernels;
-mod norm;
+mod methods;
+mod newton_monitor;
 mod options;
-mod orders;
+mod order;
 mod pairs;
 mod piecewise;
 mod point;
-mod rates;
 mod replay;
-mod run;
 mod segment;
 mod sensitivities;
 mod stages;
-mod start;
 mod statistics;
+mod step;
+mod step_size;
 mod tape;
+mod tolerances;
 mod variational;
 
+#[cfg(feature = "casadi")]
+pub(crate) use engine::Engine;
 pub use events::{
     Crossing, Event, Hybrid, HybridAdjoint, HybridForward, HybridHessian, Occurrence, Solution, TimeGradient,
 };
-pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 pub use integrator::Integrator;
+pub use methods::Radau;
 pub use options::AdaptiveOptions;
-pub use piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
-#[cfg(feature = "casadi")]
-pub(crate) use sealed::Engine;
+pub use piecewise::{
+    Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian, PiecewiseLeastSquares,
+    PiecewiseQuadrature, Spanning,
+};
 pub use statistics::AdaptiveStatistics;
 
-use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, Method, RadauIIA};
-use alloc::boxed::Box;
-use replay::{OneMethod, ThreeMethods};
-use stages::Stages;
+use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 
 /// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
 /// `Adaptive<Model, Radau>`.
@@ -153,129 +146,6 @@ pub trait AdaptiveMethod {
     /// Its integrator.
     type Integrator<M: Dae, T: Real>;
 }
-
-/// Radau IIA methods of 3, 5 and 7 stages: more of them where Newton's method converges fast, fewer
-/// where it is slow.
-///
-/// ```
-/// use casados::prelude::*;
-/// use nalgebra::vector;
-///
-/// /// Van der Pol's oscillator, which is stiff.
-/// #[ode]
-/// fn oscillator(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
-///     [x[1], 1e3 * (1.0 - x[0] * x[0]) * x[1] - x[0] + u[0]]
-/// }
-///
-/// let mut adaptive = Adaptive::<Oscillator, Radau>::new(AdaptiveOptions::default())?;
-/// adaptive.solve(&vector![2.0, 0.0], &vector![0.0], 500.0)?;
-/// // An explicit method of fixed steps needs more than 1e6 for the same.
-/// assert!(adaptive.statistics().steps < 1000);
-/// # Ok::<(), casados::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug)]
-pub struct Radau;
-
-mod sealed {
-    use super::*;
-    use crate::model::VectorX;
-    use crate::result::Dense;
-    use replay::StepDifferentiator;
-    use run::{After, Run, Span};
-    use tape::Entry;
-
-    /// What a method remembers. Nobody outside can name it.
-    pub trait Kind<M: Dae, T: Real>: 'static {
-        /// Its memory.
-        type State: Default + Send + Sync;
-    }
-
-    /// What integrates with steps of variable size, for the models that it can.
-    pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
-        /// Whether `z` at the end of a step is that of a stage; else it is found from the
-        /// equations.
-        const ENDS_ON_STAGE: bool;
-        /// What takes its steps again.
-        type Replays: StepDifferentiator<M, T>;
-        /// Integrates an interval; `after` is called after each accepted step.
-        ///
-        /// # Errors
-        /// Whatever ends a run early.
-        fn integrate(
-            state: &mut Self::State,
-            run: &mut Run<'_, M, T>,
-            x0: &VectorX<M, T>,
-            span: Span<T>,
-            after: After<'_, M, T>,
-        ) -> Result<(), Error>;
-        /// The solution inside a step, from its numbers; `inputs` are variables of the model, of
-        /// which `u` and `p` count.
-        ///
-        /// # Errors
-        /// A value of the model that is not finite.
-        fn interpolate(
-            state: &mut Self::State,
-            inputs: &[T],
-            entry: &Entry<T>,
-            numbers: (&[T], &[T]),
-            t: T,
-            dense: &mut Dense<M, T>,
-        ) -> Result<(), Error>;
-        /// What takes a step again.
-        fn replays(state: &mut Self::State) -> &mut Self::Replays;
-    }
-
-    /// The methods that an integrator may change between.
-    pub trait Family: 'static {
-        /// How many.
-        const LEVELS: usize;
-        /// See [`Engine`].
-        const ENDS_ON_STAGE: bool;
-        /// What takes their steps again.
-        type Replays<M: Dae, T: Real>: StepDifferentiator<M, T> + Default + Send + Sync;
-        /// One of them.
-        ///
-        /// # Errors
-        /// [`Error::OutOfMemory`]
-        fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error>;
-    }
-}
-use sealed::Family;
-
-impl Family for Radau {
-    const LEVELS: usize = 3;
-    const ENDS_ON_STAGE: bool = true;
-    type Replays<M: Dae, T: Real> = ThreeMethods<
-        OneMethod<M, RadauIIA<3>, T, 3>,
-        OneMethod<M, RadauIIA<5>, T, 5>,
-        OneMethod<M, RadauIIA<7>, T, 7>,
-    >;
-    fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-        match level {
-            0 => RadauIIA::<3>::open(0),
-            1 => RadauIIA::<5>::open(0),
-            _ => RadauIIA::<7>::open(0),
-        }
-    }
-}
-
-macro_rules! single {
-    ($($method:ident: $stages:literal, $groups:literal, $ends_on_stage:literal);*) => {
-        $(impl Family for $method<$stages> {
-            const LEVELS: usize = 1;
-            const ENDS_ON_STAGE: bool = $ends_on_stage;
-            type Replays<M: Dae, T: Real> = OneMethod<M, Self, T, $stages>;
-            fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                // As many lanes as there are eigenvalues, filled up to registers; stages in groups
-                // of four.
-                let tableau = <Self as Method<$stages>>::TABLEAU;
-                Ok(Box::new(collocation::Collocation::<M, T, $stages, $groups>::new(tableau)?))
-            }
-        })*
-    };
-}
-single!(RadauIIA: 3, 1, true; RadauIIA: 5, 2, true; RadauIIA: 7, 2, true);
-single!(Gauss: 2, 1, false; Gauss: 3, 1, false; Gauss: 4, 1, false; Gauss: 5, 2, false; Gauss: 6, 2, false);
 
 macro_rules! methods {
     ($($method:ty),*) => {

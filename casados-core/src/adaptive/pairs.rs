@@ -4,7 +4,7 @@
 //! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5,
 //! II.6 and II.10; the coefficients of the codes DOPRI5 and DOP853.
 
-use super::control::Control;
+use crate::adaptive::step_size::Control;
 use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 

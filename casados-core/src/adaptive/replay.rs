@@ -92,6 +92,22 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     fn stages(&mut self, level: usize) -> Result<&[T], Error>;
 }
 
+/// What differentiates a step, whatever the method is: a program that does not ask for it contains
+/// none of it.
+pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
+    /// # Errors
+    /// Those of Newton's method; a singular matrix.
+    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
+    /// # Errors
+    /// [`Error::NoResult`]
+    fn slopes(
+        &mut self,
+        level: usize,
+        weights: &[f64],
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error>;
+}
+
 /// The integrator of one step.
 type Step<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
 

@@ -1,10 +1,10 @@
 //! The steps of one of several intervals that follow each other.
 
+use super::engine::Engine;
 use super::integrator::{Integrator, inside};
 use super::point::place_inputs;
-use super::run::Span;
-use super::sealed::Engine;
 use super::sensitivities::{Frozen, Memory};
+use super::step::Span;
 use super::tape::Tape;
 use crate::error::{Argument, Error};
 use crate::finite::check_input;

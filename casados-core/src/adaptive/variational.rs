@@ -16,60 +16,22 @@
 //! "forward sensitivity analysis"); the worst column counts.
 
 use super::consistent::Consistent;
-use super::defect_filter::RelativeErrors;
-use super::norm::mean;
+use super::error_estimate::RelativeErrors;
+use super::newton_monitor::Failure;
 use super::pairs::Pair;
 use super::point::At;
-use super::replay::{AcceptedStep, StepDifferentiator};
-use super::sealed::Engine;
-use super::stages::{Failure, FilteredDefect, MOST, Stages, StepContext};
+use super::replay::{AcceptedStep, Differentiate};
+use super::stages::{FilteredDefect, MOST, Stages, StepContext};
+use super::tolerances::{Tolerances, mean};
 use crate::error::Error;
 use crate::linalg::axpy;
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, Ode};
-use crate::result::Forward;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
-
-/// What differentiates a step, whatever the method is: a program that does not ask for it contains
-/// none of it.
-pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
-    /// # Errors
-    /// Those of Newton's method; a singular matrix.
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
-    /// # Errors
-    /// [`Error::NoResult`]
-    fn slopes(
-        &mut self,
-        level: usize,
-        weights: &[f64],
-        to: &mut ArrayW<M, ArrayX<M, T>>,
-    ) -> Result<(), Error>;
-}
-
-struct Replays<M: Dae, B: Engine<M, T>, T: Real> {
-    state: B::State,
-    model: PhantomData<fn() -> (M, T)>,
-}
-
-impl<M: Dae, B: Engine<M, T>, T: Real> Differentiate<M, T> for Replays<M, B, T> {
-    fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error> {
-        B::replays(&mut self.state).forward(step, None)
-    }
-
-    fn slopes(
-        &mut self,
-        level: usize,
-        weights: &[f64],
-        to: &mut ArrayW<M, ArrayX<M, T>>,
-    ) -> Result<(), Error> {
-        B::replays(&mut self.state).slopes(level, weights, to)
-    }
-}
 
 /// Memory of derivatives, a row for each direction.
 #[derive(Zeroable)]
@@ -88,15 +50,6 @@ struct Memory<M: Dae, T: Plain> {
     magnitudes: ArrayW<M, T>,
 }
 
-/// Tolerances of `(x, z)`.
-pub struct Tolerances<'a, M: Dae, T: Real> {
-    /// As the estimate of lower order needs them,
-    pub estimator: &'a ArrayK<M, (T, T)>,
-    /// and as they were asked for.
-    pub rtol: &'a ArrayK<M, T>,
-    pub atol: &'a ArrayK<M, T>,
-}
-
 /// The derivatives along a run.
 pub struct Variational<M: Dae, T: Real> {
     replays: Box<dyn Differentiate<M, T>>,
@@ -108,15 +61,14 @@ pub struct Variational<M: Dae, T: Real> {
 impl<M: Dae, T: Real> Variational<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn new<B: Engine<M, T>>() -> Result<Self, Error> {
+    pub fn new(replays: Box<dyn Differentiate<M, T>>) -> Result<Self, Error> {
         let mut memory: Box<Memory<M, T>> = allocate()?;
         M::jacobian_constants::<T>(&mut memory.jacobian);
         let (length, mut unknowns) = (M::Shape::NK * MOST, Vec::new());
         unknowns
             .try_reserve_exact(length)
             .map_err(|_| Error::OutOfMemory { bytes: length * size_of::<T>() })?;
-        let replays = Replays::<M, B, T> { state: B::State::default(), model: PhantomData };
-        Ok(Self { replays: Box::new(replays), memory, unknowns })
+        Ok(Self { replays, memory, unknowns })
     }
 
     /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of
@@ -219,7 +171,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         at: At<'_, M, T>,
         level: usize,
         start: &StepContext<'_, M, T>,
-        tolerances: &Tolerances<'_, M, T>,
+        tolerances: &Tolerances<M, T>,
         again: bool,
     ) -> Result<f64, Failure> {
         let diverges = |_: Error| Failure::Diverges;

@@ -1,8 +1,8 @@
 //! Events that come sooner and sooner: the paradox of Zeno (J. Zhang, K. H. Johansson, J. Lygeros,
 //! S. Sastry, Zeno hybrid systems, Int. J. Robust Nonlinear Control 11 (2001)).
 
-use super::super::sealed::Engine;
 use super::Hybrid;
+use crate::adaptive::engine::Engine;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;

@@ -1,11 +1,11 @@
 //! Steps and events that are kept: each part between two events has the same steps, relative to its
 //! length, and ends where its event happens now.
 
-use super::super::run::Span;
-use super::super::sealed::Engine;
 use super::evaluate::finite;
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
+use crate::adaptive::engine::Engine;
+use crate::adaptive::step::Span;
 use crate::error::{Argument, Error, Refusal};
 use crate::finite::check_named;
 use crate::model::{Dae, VectorU, VectorX};

@@ -6,10 +6,10 @@
 //!
 //! `z_w` follows from the algebraic equations by the theorem of implicit functions.
 
-use super::super::point::{At, place_inputs};
-use super::super::sealed::Engine;
 use super::evaluate::{finite, place, slope};
 use super::{Event, Hybrid};
+use crate::adaptive::engine::Engine;
+use crate::adaptive::point::{At, place_inputs};
 use crate::error::Error;
 use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::{Real, Scalar};

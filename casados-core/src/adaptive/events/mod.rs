@@ -29,12 +29,12 @@ pub use event::{Crossing, Event};
 pub use results::{HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
 pub use second::HybridHessian;
 
-use super::integrator::Integrator;
-use super::run::Span;
-use super::sealed::Engine;
-use super::segment::{Segment, dense, refill};
-use super::sensitivities::{chain, dynamic};
-use super::statistics::AdaptiveStatistics;
+use crate::adaptive::engine::Engine;
+use crate::adaptive::integrator::Integrator;
+use crate::adaptive::segment::{Segment, dense, refill};
+use crate::adaptive::sensitivities::{chain, dynamic};
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::step::Span;
 use crate::error::{Argument, Error, Place};
 use crate::finite::{check_named, not_finite};
 use crate::integrator::blocks::Rows;

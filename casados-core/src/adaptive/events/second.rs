@@ -12,10 +12,10 @@
 //!
 //! Here nothing depends on the time: neither models nor functions have second derivatives by it.
 
-use super::super::point::At;
-use super::super::sealed::Engine;
 use super::evaluate::dot;
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
+use crate::adaptive::engine::Engine;
+use crate::adaptive::point::At;
 use crate::error::{Argument, Error};
 use crate::finite::{check_named, not_finite};
 use crate::integrator::blocks::{Rows, Square, add, element, fill, identity};

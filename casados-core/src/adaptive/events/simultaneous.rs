@@ -8,17 +8,17 @@
 //!    happens if its function is still zero.
 //! 4. What a jump itself takes from one side of zero to the other is no crossing.
 
-use super::super::point::At;
-use super::super::sealed::Engine;
-use super::super::segment::add;
 use super::{Hybrid, Occurrence};
+use crate::adaptive::engine::Engine;
+use crate::adaptive::point::At;
+use crate::adaptive::segment::add;
+use crate::adaptive::step::Span;
 use crate::error::Error;
 use crate::memory::push;
 use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-use super::super::run::Span;
 use super::evaluate::finite;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {

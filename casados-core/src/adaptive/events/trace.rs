@@ -1,14 +1,14 @@
 //! From event to event: the steps up to each, shortened to its time, and what happens there.
 
-use super::super::point::{At, place_inputs};
-use super::super::replay::{AcceptedStep, StepDifferentiator};
-use super::super::run::Span;
-use super::super::sealed::Engine;
-use super::super::segment::add;
-use super::super::statistics::AdaptiveStatistics;
 use super::evaluate::{evaluate, finite, place};
 use super::guard::Guard;
 use super::{Event, Hybrid, Moment};
+use crate::adaptive::engine::Engine;
+use crate::adaptive::point::{At, place_inputs};
+use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::segment::add;
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::step::Span;
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
 use crate::memory::{extend, push};

@@ -44,7 +44,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         for rtol in x.as_slice().iter().chain(z.as_slice()) {
             check_relative::<T>(rtol.to_f64())?;
         }
-        stack::<M, T>(&mut self.base.rtol, x, z);
+        stack::<M, T>(&mut self.base.tolerances.rtol, x, z);
         Ok(())
     }
 
@@ -56,7 +56,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         for atol in x.as_slice().iter().chain(z.as_slice()) {
             check_absolute::<T>(atol.to_f64())?;
         }
-        stack::<M, T>(&mut self.base.atol, x, z);
+        stack::<M, T>(&mut self.base.tolerances.atol, x, z);
         Ok(())
     }
 
@@ -78,7 +78,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.sensitivities = match self.sensitivities.take() {
             _ if !controlled => None,
             Some(there) => Some(there),
-            None => Some(Box::new(Variational::new::<B>()?)),
+            None => Some(Box::new(Variational::new(Box::new(Replays::<M, B, T>::default()))?)),
         };
         Ok(())
     }

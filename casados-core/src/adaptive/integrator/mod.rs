@@ -1,0 +1,389 @@
+//! The adaptive integrator as its users see it.
+
+mod calls;
+mod derivatives;
+mod settings;
+
+use crate::adaptive::consistent::Consistent;
+use crate::adaptive::engine::{Engine, Kind, Replays};
+use crate::adaptive::options::{AdaptiveOptions, check_absolute, check_relative};
+use crate::adaptive::point::place_inputs;
+use crate::adaptive::sensitivities::{Frozen, Memory};
+use crate::adaptive::statistics::AdaptiveStatistics;
+use crate::adaptive::step::{Accepted, Run, Span, Workspace};
+use crate::adaptive::tape::Tape;
+use crate::adaptive::variational::Variational;
+use crate::error::{Argument, Error, Refusal};
+use crate::finite::{check_input, check_named};
+use crate::integrator::{self, Integrator as _};
+use crate::memory::allocate;
+use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+
+/// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
+///
+/// All calls take the state at the start of the interval, the control, and the length `h` of the
+/// interval, as those of [`Irk`](crate::Irk) and [`Erk`](crate::Erk) do; it may be negative or
+/// zero. The interval begins at the time of [`set_time`](Self::set_time). Times that are asked for
+/// or returned, as in [`dense`](Self::dense), are times, not distances from the start. All calls
+/// return a reference to results in the memory of the integrator.
+///
+/// # Errors
+/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`];
+/// [`Error::InconsistentStart`] if there are no consistent `ẋ` and `z` at the start,
+/// [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the model has no
+/// finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
+/// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until
+/// a call succeeds there is no dense output and nothing to be frozen, [`Error::NoResult`].
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// let mut cart = Adaptive::<Cart, Radau>::new(AdaptiveOptions::default())?;
+/// cart.set_time(10.0)?;
+/// // From rest, with 2 m/s², for 3 s: from t = 10 s to 13 s.
+/// let end = cart.solve(&vector![0.0, 0.0], &vector![2.0], 3.0)?;
+/// assert!((end.x - vector![9.0, 6.0]).norm() < 1e-9);
+/// assert!((cart.dense(11.0)?.x - vector![1.0, 2.0]).norm() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
+    pub(super) options: AdaptiveOptions,
+    pub(super) base: Box<Workspace<M, T>>,
+    pub(super) consistent: Consistent<M, T>,
+    pub(super) state: B::State,
+    /// Derivatives, if they take part in the choice of the steps.
+    sensitivities: Option<Box<Variational<M, T>>>,
+    pub(super) tape: Tape<T>,
+    pub(super) statistics: AdaptiveStatistics,
+    parameters: bool,
+    pub(super) start: T,
+    /// The interval of the last successful call.
+    last: Option<Span<T>>,
+    frozen: Option<Kept<M, B, T>>,
+    pub(super) memory: Option<Box<Memory<M, T>>>,
+    /// Derivatives at the start of each step.
+    history: Vec<T>,
+    method: PhantomData<fn() -> B>,
+}
+
+/// Steps that are kept for following calls.
+struct Kept<M: Dae, B: Kind<M, T>, T: Real> {
+    /// Their interval.
+    span: Span<T>,
+    /// Takes them without derivatives. Programs that keep no steps have no integrator for that.
+    solve: Solve<M, B, T>,
+}
+
+type Solve<M, B, T> =
+    fn(&mut Integrator<M, B, T>, &VectorX<M, T>, &VectorU<M, T>, T) -> Result<Span<T>, Error>;
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
+    /// An integrator with its memory on the heap.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
+    pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
+        options.check::<T>()?;
+        let mut base: Box<Workspace<M, T>> = allocate()?;
+        base.tolerances.rtol.as_mut().fill(T::from_f64(options.rtol));
+        base.tolerances.atol.as_mut().fill(T::from_f64(options.atol));
+        for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
+            *given = T::from_f64(*start);
+        }
+        Ok(Self {
+            options,
+            base,
+            consistent: Consistent::default(),
+            state: Default::default(),
+            sensitivities: None,
+            tape: Tape::default(),
+            statistics: AdaptiveStatistics::default(),
+            parameters: M::Shape::NP == 0,
+            start: T::ZERO,
+            last: None,
+            frozen: None,
+            memory: None,
+            history: Vec::new(),
+            method: PhantomData,
+        })
+    }
+
+    /// The options.
+    #[must_use]
+    pub fn options(&self) -> &AdaptiveOptions {
+        &self.options
+    }
+
+    /// What the last call did to choose its steps, successful or not.
+    #[must_use]
+    pub fn statistics(&self) -> &AdaptiveStatistics {
+        &self.statistics
+    }
+
+    /// The times between the accepted steps of the last call, the start first, if steps are
+    /// remembered.
+    pub fn times(&self) -> impl Iterator<Item = T> {
+        let end = self.last.map(|span| span.end);
+        self.tape.entries().iter().map(|entry| entry.t).chain(end)
+    }
+
+    /// `x` and `z` at the end of an interval of length `h`, and the consistent `z` at its start.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    ///
+    /// ```
+    /// # use casados_core::{Adaptive, AdaptiveOptions, Dae, Error, Radau, model::{VectorU, VectorX}};
+    /// # fn example<Reactor: Dae>(x0: VectorX<Reactor, f64>, u: VectorU<Reactor, f64>) -> Result<(), Error> {
+    /// let mut radau = Adaptive::<Reactor, Radau>::new(AdaptiveOptions::default())?;
+    /// radau.set_time(1.0)?;
+    /// let end = radau.solve(&x0, &u, 0.1)?.x; // at t = 1.1
+    /// let middle = radau.dense(1.05)?.x;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+        self.last = None;
+        let span = if let Some(Kept { solve, .. }) = self.frozen {
+            solve(self, x0, u, h)?
+        } else {
+            let (t_end, record) = (self.end(h)?, self.options.keep_steps);
+            self.run(x0, u, t_end, record, |_, _| Ok(()))?
+        };
+        self.last = Some(span);
+        Ok(&self.base.result)
+    }
+
+    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times,
+    /// which lie between the start `t` and `t + h`, while the integration passes them; steps need
+    /// not be remembered for it.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::Unordered`] of a time that is outside or before the one that
+    /// precedes it.
+    pub fn solve_at(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        times: &[T],
+        mut output: impl FnMut(T, &Dense<M, T>),
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.last = None;
+        check_input(Argument::T, times)?;
+        let (start, end) = (self.start, self.end(h)?);
+        let mut before = start;
+        for (index, t) in times.iter().enumerate() {
+            if !inside(*t, before, end) {
+                let (t, before, end) = (t.to_f64(), before.to_f64(), end.to_f64());
+                return Err(Error::Unordered { index, t, before, end });
+            }
+            before = *t;
+        }
+        if self.frozen.is_some() {
+            self.solve(x0, u, h)?;
+            for t in times {
+                output(*t, self.dense(*t)?);
+            }
+            return Ok(&self.base.result);
+        }
+        let mut times = times.iter().copied().peekable();
+        let record = self.options.keep_steps;
+        let span = self.run(x0, u, end, record, |step, dense| {
+            while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
+                (step.evaluate)(t, dense)?;
+                output(t, dense);
+            }
+            Ok(())
+        })?;
+        // Of an interval without length.
+        let Workspace { result, dense, .. } = &mut *self.base;
+        (dense.x, dense.z) = (result.x, result.z);
+        for t in times {
+            output(t, dense);
+        }
+        self.last = Some(span);
+        Ok(&self.base.result)
+    }
+
+    /// The solution at the time `t`, as the model sees it: inside the interval of the last call.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`], also if that call failed or steps are not remembered;
+    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`].
+    pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
+        check_input(Argument::T, &[t])?;
+        let span = self.last.ok_or(Error::NoResult)?;
+        self.dense_in(span, t)
+    }
+
+    /// The solution at a time inside the interval whose steps are on the tape.
+    pub(super) fn dense_in(&mut self, span: Span<T>, t: T) -> Result<&Dense<M, T>, Error> {
+        if !inside(t, span.start, span.end) {
+            let (t, start, end) = (t.to_f64(), span.start.to_f64(), span.end.to_f64());
+            return Err(Error::OutsideInterval { t, start, end });
+        }
+        let step = self.tape.find(t);
+        let Workspace { point, result, dense, .. } = &mut *self.base;
+        match self.tape.entries().get(step) {
+            Some(entry) => {
+                let numbers = self.tape.numbers(step, M::Shape::NX);
+                B::interpolate(&mut self.state, point.as_ref(), entry, numbers, t, dense)?;
+            }
+            None if span.start == span.end => (dense.x, dense.z) = (result.x, result.z),
+            None => return Err(Error::NoResult),
+        }
+        Ok(dense)
+    }
+
+    /// Following calls take the steps of the last successful one, whatever they are given, and
+    /// solve them to rounding: one smooth function of `x₀`, `u` and `p`. Their interval has to be
+    /// the same.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`], also if steps were not remembered.
+    pub fn freeze(&mut self) -> Result<(), Error> {
+        let span = self.last.ok_or(Error::NoResult)?;
+        if self.tape.entries().is_empty() && span.start != span.end {
+            return Err(Error::NoResult);
+        }
+        self.frozen = Some(Kept { span, solve: Self::solve_frozen });
+        Ok(())
+    }
+
+    /// The steps that are kept, without derivatives.
+    fn solve_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        let span = self.begin_frozen(x0, u, h)?;
+        let Self { base, consistent, tape, state, .. } = self;
+        let given = base.given;
+        Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
+        Ok(span)
+    }
+
+    /// Following calls choose their steps again.
+    pub fn thaw(&mut self) {
+        self.frozen = None;
+    }
+
+    /// The end of an interval of this length.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
+    /// resolve.
+    pub(super) fn end(&self, h: T) -> Result<T, Error> {
+        check_input(Argument::H, &[h])?;
+        let end = self.start + h;
+        if end == self.start && h != T::ZERO {
+            let (t, h) = (self.start.to_f64(), h.to_f64());
+            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution, unsettled: None });
+        }
+        Ok(end)
+    }
+
+    /// What every call begins with.
+    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
+        self.statistics = AdaptiveStatistics::default();
+        check_named::<M, T>(Argument::X0, x0.as_slice())?;
+        check_named::<M, T>(Argument::U, u.as_slice())?;
+        check_input(Argument::T, &[t_end, t_end - self.start])?;
+        if !self.parameters {
+            return Err(Error::ParametersNotSet);
+        }
+        self.base.u = *u;
+        Ok(Span { start: self.start, end: t_end })
+    }
+
+    /// Memory of derivatives.
+    pub(super) fn reserve(&mut self) -> Result<(), Error> {
+        if self.memory.is_none() {
+            self.memory = Some(allocate()?);
+        }
+        Ok(())
+    }
+
+    /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there
+    /// is no result.
+    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        self.last = None;
+        self.reserve()?;
+        if self.frozen.is_some() {
+            return self.begin_frozen(x0, u, h);
+        }
+        let t_end = self.end(h)?;
+        self.run(x0, u, t_end, true, |_, _| Ok(()))
+    }
+
+    /// What a call with frozen steps begins with.
+    ///
+    /// # Errors
+    /// [`Error::OutsideInterval`] if the interval is not that of the frozen steps.
+    fn begin_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        let t_end = self.end(h)?;
+        let span = self.begin(x0, u, t_end)?;
+        let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
+        frozen.check_is(span.start, span.end)?;
+        // Dense output of explicit methods takes steps again.
+        let Workspace { point, u, parameters, .. } = &mut *self.base;
+        place_inputs::<M, T>(point.as_mut(), u, parameters);
+        Ok(span)
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn parts(
+        &mut self,
+        span: Span<T>,
+    ) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
+        let Self { base, consistent, tape, state, memory, history, frozen, .. } = self;
+        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+        let memory = memory.as_deref_mut().ok_or(missing)?;
+        let given = base.given;
+        let chosen = frozen.is_none();
+        Ok((Frozen { base, consistent, tape, span, given, chosen }, state, memory, history))
+    }
+
+    /// There is a result, with derivatives.
+    fn done(&mut self, span: Span<T>) -> Result<&Memory<M, T>, Error> {
+        self.last = Some(span);
+        self.memory.as_deref().ok_or(Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() })
+    }
+
+    /// Integrates to a time; there is a result as soon as the caller says so.
+    pub(super) fn run(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        record: bool,
+        mut after: impl FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+    ) -> Result<Span<T>, Error> {
+        self.last = None;
+        let span = self.begin(x0, u, t_end)?;
+        let Self { options, base, consistent, state, tape, statistics, sensitivities, .. } = self;
+        tape.clear();
+        let sensitivities = sensitivities.as_deref_mut();
+        let mut run = Run { options, base, consistent, tape, record, sensitivities, statistics };
+        B::integrate(state, &mut run, x0, span, &mut after)?;
+        Ok(span)
+    }
+}
+
+/// Whether a time lies in an interval of any direction.
+pub(super) fn inside<T: Real>(t: T, start: T, end: T) -> bool {
+    if start <= end { start <= t && t <= end } else { end <= t && t <= start }
+}
+
+/// `(x, z)` as one array.
+fn stack<M: Dae, T: Real>(to: &mut ArrayK<M, T>, x: &VectorX<M, T>, z: &VectorZ<M, T>) {
+    for (to, from) in to.as_mut().iter_mut().zip(x.as_slice().iter().chain(z.as_slice())) {
+        *to = *from;
+    }
+}

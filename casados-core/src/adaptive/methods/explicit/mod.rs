@@ -1,0 +1,338 @@
+//! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
+//! the difference to the other one decides about the step.
+
+mod stepper;
+
+use crate::adaptive::engine::{Engine, Kind};
+use crate::adaptive::pairs::Pair;
+use crate::adaptive::point::At;
+use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
+use crate::adaptive::step::{Accepted, After, Run, Span, Workspace};
+use crate::adaptive::step_size::{ExplicitStep, PiController, first_length};
+use crate::adaptive::tape::Entry;
+use crate::adaptive::tolerances::{Tolerances, mean, norm};
+use crate::erk::Integrator as Erk;
+use crate::error::{Error, Refusal};
+use crate::integrator::Integrator as _;
+use crate::memory::Heap;
+use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
+use crate::options::Options;
+use crate::quadrature::OptionalIntegrand;
+use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use crate::tableau::{DormandPrince5, DormandPrince8};
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+use core::any::Any;
+use core::marker::PhantomData;
+use stepper::{Stepper, Take};
+
+/// The method of an explicit pair with `S` stages.
+pub struct Steps<M: Dae, B, T: Real, const S: usize> {
+    engine: Option<Box<dyn Take<M, T> + Send + Sync>>,
+    /// The integrator with steps of equal size, which exists for explicit models alone.
+    replay: Option<Box<dyn Any + Send + Sync>>,
+    method: PhantomData<fn() -> B>,
+}
+
+impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
+    fn default() -> Self {
+        Self { engine: None, replay: None, method: PhantomData }
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    fn erk(&mut self) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        if self.replay.is_none() {
+            let erk: Box<Erk<M, B, S, T, Heap>> = Box::new(Erk::new(Options::default())?);
+            self.replay = Some(erk);
+        }
+        // It is one, whatever the type system knows.
+        let erk = self.replay.as_mut().and_then(|replay| replay.downcast_mut::<Erk<M, B, S, T, Heap>>());
+        erk.ok_or(Error::NoResult)
+    }
+
+    /// At the start of a step.
+    fn go(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        let erk = self.erk()?;
+        if M::Shape::NP > 0 {
+            erk.set_parameters(step.at.p)?;
+        }
+        erk.set_time(step.at.t)?;
+        Ok(erk)
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
+    fn solve(
+        &mut self,
+        step: &AcceptedStep<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
+    }
+
+    fn forward(
+        &mut self,
+        step: &AcceptedStep<'_, M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error> {
+        self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
+    }
+
+    fn hessian(
+        &mut self,
+        step: &AcceptedStep<'_, M, T>,
+        lambda: &VectorX<M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
+    }
+
+    fn adjoint(
+        &mut self,
+        step: &AcceptedStep<'_, M, T>,
+        lambda: &VectorX<M, T>,
+        along: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
+        self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
+    }
+
+    fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {
+        self.erk()?.slopes(weights, to)
+    }
+
+    fn stages(&mut self, _: usize) -> Result<&[T], Error> {
+        Ok(&[])
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    fn open(&mut self) -> Result<&mut (dyn Take<M, T> + Send + Sync), Error> {
+        Ok(match &mut self.engine {
+            Some(engine) => &mut **engine,
+            none => &mut **none.insert(Box::new(Stepper::<M, B, T, S>::new()?)),
+        })
+    }
+
+    /// Integrates the interval.
+    fn integrate(
+        &mut self,
+        run: &mut Run<'_, M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        after: After<'_, M, T>,
+    ) -> Result<(), Error> {
+        run.place(x0, &ArrayK::<M, T>::zeroed(), span.start);
+        run.begin_sensitivities(x0, span.start)?;
+        let nx = M::Shape::NX;
+        let step = self.open()?;
+        step.go(run.base.point.as_ref(), x0.as_slice());
+        let result = integrate_steps::<M, B, T, S>(step, run, span, after);
+        run.statistics.residuals += step.count();
+        run.base.point.as_mut()[nx..2 * nx].copy_from_slice(match &result {
+            Ok(end) => end.as_slice(),
+            Err(_) => x0.as_slice(),
+        });
+        result?;
+        run.finish();
+        Ok(())
+    }
+}
+
+/// The steps of an interval; the state at its end.
+fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    span: Span<T>,
+    after: After<'_, M, T>,
+) -> Result<VectorX<M, T>, Error> {
+    let nx = M::Shape::NX;
+    let mut x = VectorX::<M, T>::zeroed();
+    x.as_mut_slice().copy_from_slice(&run.base.point.as_ref()[nx..2 * nx]);
+    let length = span.end - span.start;
+    let direction = if length < T::ZERO { -1.0 } else { 1.0 };
+    let longest = length.to_f64().abs().min(run.options.max_step);
+    if length == T::ZERO {
+        return Ok(x);
+    }
+    let mut t = span.start;
+    let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
+    let mut controller = PiController::new(B::CONTROL);
+    let mut refusal = Refusal::Error;
+    let (mut rejected, mut tried) = (false, 0);
+    loop {
+        let last = ((t + h * T::from_f64(1.01) - span.end) * T::from_f64(direction)).to_f64() >= 0.0;
+        if last {
+            h = span.end - t;
+        }
+        if tried >= run.options.max_steps {
+            return Err(Error::TooManySteps { t: t.to_f64(), steps: tried, stiff: step.is_stiff() });
+        }
+        run.check_step(t, h, refusal)?;
+        tried += 1;
+        let [error, of_derivatives] = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
+        if !(error + of_derivatives).is_finite() {
+            run.statistics.failed += 1;
+            refusal = Refusal::NotFinite;
+            h = h * T::from_f64(0.5);
+            rejected = true;
+            continue;
+        }
+        let tried_step =
+            ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
+        let error = controller.error_of_difference::<T>(tried_step, error).max(of_derivatives);
+        let factor = controller.factor::<T>(tried_step, error);
+        if error > 1.0 {
+            run.statistics.rejected += 1;
+            refusal = Refusal::Error;
+            h = h * T::from_f64(factor.min(1.0));
+            rejected = true;
+            continue;
+        }
+        run.statistics.steps += 1;
+        if let Some(sensitivities) = &mut run.sensitivities {
+            sensitivities.accept();
+        }
+        if run.record {
+            run.tape.push(t, h, 0, x.as_slice(), &[])?;
+        }
+        let end = if last { span.end } else { t + h };
+        let (start, size) = (t, h);
+        let mut evaluate =
+            |time: T, dense: &mut Dense<M, T>| step.interpolate(start, size, (time - start) / size, dense);
+        let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
+        after(&mut accepted, &mut run.base.dense)?;
+        if accepted.stop {
+            return Ok(x);
+        }
+        x.as_mut_slice().copy_from_slice(step.end());
+        step.advance();
+        t = end;
+        if last {
+            return Ok(x);
+        }
+        let mut next = (h.to_f64().abs() * factor).min(longest);
+        if rejected {
+            next = next.min(h.to_f64().abs());
+        }
+        rejected = false;
+        h = T::from_f64(direction * next);
+    }
+}
+
+/// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
+/// and that of derivatives if they take part; NaN if there is none.
+fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    h: T,
+    steps: f64,
+) -> [f64; 2] {
+    let error = step.take(t, h).and_then(|()| {
+        let (rtol, atol) = (run.base.tolerances.rtol.as_ref(), run.base.tolerances.atol.as_ref());
+        step.error(t, h, steps, rtol, atol)
+    });
+    let error = error.unwrap_or(f64::NAN);
+    match &mut run.sensitivities {
+        Some(sensitivities) if error <= 1.0 => {
+            let Workspace { point, u, parameters, tolerances: Tolerances { rtol, atol, .. }, .. } =
+                &*run.base;
+            let taken = AcceptedStep { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
+            let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
+            let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
+            [error, other.unwrap_or(f64::NAN)]
+        }
+        _ => [error, 0.0],
+    }
+}
+
+/// The length of the first step.
+fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    direction: f64,
+    longest: f64,
+) -> Result<f64, Error> {
+    let mut slope = VectorX::<M, T>::zeroed();
+    slope.as_mut_slice().copy_from_slice(step.slope(t)?);
+    if let Some(given) = run.options.initial_step {
+        return Ok(given.min(longest));
+    }
+    let mut scale = VectorX::<M, T>::zeroed();
+    let Tolerances { rtol, atol, .. } = &run.base.tolerances;
+    let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
+    for ((scale, (rtol, atol)), x) in scale.as_mut_slice().iter_mut().zip(tolerances).zip(x.as_slice()) {
+        *scale = T::ONE / (*atol + *rtol * x.abs());
+    }
+    let scale = scale.as_slice();
+    let (size, speed) = (norm(x.as_slice(), scale), norm(slope.as_slice(), scale));
+    let length = first_length([size, speed], longest, 1.0 / B::CONTROL.order, |length| {
+        let h = T::from_f64(direction * length);
+        let mut other = *x;
+        for (other, slope) in other.as_mut_slice().iter_mut().zip(slope.as_slice()) {
+            *other = *other + h * *slope;
+        }
+        step.go(run.base.point.as_ref(), other.as_slice());
+        let mut sum = 0.0;
+        if let Ok(second) = step.slope(t + h) {
+            for ((second, slope), scale) in second.iter().zip(slope.as_slice()).zip(scale) {
+                let change = ((*second - *slope) * *scale).to_f64();
+                sum += change * change;
+            }
+        }
+        mean(sum, scale.len())
+    });
+    step.go(run.base.point.as_ref(), x.as_slice());
+    step.slope(t)?;
+    Ok(length)
+}
+
+macro_rules! explicit {
+    ($($method:ty: $stages:literal),*) => {
+        $(impl<M: Dae, T: Real> Kind<M, T> for $method {
+            type State = Steps<M, $method, T, $stages>;
+        }
+
+        impl<M: Ode, T: Real> Engine<M, T> for $method {
+            const ENDS_ON_STAGE: bool = true;
+            type Replays = Self::State;
+
+            fn integrate(
+                state: &mut Self::State,
+                run: &mut Run<'_, M, T>,
+                x0: &VectorX<M, T>,
+                span: Span<T>,
+                after: After<'_, M, T>,
+            ) -> Result<(), Error> {
+                state.integrate(run, x0, span, after)
+            }
+
+            fn interpolate(
+                state: &mut Self::State,
+                inputs: &[T],
+                entry: &Entry<T>,
+                numbers: (&[T], &[T]),
+                t: T,
+                dense: &mut Dense<M, T>,
+            ) -> Result<(), Error> {
+                let step = state.open()?;
+                step.go(inputs, numbers.0);
+                step.slope(entry.t)?;
+                step.take(entry.t, entry.h)?;
+                step.arrive(entry.t, entry.h)?;
+                step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
+            }
+
+            fn replays(state: &mut Self::State) -> &mut Self::Replays {
+                state
+            }
+        })*
+    };
+}
+explicit!(DormandPrince5: 6, DormandPrince8: 12);

@@ -1,0 +1,293 @@
+//! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
+
+use crate::adaptive::discontinuity::{BranchChange, Branches};
+use crate::adaptive::pairs::Pair;
+use crate::adaptive::tolerances::norm;
+use crate::erk::{Grid, Own, Point, Record, Scheme};
+use crate::error::{Error, Place};
+use crate::finite::check_output;
+use crate::memory::allocate;
+use crate::model::{ArrayX, Dae, Ode};
+use crate::result::Dense;
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Shape};
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// Memory of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct Memory<M: Ode, T: Real, const S: usize> {
+    point: Point<M, T>,
+    record: Record<M, T, S>,
+    /// The state at the end of the step, and its derivative there.
+    end: ArrayX<M, T>,
+    end_slope: ArrayX<M, T>,
+    difference: ArrayX<M, T>,
+    scale: ArrayX<M, T>,
+    /// Stages for dense output.
+    more: [ArrayX<M, T>; 3],
+    /// The branches of the model at the start of the step, and at its end.
+    branches: [Branches; 2],
+}
+
+/// A step of an explicit pair.
+pub trait Take<M: Dae, T: Real> {
+    /// Goes to the start of a step.
+    fn go(&mut self, inputs: &[T], x: &[T]);
+    /// The derivative at the start.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn slope(&mut self, t: T) -> Result<&[T], Error>;
+    /// All stages of a step whose first is there, and its end.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn take(&mut self, t: T, h: T) -> Result<(), Error>;
+    /// The derivative at the end.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
+    /// The estimated error relative to what is tolerated, where the interval has so many steps; the
+    /// derivative at the end is there if that is at most one.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    /// How the step that was taken changes the branches of the model, if it does.
+    fn change(&self) -> Option<BranchChange>;
+    /// The state at the end.
+    fn end(&self) -> &[T];
+    /// The end is the next start.
+    fn advance(&mut self);
+    /// The polynomial of the step that was taken.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
+    /// Whether stability limited most of the steps since the start of the run, of those whose
+    /// errors may count more than once.
+    fn is_stiff(&self) -> bool;
+    /// How often the model was evaluated since this was asked for last.
+    fn count(&mut self) -> usize;
+}
+
+pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
+    scheme: Scheme<M, T, S>,
+    memory: Box<Memory<M, T, S>>,
+    /// How the step that was taken changes the branches of the model, if it does.
+    change: Option<BranchChange>,
+    /// Steps at the bound of stability less those that are not.
+    at_bound: i64,
+    method: PhantomData<fn() -> B>,
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+    pub fn new() -> Result<Self, Error> {
+        Ok(Self {
+            scheme: Scheme::new(&B::TABLEAU),
+            memory: allocate()?,
+            change: None,
+            at_bound: 0,
+            method: PhantomData,
+        })
+    }
+
+    /// The derivative at a state.
+    fn evaluate(
+        scheme: &Scheme<M, T, S>,
+        point: &mut Point<M, T>,
+        x: &[T],
+        t: T,
+        slope: &mut ArrayX<M, T>,
+    ) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let numbers = point.variables_mut();
+        numbers[nx..2 * nx].copy_from_slice(x);
+        if let Some(time) = numbers.last_mut() {
+            *time = t;
+        }
+        point.derivative(scheme, slope, Place { step: 0, stage: 0, iteration: 0 })
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+    /// How often an error counts in an interval of so many steps: once where the Jacobian takes it
+    /// back, as where it is damped, and by [`Pair::GLOBAL_ERROR_FACTOR`] where it turns it or lets
+    /// it grow. The last stage `Y` is at the end, as the step is; of the difference `d` of the two
+    /// and `J d` the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of
+    /// stability, or not (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section
+    /// IV.2).
+    fn global_error_factor(&mut self, steps: f64) -> f64 {
+        let count = B::GLOBAL_ERROR_FACTOR.count(steps);
+        if count <= 1.0 {
+            return 1.0;
+        }
+        let Memory { record, end_slope, difference, scale, .. } = &mut *self.memory;
+        let Some(last) = record.k.last() else { return 1.0 };
+        difference.as_mut().fill(T::ZERO);
+        combine(&B::FSAL_DIFFERENCE, &record.k, difference.as_mut());
+        let (mut along, mut distances, mut changes) = (T::ZERO, T::ZERO, T::ZERO);
+        let slopes = end_slope.as_ref().iter().zip(last.as_ref());
+        for ((distance, (end, last)), scale) in difference.as_ref().iter().zip(slopes).zip(scale.as_ref()) {
+            let (distance, change) = (*distance * *scale, (*end - *last) * *scale);
+            along = along + distance * change;
+            distances = distances + distance * distance;
+            changes = changes + change * change;
+        }
+        // Scales have the factor `h`, and so have the changes.
+        let is_at_bound = changes.to_f64() > B::STABILITY_BOUND * B::STABILITY_BOUND * distances.to_f64();
+        self.at_bound += if is_at_bound { 1 } else { -1 };
+        let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
+        let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
+        if damped.is_nan() { count } else { count + (1.0 - count) * damped.min(1.0) }
+    }
+}
+
+/// `Σ_i e_i k_i`
+fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
+    for (coefficient, stage) in coefficients.iter().zip(stages) {
+        if *coefficient != 0.0 {
+            let coefficient = T::from_f64(*coefficient);
+            for (sum, k) in sum.iter_mut().zip(stage.as_ref()) {
+                *sum = *sum + coefficient * *k;
+            }
+        }
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
+    fn go(&mut self, inputs: &[T], x: &[T]) {
+        self.at_bound = 0;
+        let Memory { point, record, .. } = &mut *self.memory;
+        point.variables_mut().copy_from_slice(inputs);
+        // An explicit model is evaluated at `ẋ = 0`.
+        point.variables_mut()[..M::Shape::NX].fill(T::ZERO);
+        record.x.as_mut().copy_from_slice(x);
+    }
+
+    fn slope(&mut self, t: T) -> Result<&[T], Error> {
+        let Memory { point, record, branches, .. } = &mut *self.memory;
+        Self::evaluate(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
+        branches[0] = Branches::of::<M, Own<T>>(&point.v);
+        Ok(record.k[0].as_ref())
+    }
+
+    fn take(&mut self, t: T, h: T) -> Result<(), Error> {
+        let Memory { point, record, end, branches, .. } = &mut *self.memory;
+        let grid = Grid { start: t, h, steps: 1, compensated: false };
+        self.change = None;
+        for stage in 1..S {
+            let at = Place { step: 0, stage, iteration: 0 };
+            point.go(&self.scheme, &grid, record, at)?;
+            point.derivative(&self.scheme, &mut record.k[stage], at)?;
+            self.change = self.change.max(branches[0].change(Branches::of::<M, Own<T>>(&point.v)));
+        }
+        record.end(&self.scheme, &grid, 0, end, None, &mut point.non_finite)
+    }
+
+    fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {
+        let Memory { point, end, end_slope, branches, .. } = &mut *self.memory;
+        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)?;
+        branches[1] = Branches::of::<M, Own<T>>(&point.v);
+        self.change = self.change.max(branches[0].change(branches[1]));
+        Ok(())
+    }
+
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+        let (stages, last) = B::DIFFERENCE;
+        if last != 0.0 {
+            self.arrive(t, h)?;
+        }
+        let Memory { record, end, end_slope, difference, scale, .. } = &mut *self.memory;
+        let states = record.x.as_ref().iter().zip(end.as_ref());
+        for (((scale, (before, after)), rtol), atol) in
+            scale.as_mut().iter_mut().zip(states).zip(rtol).zip(atol)
+        {
+            *scale = h / (*atol + *rtol * before.abs().max(after.abs()));
+        }
+        let mut difference_of = |coefficients: &[f64; S]| {
+            difference.as_mut().fill(T::ZERO);
+            combine(coefficients, &record.k, difference.as_mut());
+            if last != 0.0 {
+                combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
+            }
+            norm(difference.as_ref(), scale.as_ref())
+        };
+        let fine = difference_of(&stages);
+        let coarse = B::THIRD_ORDER.as_ref().map(difference_of);
+        let error = B::combined(fine, coarse);
+        // Written so that NaN stays.
+        if error > 1.0 {
+            return Ok(error);
+        }
+        if last == 0.0 {
+            self.arrive(t, h)?;
+        }
+        Ok(error * self.global_error_factor(steps))
+    }
+
+    fn change(&self) -> Option<BranchChange> {
+        self.change
+    }
+
+    fn end(&self) -> &[T] {
+        self.memory.end.as_ref()
+    }
+
+    fn advance(&mut self) {
+        let Memory { record, end, end_slope, branches, .. } = &mut *self.memory;
+        record.x = *end;
+        record.k[0] = *end_slope;
+        branches[0] = branches[1];
+    }
+
+    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {
+        let Memory { point, record, end, end_slope, more, difference: x, .. } = &mut *self.memory;
+        let last = core::slice::from_ref(&*end_slope);
+        for index in 0..B::DENSE_STAGES.len().min(more.len()) {
+            let Some(stage) = B::DENSE_STAGES.get(index) else { break };
+            x.as_mut().fill(T::ZERO);
+            combine(&stage.stages, &record.k, x.as_mut());
+            combine(&[stage.end], last, x.as_mut());
+            combine(&stage.more, &more[..index], x.as_mut());
+            for (x, start) in x.as_mut().iter_mut().zip(record.x.as_ref()) {
+                *x = *start + h * *x;
+            }
+            let time = t + h * T::from_f64(stage.node);
+            Self::evaluate(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
+        }
+        // Nested: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
+        let rest = T::ONE - theta;
+        let to = dense.x.as_mut_slice();
+        to.fill(T::ZERO);
+        for (power, (stages, end, others)) in B::POLYNOMIAL.iter().enumerate().rev() {
+            x.as_mut().fill(T::ZERO);
+            combine(stages, &record.k, x.as_mut());
+            combine(&[*end], last, x.as_mut());
+            combine(others, more, x.as_mut());
+            let factor = if power % 2 == 0 { rest } else { theta };
+            for (to, x) in to.iter_mut().zip(x.as_ref()) {
+                *to = factor * (h * *x + *to);
+            }
+        }
+        for (index, to) in to.iter_mut().enumerate() {
+            let (start, change) = (record.x[index], end[index] - record.x[index]);
+            let bend = h * record.k[0][index] - change;
+            let cubic = change - h * end_slope[index] - bend;
+            *to = start + theta * (change + rest * (bend + theta * (cubic + *to)));
+        }
+        check_output(to, 0)
+    }
+
+    fn is_stiff(&self) -> bool {
+        self.at_bound > 0
+    }
+
+    fn count(&mut self) -> usize {
+        core::mem::take(&mut self.memory.point.counts.residuals)
+    }
+}

@@ -1,0 +1,57 @@
+//! A family of implicit methods as one engine.
+
+use crate::adaptive::engine::{Engine, Kind};
+use crate::adaptive::order::{Family, Orders, interpolate};
+use crate::adaptive::step::{After, Run, Span};
+use crate::adaptive::tape::Entry;
+use crate::error::Error;
+use crate::model::{Dae, VectorX};
+use crate::result::Dense;
+use crate::scalar::Real;
+
+/// What a family remembers: the steps that it takes, and those that it takes again.
+pub struct Implicit<M: Dae, B: Family, T: Real> {
+    levels: Orders<M, T>,
+    replays: B::Replays<M, T>,
+}
+
+impl<M: Dae, B: Family, T: Real> Default for Implicit<M, B, T> {
+    fn default() -> Self {
+        Self { levels: Orders::default(), replays: Default::default() }
+    }
+}
+
+impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
+    type State = Implicit<M, B, T>;
+}
+
+impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
+    const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
+    type Replays = B::Replays<M, T>;
+
+    fn integrate(
+        state: &mut Self::State,
+        run: &mut Run<'_, M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        after: After<'_, M, T>,
+    ) -> Result<(), Error> {
+        run.integrate::<B>(&mut state.levels, x0, span, after)
+    }
+
+    fn interpolate(
+        state: &mut Self::State,
+        _: &[T],
+        entry: &Entry<T>,
+        (x, y): (&[T], &[T]),
+        t: T,
+        dense: &mut Dense<M, T>,
+    ) -> Result<(), Error> {
+        let stages = state.levels.get::<B>(entry.level)?;
+        interpolate(stages, x, y, t - entry.t, entry.h, dense)
+    }
+
+    fn replays(state: &mut Self::State) -> &mut Self::Replays {
+        &mut state.replays
+    }
+}

@@ -1,0 +1,275 @@
+//! Derivatives of integrals over intervals with controls of their own.
+//!
+//! An integrand sees one interval at a time, with derivatives by `(x_k, u_k, p)`; here they become
+//! those by all of `W = (x₀, u₀, …, u_{N−1}, p)`:
+//!
+//! ```text
+//! dq/dW = Σ_k dq_k/d(x_k, u_k, p) D_k        H = Σ_k D_kᵀ H_k D_k        D_k = d(x_k, u_k, p)/dW
+//! ```
+
+use super::columns::Columns;
+use crate::adaptive::segment::filled;
+use crate::error::Error;
+use crate::function::{Function, MatrixYP, MatrixYU, MatrixYX};
+use crate::integrator::blocks::fill;
+use crate::model::{
+    ArrayW, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
+};
+use crate::quadrature::{Integrand, LeastSquares, Quadrature};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape, listed};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// The derivatives of the integrals of [`Quadrature`] over several intervals.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// // q = ∫ x dt of no growth in the first second, and of growth by u in the second.
+/// let mut integral = Quadrature::<Amount>::new();
+/// let (x0, controls, ends) = (vector![2.0], [vector![0.0], vector![0.0]], [1.0, 2.0]);
+/// let (_, derivatives) = horizon.with(&mut integral).forward(&x0, &controls, &ends)?;
+/// assert!((integral.q[0] - 4.0).abs() < 1e-6);
+/// // NY × NX, and NY × NU for each interval: ∂x(t)/∂u_0 is 2 t, later on 2; ∂x(t)/∂u_1 is
+/// // 2 (t − 1).
+/// assert!((derivatives.dq_dx0[0] - 2.0).abs() < 1e-6);
+/// assert!((derivatives.dq_du[0][0] - 3.0).abs() < 1e-6);
+/// assert!((derivatives.dq_du[1][0] - 1.0).abs() < 1e-6);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub struct PiecewiseQuadrature<F: Function, T: Plain = f64> {
+    /// `∂q/∂x₀`
+    pub dq_dx0: MatrixYX<F, T>,
+    /// `∂q/∂u_k`
+    pub dq_du: Vec<MatrixYU<F, T>>,
+    /// `∂q/∂p`
+    pub dq_dp: MatrixYP<F, T>,
+}
+
+/// The derivatives of [`LeastSquares`] over several intervals, with the matrix of Gauss and Newton.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// // φ = ½ ∫ x² dt where x = 2: H is the integral of squares of derivatives of x.
+/// let mut squares = LeastSquares::<Amount>::new(&vector![1.0]); // weights W
+/// let (x0, controls, ends) = (vector![2.0], [vector![0.0]], [1.0]);
+/// let (_, derivatives) = horizon.with(&mut squares).forward(&x0, &controls, &ends)?;
+/// assert!((derivatives.grad_x0[0] - 2.0).abs() < 1e-6); // ∫ x ∂x/∂x₀ dt
+/// assert!((derivatives.h_xx[0] - 1.0).abs() < 1e-6); // ∫ (∂x/∂x₀)² dt
+/// assert!((derivatives.h_uu[0][0] - 4.0 / 3.0).abs() < 1e-5); // ∫ (2 t)² dt
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub struct PiecewiseLeastSquares<M: Dae, T: Real = f64> {
+    /// `∇φ` with respect to `x₀`
+    pub grad_x0: VectorX<M, T>,
+    /// `∇φ` with respect to `u_k`
+    pub grad_u: Vec<VectorU<M, T>>,
+    /// `∇φ` with respect to `p`
+    pub grad_p: VectorP<M, T>,
+    /// `H`, the block of `x₀` and `x₀`.
+    pub h_xx: MatrixXX<M, T>,
+    /// `H`, the blocks of `x₀` and `u_k`.
+    pub h_xu: Vec<MatrixXU<M, T>>,
+    /// `H`, the blocks of `u_j` and `u_k`, row after row.
+    pub h_uu: Vec<MatrixUU<M, T>>,
+    /// `H`, the block of `x₀` and `p`.
+    pub h_xp: MatrixXP<M, T>,
+    /// `H`, the blocks of `u_k` and `p`.
+    pub h_up: Vec<MatrixUP<M, T>>,
+    /// `H`, the block of `p` and `p`.
+    pub h_pp: MatrixPP<M, T>,
+}
+
+listed!([F: Function, T: Plain] PiecewiseQuadrature<F, T> { dq_dx0, dq_du, dq_dp });
+listed!([M: Dae, T: Real] PiecewiseLeastSquares<M, T> { grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
+
+/// An integrand whose derivatives over several intervals have a form of their own: [`Quadrature`]
+/// and [`LeastSquares`].
+///
+/// ```
+/// # use casados::adaptive::{PiecewiseQuadrature, Spanning};
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// Grows at the rate u, in 1/s: x = x₀ exp(Σ u_k h_k).
+/// # #[ode]
+/// # fn growth(x: f64, u: f64) -> f64 { u * x }
+/// # #[function]
+/// # fn amount(x: f64, _u: f64) -> f64 { x }
+/// # let mut horizon = Piecewise::new(Adaptive::<Growth, Radau>::new(AdaptiveOptions::default())?);
+/// /// What `with(&mut integrand).forward(..)` returns beside the derivatives of the solution.
+/// type Found = <Quadrature<Amount> as Spanning<Growth, f64>>::Derivatives;
+/// let mut integral = Quadrature::<Amount>::new();
+/// let (_, found): (_, Found) =
+///     horizon.with(&mut integral).forward(&vector![2.0], &[vector![0.0]], &[1.0])?;
+/// let found: PiecewiseQuadrature<Amount> = found;
+/// assert!((found.dq_dx0[0] - 1.0).abs() < 1e-9);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub trait Spanning<M: Dae, T: Real>: Integrand<M, T> {
+    /// That form.
+    type Derivatives;
+    /// Derivatives from rows and a matrix over all directions.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    #[doc(hidden)]
+    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error>;
+}
+
+impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for Quadrature<F, T> {
+    type Derivatives = PiecewiseQuadrature<F, T>;
+    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error> {
+        let (at, width) = (&sums.at, sums.at.all());
+        let q = |r: usize, c: usize| sums.gradients[r * width + c];
+        let mut all = PiecewiseQuadrature {
+            dq_dx0: Zeroable::zeroed(),
+            dq_du: filled(at.intervals, MatrixYU::<F, T>::zeroed())?,
+            dq_dp: Zeroable::zeroed(),
+        };
+        fill(&mut all.dq_dx0, q);
+        fill(&mut all.dq_dp, |r, c| q(r, at.p() + c));
+        for (k, du) in all.dq_du.iter_mut().enumerate() {
+            fill(du, |r, c| q(r, at.u(k) + c));
+        }
+        Ok(all)
+    }
+}
+
+impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for LeastSquares<F, T> {
+    type Derivatives = PiecewiseLeastSquares<M, T>;
+    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error> {
+        let at = &sums.at;
+        let (mut grad_x0, mut grad_p) = (VectorX::<M, T>::zeroed(), VectorP::<M, T>::zeroed());
+        let mut grad_u = filled(at.intervals, VectorU::<M, T>::zeroed())?;
+        let gradient = |from: usize, to: &mut [T]| {
+            to.copy_from_slice(sums.gradients.get(from..from + to.len()).unwrap_or_default())
+        };
+        gradient(0, grad_x0.as_mut_slice());
+        gradient(at.p(), grad_p.as_mut_slice());
+        for (k, grad_u) in grad_u.iter_mut().enumerate() {
+            gradient(at.u(k), grad_u.as_mut_slice());
+        }
+        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(&sums.matrix)?;
+        Ok(PiecewiseLeastSquares { grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp })
+    }
+}
+
+/// A symmetric matrix over all directions.
+pub(super) struct Blocks<M: Dae, T: Real> {
+    pub h_xx: MatrixXX<M, T>,
+    pub h_xu: Vec<MatrixXU<M, T>>,
+    pub h_uu: Vec<MatrixUU<M, T>>,
+    pub h_xp: MatrixXP<M, T>,
+    pub h_up: Vec<MatrixUP<M, T>>,
+    pub h_pp: MatrixPP<M, T>,
+}
+
+impl<M: Dae> Columns<M> {
+    /// The blocks of a matrix, of whose elements that differ by rounding the lower ones count.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub(super) fn blocks<T: Real>(&self, sum: &[T]) -> Result<Blocks<M, T>, Error> {
+        let h = |r: usize, c: usize| sum[r.max(c) * self.all() + r.min(c)];
+        let count = self.intervals;
+        let mut blocks = Blocks {
+            h_xx: Zeroable::zeroed(),
+            h_xu: filled(count, MatrixXU::<M, T>::zeroed())?,
+            h_uu: filled(count * count, MatrixUU::<M, T>::zeroed())?,
+            h_xp: Zeroable::zeroed(),
+            h_up: filled(count, MatrixUP::<M, T>::zeroed())?,
+            h_pp: Zeroable::zeroed(),
+        };
+        fill(&mut blocks.h_xx, h);
+        fill(&mut blocks.h_xp, |r, c| h(r, self.p() + c));
+        fill(&mut blocks.h_pp, |r, c| h(self.p() + r, self.p() + c));
+        for (k, (xu, up)) in blocks.h_xu.iter_mut().zip(&mut blocks.h_up).enumerate() {
+            fill(xu, |r, c| h(r, self.u(k) + c));
+            fill(up, |r, c| h(self.u(k) + r, self.p() + c));
+        }
+        for (index, uu) in blocks.h_uu.iter_mut().enumerate() {
+            fill(uu, |r, c| h(self.u(index / count) + r, self.u(index % count) + c));
+        }
+        Ok(blocks)
+    }
+}
+
+/// What an integrand adds up over all directions.
+pub struct Sums<M: Dae, T: Real> {
+    pub(super) at: Columns<M>,
+    /// A row for each output.
+    gradients: Vec<T>,
+    /// Of Gauss and Newton.
+    matrix: Vec<T>,
+    /// The second derivatives, as far as they are of the integrand itself.
+    pub(super) second: Vec<T>,
+    product: Vec<T>,
+}
+
+impl<M: Dae, T: Real> Sums<M, T> {
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub(super) fn new(
+        intervals: usize,
+        integrand: &dyn Integrand<M, T>,
+        second: bool,
+    ) -> Result<Self, Error> {
+        let at = Columns { intervals, model: core::marker::PhantomData };
+        let width = at.all();
+        let square = |wanted: bool| filled(if wanted { width * width } else { 0 }, T::ZERO);
+        let matrix = square(integrand.matrix().is_some())?;
+        let second = square(second)?;
+        let product =
+            filled(if matrix.len() + second.len() > 0 { M::Shape::NW * width } else { 0 }, T::ZERO)?;
+        let gradients = filled(integrand.gradients().len() * width, T::ZERO)?;
+        Ok(Self { at, gradients, matrix, second, product })
+    }
+
+    /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets
+    /// it.
+    pub(super) fn add(&mut self, k: usize, integrand: &mut dyn Integrand<M, T>, v: &[T]) {
+        let Self { at, gradients, matrix, second, product } = self;
+        for (row, sum) in integrand.gradients().iter().zip(gradients.chunks_exact_mut(at.all().max(1))) {
+            at.add(k, row.as_ref(), v, sum);
+        }
+        let mut project = |lower: &[ArrayW<M, T>], sums: [&mut [T]; 2]| {
+            for sum in sums {
+                if !sum.is_empty() {
+                    at.project(k, |r, c| lower[r.max(c)][r.min(c)], v, product, sum);
+                }
+            }
+        };
+        // The exact second derivatives have the matrix of Gauss and Newton too.
+        if let Some(lower) = integrand.matrix() {
+            project(lower, [matrix, second]);
+        }
+        if let Some(lower) = integrand.second() {
+            project(lower, [&mut [], second]);
+        }
+        integrand.next();
+    }
+
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let mut all = self.gradients.iter().chain(&self.matrix).chain(&self.second);
+        match all.position(|value| !value.is_finite()) {
+            Some(index) => Err(Error::Overflow { step: 0, index }),
+            None => Ok(()),
+        }
+    }
+}

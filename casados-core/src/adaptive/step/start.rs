@@ -1,0 +1,118 @@
+//! Where a run begins: consistent states, and the length of the first step.
+
+use crate::adaptive::point::{At, place_inputs, variable};
+use crate::adaptive::step::{Run, Span, Workspace};
+use crate::adaptive::step_size::first_length;
+use crate::adaptive::tolerances::norm;
+use crate::error::Error;
+use crate::model::{ArrayK, Dae, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use bytemuck::Zeroable;
+
+impl<M: Dae, T: Real> Run<'_, M, T> {
+    /// Everything at the start of the interval.
+    pub(super) fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
+        let Workspace { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
+        if !*ready {
+            M::jacobian_constants::<T>(jacobian);
+            *ready = true;
+        }
+        *start = *given;
+        let at = At { x: x0, u, p: parameters, t: span.start };
+        match self.consistent.solve_from_afar(&at, start) {
+            Ok(points) => self.statistics.residuals += points,
+            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not
+            // full rank.
+            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {
+                *start = Zeroable::zeroed()
+            }
+            Err(error) => return Err(error),
+        }
+        let start = *start;
+        self.place(x0, &start, span.start);
+        Ok(())
+    }
+
+    /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
+    pub(super) fn settle(&mut self, t: T) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let Workspace { point, u, parameters, .. } = &mut *self.base;
+        let mut x = VectorX::<M, T>::zeroed();
+        let mut y = ArrayK::<M, T>::zeroed();
+        for (index, y) in y.as_mut().iter_mut().enumerate() {
+            *y = point[variable::<M>(index)];
+        }
+        x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
+        match self.consistent.solve(&At { x: &x, u, p: parameters, t }, &mut y) {
+            Ok(points) => self.statistics.residuals += points,
+            // As at the start.
+            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => return Ok(()),
+            Err(error) => return Err(error),
+        }
+        for (index, y) in y.as_ref().iter().enumerate() {
+            point[variable::<M>(index)] = *y;
+        }
+        Ok(())
+    }
+
+    /// The variables at the start, from `(ẋ, z)` there.
+    pub fn place(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
+        let nx = M::Shape::NX;
+        let Workspace { point, u, parameters, result, .. } = &mut *self.base;
+        let numbers = point.as_mut();
+        for (index, value) in start.as_ref().iter().enumerate() {
+            numbers[variable::<M>(index)] = *value;
+        }
+        numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
+        place_inputs::<M, T>(numbers, u, parameters);
+        if let Some(time) = numbers.last_mut() {
+            *time = t;
+        }
+        result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[nx..]);
+    }
+
+    /// The solution at the end.
+    pub fn finish(&mut self) {
+        let nx = M::Shape::NX;
+        let Workspace { point, result, .. } = &mut *self.base;
+        let states = &point.as_ref()[nx..];
+        result.x.as_mut_slice().copy_from_slice(&states[..nx]);
+        result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
+    }
+
+    /// The length of the first step.
+    pub(super) fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
+        if let Some(step) = self.options.initial_step {
+            return Ok(step.min(longest));
+        }
+        let nx = M::Shape::NX;
+        let Workspace { point, tolerances, parameters, u, start, .. } = &mut *self.base;
+        let states = &point.as_ref()[nx..2 * nx];
+        tolerances.measure_user(states);
+        let scale = &tolerances.scale.as_ref()[..nx];
+        let xdot = &start.as_ref()[..nx];
+        let (size, slope) = (norm(states, scale), norm(xdot, scale));
+        let length = first_length([size, slope], longest, 1.0 / tolerances.estimate_order, |step| {
+            // A second point, if there is a consistent one.
+            let h = T::from_f64(if span.end < span.start { -step } else { step });
+            let mut x = VectorX::<M, T>::zeroed();
+            for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {
+                *to = *x + h * *xdot;
+            }
+            let mut y = *start;
+            let at = At { x: &x, u, p: parameters, t: span.start + h };
+            let solved = self.consistent.solve(&at, &mut y);
+            self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
+            if solved.is_err() {
+                return 0.0;
+            }
+            for (y, xdot) in y.as_mut().iter_mut().zip(xdot) {
+                *y = *y - *xdot;
+            }
+            norm(&y.as_ref()[..nx], scale)
+        });
+        self.measure();
+        Ok(length)
+    }
+}
