@@ -2,9 +2,9 @@
 
 use crate::linalg::dot;
 use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::instance::data::inputs;
 use crate::ocp::formulation::functions::dynamics::{IntegralTerms, IntervalResult};
 use crate::ocp::formulation::functions::point::{Terms, add_blocks};
+use crate::ocp::formulation::instance::data::inputs;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::set;
 use crate::qp::{Arrays, part, part_mut, splat};
