@@ -68,7 +68,7 @@ pub(super) trait Method<P, T, D, M> {
     fn record(&mut self, row: Iteration) -> Result<(), OcpError>;
 }
 
-/// Iterates until a test, a step or the observer ends the run. What it took is counted in `outcome`.
+/// Iterates until a test, a step or the observer ends the run; counts in `outcome` what it took.
 ///
 /// # Errors
 /// Those of the method.

@@ -29,8 +29,8 @@ const CLOSED_GAPS: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
 const STEPS_THAT_CLOSE_GAPS: usize = 4;
-/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, as a part of
-/// the penalty.
+/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, as a part
+/// of the penalty.
 const PROXIMITY_WEIGHT: f64 = 2e-5;
 
 /// What came of a QP.
