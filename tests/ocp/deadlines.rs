@@ -87,7 +87,7 @@ fn late_samples_leave_the_plan() -> Test {
     };
     let before = plan(&controller);
     let x = [0.01, 0.12, 0.0, 0.0];
-    // From the plan nobody asks for the time; without it before its one factorisation.
+    // A warm start asks nobody for the time, a cold one before the factorisation that it takes.
     controller.reset();
     let late = controller.prepare()?.feedback_until(&x, &mut || true);
     assert!(matches!(late, Err(OcpError::Qp(QpError::OutOfTime { iterations: 0, .. }))), "{late:?}");
