@@ -23,7 +23,7 @@ names! {
     Gauss Heun Midpoint RadauIIA Rk4 Tableau Dae Erk Error Function Inline Irk Ode Record dae function ode
     Collocation Constraint ConvexCost Exact Formulation GaussNewton GeneralCost Globalisation HeapIpm
     HeapOcp HeapRealTime HeapSqp Horizon Huber IpmOptions Iteration LeastSquaresCost Log Map OcpError Outcome
-    Problem RealTime Sensitivities Shooting SolutionFactors SqpOptions Status Trajectory Update
+    Problem RealTime Sensitivities Shooting SolutionFactors SqpOptions Status Trajectory
     WithIntegral
     Block Bounds Condensing QpField HeapInteriorPoint HeapQp HeapSolution InteriorPoint InteriorPointOptions Qp
     QpError QpSolver QpStart QpStatistics QpView Residuals Side Solution Stage StageDims
