@@ -29,9 +29,9 @@ const CLOSED_GAPS: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
 const STEPS_THAT_CLOSE_GAPS: usize = 4;
-/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, as a part
-/// of the penalty.
-const PROXIMITY_WEIGHT: f64 = 2e-5;
+/// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, and the
+/// digits of the QP, as parts of the penalty; then those of an easier QP.
+const PROXIMITY_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -240,9 +240,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
         self.set_elastic(ocp, state, penalty);
-        self.qp_solver.permit(QP_ROUNDING * penalty);
-        ocp.forget_objective(T::from_f64(PROXIMITY_WEIGHT * penalty / violation));
-        let result = self.solve_qp(ocp, state, QpStart::Cold, row);
+        let mut result = Ok(());
+        for (weight, digits) in PROXIMITY_WEIGHTS {
+            self.qp_solver.permit(digits * penalty);
+            ocp.forget_objective(T::from_f64(weight * penalty / violation));
+            result = self.solve_qp(ocp, state, QpStart::Cold, row);
+            if result.is_ok() {
+                break;
+            }
+        }
         self.set_elastic(ocp, state, alone);
         result
     }
