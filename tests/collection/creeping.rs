@@ -5,7 +5,8 @@ use super::ocps::line;
 use super::units::fix;
 use super::{Test, solve};
 use casados::ocp::{
-    Constraint, Exact, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder, WithIntegral,
+    Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Problem, SecondOrder,
+    WithIntegral,
 };
 use casados::prelude::*;
 use casados::qp::residuals;
@@ -71,6 +72,16 @@ fn terrain_that_bends() -> Test {
     let mut ocp = ride!();
     let (outcome, _) = solve(&mut ocp)?;
     assert!(outcome.is_converged() && outcome.iterations <= 149, "{outcome}");
+    assert!((outcome.objective - 2651.8576).abs() <= 1e-6 * 2651.8576, "{outcome}");
+    is_optimal(&mut ocp)
+}
+
+/// Without damping steps are 1e-4 for hundreds of iterations.
+#[test]
+fn terrain_by_the_interior_point() -> Test {
+    let mut ocp = ride!();
+    let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{outcome}");
     assert!((outcome.objective - 2651.8576).abs() <= 1e-6 * 2651.8576, "{outcome}");
     is_optimal(&mut ocp)
 }

@@ -93,7 +93,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let scale = &tolerances.scale.as_ref()[..nx];
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let length = first_length([size, slope], longest, 1.0 / tolerances.estimate_order, |step| {
+        let length = first_length([size, slope], longest, 0.25, |step| {
             // A second point, if there is a consistent one.
             let h = T::from_f64(if span.end < span.start { -step } else { step });
             let mut x = VectorX::<M, T>::zeroed();

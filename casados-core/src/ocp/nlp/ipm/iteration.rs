@@ -5,7 +5,7 @@ use super::kkt::lengths::Lengths;
 use super::kkt::measure;
 use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, resolve};
 use super::kkt::scaling::{Relative, relative};
-use super::line_search::{FilterModel, LineSearch, SearchOutcome};
+use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
 use super::predictor::{self, needs_equal_steps};
 use super::state::State;
 
@@ -38,6 +38,7 @@ const EXACT: Exact = Exact { convexification: Convexification::None };
 /// A search direction, and how far it may be gone.
 struct Direction {
     expected: FilterModel,
+    tau: f64,
     primal: f64,
     dual: f64,
     /// It moves nothing but rounding errors.
@@ -180,6 +181,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             small_violation: state.small_violation,
             most: (GROWTH * here.violation.min(first)).max(first),
             mu: state.mu,
+            delta: state.delta,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
@@ -187,7 +189,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
-        Ok(Direction { expected, primal, dual, tiny, is_corrected })
+        Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
     }
 
     /// How far the search direction is gone. A corrected one is gone as far as it may be, or
@@ -200,7 +202,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         direction: &mut Direction,
     ) -> Result<SearchOutcome, OcpError> {
         if direction.tiny {
-            return Ok(SearchOutcome::Step(direction.primal));
+            return Ok(SearchOutcome::Step(Accepted { alpha: direction.primal, corrected: false }));
         }
         let lengths = state.lengths;
         macro_rules! room {
@@ -214,7 +216,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if direction.is_corrected {
             let Direction { expected, primal, .. } = direction;
             if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
-                return Ok(SearchOutcome::Step(*primal));
+                return Ok(SearchOutcome::Step(Accepted { alpha: *primal, corrected: false }));
             }
             let here = direction.expected.here;
             let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
@@ -222,8 +224,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             *direction = self.along(ocp, capacity, state, here, false)?;
             self.expand(ocp, state)?;
         }
-        let Direction { expected, primal, .. } = direction;
-        Ok(room!(work).search(ocp, state, expected, *primal))
+        let Direction { expected, primal, tau, .. } = direction;
+        room!(work).search(ocp, state, expected, *primal, *tau)
     }
 
     /// Goes the step that was accepted.
@@ -233,13 +235,16 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         capacity: &Lengths,
         state: &State<'_>,
         direction: &Direction,
-        alpha: f64,
+        accepted: Accepted,
     ) -> Result<(), OcpError> {
         let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = &*core::mem::take(&mut work.units);
-        let mut dual = direction.dual;
+        let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
+        if corrected {
+            dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+        }
         if needs_equal_steps(&iterate.sides) {
             dual = dual.min(alpha);
         }
@@ -323,14 +328,15 @@ where
         }
         let found = self.search(ocp, capacity, state, &mut direction)?;
         row.times.search = watch.lap();
-        row.step = match found {
-            SearchOutcome::Step(length) => length,
+        let accepted = match found {
+            SearchOutcome::Step(accepted) => accepted,
             SearchOutcome::Nothing => return Ok(self.recover(ocp, capacity, state)),
             SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
         };
+        (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         state.count_stalled(row.step);
         state.regularisation.gone(row.step / direction.primal);
-        self.accept(ocp, capacity, state, &direction, row.step)?;
+        self.accept(ocp, capacity, state, &direction, accepted)?;
         let force = of_tolerance(state.lengths.sizes.force);
         let least = (self.options.tolerance * force).max(self.options.final_mu);
         let ends = direction.tiny && state.mu <= least;

@@ -1,21 +1,27 @@
-//! How far a step goes: the filter line search.
+//! How far a step goes: the filter line search with second-order corrections.
 
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::kkt_view;
+use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp};
 use super::kkt::work::Work;
 use super::state::State;
+use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, GAMMA_PHI, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides,
 };
-use crate::qp::{Places, Solution, StageDims, Store, part, part_mut};
+use crate::qp::interior::Iterate;
+use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `γ_α`
 const ALPHA_MIN_FRAC: f64 = 0.05;
+/// Corrections of one step.
+const MAX_SOC: usize = 4;
+/// `κ_soc`: a correction that leaves more of the violation is the last one.
+const KAPPA_SOC: f64 = 0.99;
 
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +34,8 @@ pub(super) struct FilterModel {
     /// No step leaves more violation.
     pub most: f64,
     pub mu: f64,
+    /// `δ_w`
+    pub delta: f64,
 }
 
 impl FilterModel {
@@ -66,11 +74,18 @@ impl FilterModel {
     }
 }
 
+/// A step that was accepted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Accepted {
+    pub alpha: f64,
+    pub corrected: bool,
+}
+
 /// What a line search finds.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum SearchOutcome {
-    /// A step of this length.
-    Step(f64),
+    /// A step.
+    Step(Accepted),
     /// No step is short enough.
     Nothing,
     /// The time was over before.
@@ -105,28 +120,41 @@ where
         self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
     }
 
-    /// Halves the step until the filter accepts it; a point without a value is not accepted.
+    /// Halves the step until the filter accepts it.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]; points without a value are not good enough.
     pub fn search<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
         expected: &FilterModel,
         longest: f64,
-    ) -> SearchOutcome {
+        tau: f64,
+    ) -> Result<SearchOutcome, OcpError> {
         let State { filter, over, .. } = state;
         let mut alpha = longest;
         let shortest = expected.shortest();
         while alpha >= shortest {
             let there = self.measure(ocp, expected.mu, alpha);
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
-                return SearchOutcome::Step(alpha);
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
+            }
+            // Corrections know nothing of stages.
+            let bends =
+                !P::Dynamics::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
+            if alpha == longest
+                && bends
+                && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
+            {
+                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: true }));
             }
             if over() {
-                return SearchOutcome::OutOfTime;
+                return Ok(SearchOutcome::OutOfTime);
             }
             alpha *= 0.5;
         }
-        SearchOutcome::Nothing
+        Ok(SearchOutcome::Nothing)
     }
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
@@ -176,6 +204,58 @@ where
             objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force,
             violation,
         })
+    }
+
+    /// Second-order corrections: constraints take their values at the point that was tried.
+    /// Afterwards the step is what was accepted, or what it was before.
+    fn correct<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        filter: &mut Filter,
+        expected: &FilterModel,
+        tau: f64,
+    ) -> Result<Option<f64>, OcpError> {
+        {
+            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            assign(self.work.step, iterate.step);
+            assign(self.work.slack_step, iterate.sides.slack_step);
+            assign(self.work.multiplier_step, iterate.sides.multiplier_step);
+        }
+        let mut violation = expected.here.violation;
+        let mut accepted = None;
+        for _ in 0..MAX_SOC {
+            ocp.correct(self.trial, self.work.ends);
+            let (solved, alpha) = {
+                let qp = ocp.qp.view();
+                let mut iterate =
+                    kkt_view_of_new_qp(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
+                iterate.units = self.work.units;
+                // Sides keep their slacks; the gradient stays what it was.
+                evaluate_values(&mut iterate);
+                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
+                let solved = super::kkt::newton::step(&mut iterate, mu, delta);
+                (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
+            };
+            if solved.is_err() {
+                break;
+            }
+            let Some(there) = self.measure(ocp, expected.mu, alpha) else { break };
+            if expected.accepts(filter, alpha, &there) {
+                accepted = Some(alpha);
+                break;
+            }
+            if there.violation > KAPPA_SOC * violation {
+                break;
+            }
+            violation = there.violation;
+        }
+        if accepted.is_none() {
+            let iterate: Iterate<'_, T> = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+            assign(iterate.step, self.work.step);
+            assign(iterate.sides.slack_step, self.work.slack_step);
+            assign(iterate.sides.multiplier_step, self.work.multiplier_step);
+        }
+        Ok(accepted)
     }
 }
 

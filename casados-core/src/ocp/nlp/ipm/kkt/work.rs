@@ -14,6 +14,10 @@ pub(in crate::ocp::nlp::ipm) struct Work<'a, T> {
     pub rows: &'a mut [T],
     /// Slacks there.
     pub slacks: &'a mut [T],
+    /// The step before corrections.
+    pub step: &'a mut [T],
+    pub slack_step: &'a mut [T],
+    pub multiplier_step: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub pi: &'a mut [T],
     /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
@@ -31,7 +35,7 @@ impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
         let (pairs, Extent { ld, end, .. }) = (counts.pairs(), Extent::of::<T>(dims));
-        ends + 2 * end.row + 2 * pairs + end.dynamics + ld + elastic::memory(dims)
+        ends + 3 * end.row + 4 * pairs + end.dynamics + ld + elastic::memory(dims)
     }
 
     /// In memory of that length, whose contents stay.
@@ -42,6 +46,9 @@ impl<'a, T: Real> Work<'a, T> {
             ends: take_mut(rest, ends),
             rows: take_mut(rest, end.row),
             slacks: take_mut(rest, pairs),
+            step: take_mut(rest, end.row),
+            slack_step: take_mut(rest, pairs),
+            multiplier_step: take_mut(rest, pairs),
             pi: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
             units: take_mut(rest, end.row),
