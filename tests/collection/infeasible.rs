@@ -184,7 +184,7 @@ fn walled() -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> 
     Ok(ocp)
 }
 
-/// A wall that is wider than the corridor. `Sqp` creeps along it: it names the wall without a proof.
+/// A wall that is wider than the corridor. `Sqp` creeps along it, and names it without a proof.
 #[test]
 fn walled_corridor() -> Test {
     let [(by_sqp, _), (by_ipm, _)] = both(walled)?;

@@ -10,6 +10,10 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
+/// The exponent of implicit methods, whatever their order: with that of the estimate errors of five
+/// Gauss stages do not follow tolerances.
+const EXPONENT: f64 = 0.25;
+
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Everything at the start of the interval.
     pub(super) fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
@@ -93,7 +97,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let scale = &tolerances.scale.as_ref()[..nx];
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let length = first_length([size, slope], longest, 0.25, |step| {
+        let length = first_length([size, slope], longest, EXPONENT, |step| {
             // A second point, if there is a consistent one.
             let h = T::from_f64(if span.end < span.start { -step } else { step });
             let mut x = VectorX::<M, T>::zeroed();
