@@ -2,9 +2,11 @@
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
+#[cfg(feature = "alloc")]
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
+#[cfg(feature = "alloc")]
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::problem::{Formulation, Problem};
