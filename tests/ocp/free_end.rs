@@ -160,10 +160,8 @@ fn a_car_from_rest_to_rest() -> Test {
         .on(free)?;
     running.set_parameters(.., &[f64::MAX, 2.0])?;
     terminal.set_parameters(.., &[f64::MAX, 2.0])?;
-    for ocp in [&mut running] {
-        ocp.fix_initial_state(&[0.0; 2])?.guess(&[50.0, 5.0], &[0.0])?;
-        ocp.bound("x[0]", N.., 100.0, 100.0)?.bound("x[1]", N.., 0.0, 0.0)?;
-    }
+    running.fix_initial_state(&[0.0; 2])?.guess(&[50.0, 5.0], &[0.0])?;
+    running.bound("x[0]", N.., 100.0, 100.0)?.bound("x[1]", N.., 0.0, 0.0)?;
     terminal.fix_initial_state(&[0.0; 2])?.guess(&[50.0, 5.0], &[0.0])?;
     terminal.bound("x[0]", N.., 100.0, 100.0)?.bound("x[1]", N.., 0.0, 0.0)?;
     assert!(HeapIpm::new(&running)?.solve(&mut running)?.is_converged());
