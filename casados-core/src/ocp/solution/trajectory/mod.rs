@@ -230,7 +230,8 @@ fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
 }
 
 impl<T: Real> Trajectory<T> {
-    /// The last of the times: the end of the horizon, which may have been [found](Horizon::free).
+    /// The last of the times: the end of the horizon, which may have been
+    /// [found](crate::ocp::Horizon::free).
     ///
     /// [Horizon::free]: crate::ocp::Horizon::free
     #[must_use]
