@@ -34,6 +34,8 @@ pub enum Barrier {
 const KKT_ERROR_RED_ITERS: usize = 4;
 /// `κ`: an error is to be below this part of the largest of them.
 const KKT_ERROR_RED_FACT: f64 = 0.9999;
+/// So many steps without regularisation, one after the other, end a monotone phase.
+const CONVEX_STEPS: usize = 3;
 /// A monotone phase does not begin with less than this, or the mean product if that is less.
 const MONOTONE_MU: f64 = 0.1;
 
@@ -46,15 +48,15 @@ pub(in crate::ocp::nlp) struct Progress {
     adapts: bool,
     /// Whether it does.
     free: bool,
-    /// Whether the last step was without regularisation.
-    convex: bool,
+    /// Steps without regularisation, one after the other.
+    convex: usize,
 }
 
 impl Progress {
     /// Of a run that begins.
     pub fn new(barrier: Barrier) -> Self {
         let adapts = barrier == Barrier::Adaptive;
-        Self { errors: [0.0; KKT_ERROR_RED_ITERS], count: 0, adapts, free: adapts, convex: false }
+        Self { errors: [0.0; KKT_ERROR_RED_ITERS], count: 0, adapts, free: adapts, convex: 0 }
     }
 
     /// Whether it may follow steps.
@@ -73,7 +75,7 @@ impl Progress {
         let now = error(0.0);
         let largest = self.errors.iter().take(self.count).fold(0.0, |m: f64, &e| m.max(e));
         let shrinks = self.count < KKT_ERROR_RED_ITERS || now <= KKT_ERROR_RED_FACT * largest;
-        if shrinks && (self.free || self.adapts && self.convex) {
+        if shrinks && (self.free || self.adapts && self.convex >= CONVEX_STEPS) {
             if let Some(error) = self.errors.get_mut(self.count % KKT_ERROR_RED_ITERS) {
                 *error = now;
             }
@@ -90,7 +92,7 @@ impl Progress {
 
     /// Counts a step; `μ` if it needed a regularisation and said what `μ` is.
     pub fn count(&mut self, regularised: bool, mu: f64, mean: f64) -> Option<f64> {
-        self.convex = !regularised;
+        self.convex = if regularised { 0 } else { self.convex + 1 };
         let ends = regularised && self.free;
         self.free &= !regularised;
         ends.then(|| begin(mu, mean))

@@ -17,9 +17,8 @@ const MAX_HESSIAN_PERTURBATION: f64 = 1e20;
 /// What `δ_w` grows by where it is not enough: while none is known, and after that.
 const PERTURB_INC_FACT_FIRST: f64 = 100.0;
 const PERTURB_INC_FACT: f64 = 8.0;
-/// The first `δ_w` of an iteration is this part of the last one. IPOPT's third costs iterations
-/// where one more factorisation is cheap beside second derivatives.
-const PERTURB_DEC_FACT: f64 = 0.1;
+/// The first `δ_w` of an iteration is this part of the last one.
+const PERTURB_DEC_FACT: f64 = 1.0 / 3.0;
 /// A step that goes no farther than this part of what bounds leave of it is short,
 const SHORT: f64 = 0.1;
 /// and after so many in sequence the next ones are damped,
