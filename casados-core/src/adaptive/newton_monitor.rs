@@ -8,12 +8,12 @@ use crate::scalar::Scalar;
 /// The Newton matrix is that of the last Jacobian, so that the iteration converges linearly. It is
 /// expected to take no more than this many iterations, and this many more with each stage above
 /// three.
-const ITERATIONS: f64 = 7.0;
-const MORE_ITERATIONS: f64 = 2.5;
+const EXPECTED_ITERATIONS: f64 = 7.0;
+const ITERATIONS_PER_STAGE: f64 = 2.5;
 
-/// An iteration that converges at this rate, or is over at once, keeps its Jacobian for the next
-/// step.
-pub(super) const FAST: f64 = 1e-3;
+/// `THET` of RADAU5: an iteration with this rate, or that is over at once, keeps its Jacobian for
+/// the next step.
+pub(super) const THET: f64 = 1e-3;
 
 /// Increments that shrink no more are rounding errors, if they are this small beside what is
 /// tolerated: of a state near zero that follows from large ones by an equation, they may be above
@@ -81,7 +81,7 @@ pub struct Convergence {
 
 impl Default for Convergence {
     fn default() -> Self {
-        let (most, factor, last) = (ITERATIONS as usize, Self::UNKNOWN, [0.0; 2]);
+        let (most, factor, last) = (EXPECTED_ITERATIONS as usize, Self::UNKNOWN, [0.0; 2]);
         Self {
             iterations: 0,
             most,
@@ -104,9 +104,9 @@ impl Convergence {
     /// Before an iteration for so many stages, in a step of this length.
     pub(super) fn begin(&mut self, stages: usize, length: f64) {
         self.length = length;
-        self.most = (ITERATIONS + MORE_ITERATIONS * (stages as f64 - 3.0)) as usize;
+        self.most = (EXPECTED_ITERATIONS + ITERATIONS_PER_STAGE * (stages as f64 - 3.0)) as usize;
         self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
-        self.rate = FAST;
+        self.rate = THET;
         self.sides = [Sides::default(); 2];
         self.last = [0.0; 2];
     }
@@ -126,7 +126,7 @@ impl Convergence {
         if iteration > 1 && increment <= NOISE && 2.0 * increment >= last && !self.sides[0].beyond {
             // So does what converges slowly with the Jacobian of an earlier step: the next one gets
             // its own, too.
-            self.rate = 2.0 * FAST;
+            self.rate = 2.0 * THET;
             return if self.fresh { Ok(true) } else { Err(Failure::Stale) };
         }
         if iteration > 1 && iteration < most {

@@ -120,7 +120,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         (state.pivoted, state.verifies_pivots) = (true, true);
         state.need = Need::Factors;
         // The rate of this iteration says nothing of the next one.
-        (state.convergence.rate, state.convergence.factor) = (FAST, Convergence::UNKNOWN);
+        (state.convergence.rate, state.convergence.factor) = (THET, Convergence::UNKNOWN);
         true
     }
 
@@ -264,7 +264,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             return Ok(true);
         }
         self.measure();
-        state.advance(end, factor, state.convergence.rate <= FAST);
+        state.advance(end, factor, state.convergence.rate <= THET);
         Ok(false)
     }
 }

@@ -7,7 +7,7 @@ mod start;
 mod state;
 
 use crate::adaptive::consistent::Consistent;
-use crate::adaptive::newton_monitor::{FAST, Failure};
+use crate::adaptive::newton_monitor::{Failure, THET};
 use crate::adaptive::options::AdaptiveOptions;
 use crate::adaptive::order::{Family, Orders, interpolate};
 use crate::adaptive::point::At;

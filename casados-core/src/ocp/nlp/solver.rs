@@ -9,6 +9,10 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
+#[cfg(feature = "alloc")]
+use crate::qp::room;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
 /// What follows the test of an iterate.
@@ -61,11 +65,9 @@ pub(super) trait Method<P, T, D, M> {
         row: &Iteration,
     ) -> bool;
 
-    /// Writes an iteration to the log, if there is one.
-    ///
-    /// # Errors
-    /// [`OcpError::OutOfMemory`]
-    fn record(&mut self, row: Iteration) -> Result<(), OcpError>;
+    /// The log of the run.
+    #[cfg(feature = "alloc")]
+    fn log(&mut self) -> &mut Vec<Iteration>;
 }
 
 /// Iterates until a test, a step or the observer ends the run; counts in `outcome` what it took.
@@ -90,7 +92,11 @@ pub(super) fn iterate<P, T, D, M, S: Method<P, T, D, M>>(
             Next::End(status) => Some(status),
         };
         outcome.count(&row);
-        method.record(row)?;
+        #[cfg(feature = "alloc")]
+        {
+            room(method.log(), 1)?;
+            method.log().push(row);
+        }
         if !method.restart(ocp, state, end, &row)
             && let Some(status) = end
         {

@@ -24,10 +24,10 @@ use crate::ocp::nlp::solver::{Method, Next};
 use crate::ocp::nlp::watch::Watch;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-#[cfg(feature = "alloc")]
-use crate::qp::room;
 use crate::qp::{QpError, StageDims, Store, larger};
 use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 
 /// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
 /// it was at the start, or of one: an objective that becomes less leads no farther away.
@@ -304,7 +304,7 @@ where
         row: &mut Iteration,
         watch: &mut Watch,
     ) -> Result<Option<Status>, OcpError> {
-        let capacity = &state.capacity.clone();
+        let capacity = &{ state.capacity };
         if state.is_complementarity_stalled() {
             self.reset_small_slacks(ocp, state)?;
         }
@@ -351,7 +351,7 @@ where
         row: &Iteration,
     ) -> bool {
         let capacity = state.capacity;
-        let begins = self.begin_again(ocp, &capacity, state, end);
+        let begins = self.try_restart(ocp, &capacity, state, end);
         if !begins && matches!(end, Some(Status::Infeasible { .. })) {
             // That is said of the last iterate.
             state.best_iteration = *row;
@@ -359,13 +359,8 @@ where
         begins
     }
 
-    fn record(&mut self, row: Iteration) -> Result<(), OcpError> {
-        #[cfg(feature = "alloc")]
-        {
-            room(&mut self.log, 1)?;
-            self.log.push(row);
-        }
-        let _ = row;
-        Ok(())
+    #[cfg(feature = "alloc")]
+    fn log(&mut self) -> &mut Vec<Iteration> {
+        &mut self.log
     }
 }

@@ -23,7 +23,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// once, where it failed, or has had penalties for long and a simulation with the controls of
     /// the guess violates less than its iterate. It was long steps at first that led astray, or
     /// gaps that were to be closed over unstable dynamics.
-    pub(super) fn begin_again<P: Formulation<T>>(
+    pub(super) fn try_restart<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,

@@ -19,6 +19,8 @@ use crate::ocp::solution::outcome::{Outcome, Status};
 use crate::qp::room;
 use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
 /// The log has room for so many iterations before it grows.
@@ -371,7 +373,7 @@ where
         end: Option<Status>,
         row: &Iteration,
     ) -> bool {
-        let begins = self.begin_again(ocp, state, end, row);
+        let begins = self.try_restart(ocp, state, end, row);
         if !begins && matches!(end, Some(Status::Infeasible { .. })) {
             // That is said of the last iterate.
             state.best_iteration = *row;
@@ -379,13 +381,8 @@ where
         begins
     }
 
-    fn record(&mut self, row: Iteration) -> Result<(), OcpError> {
-        #[cfg(feature = "alloc")]
-        {
-            room(&mut self.log, 1)?;
-            self.log.push(row);
-        }
-        let _ = row;
-        Ok(())
+    #[cfg(feature = "alloc")]
+    fn log(&mut self) -> &mut Vec<Iteration> {
+        &mut self.log
     }
 }

@@ -5,7 +5,7 @@ use crate::qp::element::get;
 use crate::scalar::{Packed, Real, Registers};
 
 /// Registers that a vector is held in at a time.
-const HELD: usize = 4;
+const ACCUMULATORS: usize = 4;
 
 /// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
 /// be zero in one of them.
@@ -26,11 +26,11 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
             1 => return add_dots::<T, E, 1>(target, x, v),
             2 => return add_dots::<T, E, 2>(target, x, v),
             3 => return add_dots::<T, E, 3>(target, x, v),
-            _ => add_dots::<T, E, HELD>(target, x, v),
+            _ => add_dots::<T, E, ACCUMULATORS>(target, x, v),
         }
-        left -= HELD;
-        x = x.below(HELD * E::LANES);
-        v = v.get(HELD..).unwrap_or_default();
+        left -= ACCUMULATORS;
+        x = x.below(ACCUMULATORS * E::LANES);
+        v = v.get(ACCUMULATORS..).unwrap_or_default();
     }
 }
 
@@ -66,9 +66,9 @@ pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v:
             1 => symmetric_rows::<T, E, 1>(target, h, ld, v, rows),
             2 => symmetric_rows::<T, E, 2>(target, h, ld, v, rows),
             3 => symmetric_rows::<T, E, 3>(target, h, ld, v, rows),
-            _ => symmetric_rows::<T, E, HELD>(target, h, ld, v, rows),
+            _ => symmetric_rows::<T, E, ACCUMULATORS>(target, h, ld, v, rows),
         }
-        begin += HELD;
+        begin += ACCUMULATORS;
     }
 }
 
@@ -154,7 +154,7 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
 }
 
 /// The most lanes there are.
-const MOST: usize = 8;
+const MAX_LANES: usize = 8;
 
 /// `0, 1, 2, …` in the lanes of a register.
 #[inline(always)]
@@ -189,7 +189,7 @@ pub fn mirror<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
 /// The same of a matrix whose columns are one register each.
 #[inline(always)]
 fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize) {
-    let mut own = [E::from_f64(0.0); MOST];
+    let mut own = [E::from_f64(0.0); MAX_LANES];
     let mut columns = &*matrix;
     for own in own.iter_mut().take(n) {
         if let Some(cell) = E::cells(columns).first() {
@@ -197,7 +197,7 @@ fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize)
         }
         columns = columns.get(ld..).unwrap_or_default();
     }
-    let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MOST];
+    let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MAX_LANES];
     let (Some(from), Some(to)) = (own.get(..E::LANES), turned.get_mut(..E::LANES)) else { return };
     E::transpose(from, to);
     let (index, one) = (index::<T, E>(), E::from_f64(1.0));

@@ -23,7 +23,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
     /// astray, and violations that stay there say nothing of the problem. A run that ended
     /// with the violations of the guess begins again at a simulation with controls beside its.
-    pub(in crate::ocp::nlp::ipm) fn begin_again<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn try_restart<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
