@@ -283,8 +283,11 @@ impl<T: Real> Coupling<'_, T> {
             for (y, own) in y.iter_mut().zip(own) {
                 *y = *y + dot::<T, E>(part(own, 0, self.count), self.step);
             }
-            for (j, &step) in marked(self.shared).zip(controls) {
-                set(y, j, -step);
+            // The last stage has no controls.
+            if place.nu > 0 {
+                for (j, &step) in marked(self.shared).zip(controls) {
+                    set(y, j, -step);
+                }
             }
         }
         assign(part_mut(riccati.y, 0, self.free), self.right);

@@ -379,8 +379,9 @@ pub fn in_units<T: Real>(proximal: T, units: &[T], row: usize) -> T {
     units.get(row).map_or(proximal, |&unit| proximal / (unit * unit))
 }
 
-/// An element; zero if there is none.
+/// `slice[index]`
 #[inline(always)]
+#[cfg_attr(debug_assertions, track_caller)]
 pub fn at<T: Real>(slice: &[T], index: u32) -> T {
     get(slice, index as usize)
 }
@@ -389,6 +390,7 @@ pub fn at<T: Real>(slice: &[T], index: u32) -> T {
 #[inline(always)]
 pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
     for (&row, value) in rows.iter().zip(values) {
+        debug_assert!((row as usize) < target.len(), "row {row} of {}", target.len());
         if let Some(target) = target.get_mut(row as usize) {
             *target = change(*target, value);
         }
