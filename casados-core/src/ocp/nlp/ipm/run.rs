@@ -30,8 +30,12 @@ fn largest_size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>
     let mut largest = start.fold(1.0, |largest: f64, v| largest.max(v.abs().to_f64()));
     for stage in ocp.qp().stages() {
         for bounds in [stage.x_bounds(), stage.u_bounds()] {
-            let sizes = bounds.lower.iter().chain(bounds.upper).map(|bound| bound.abs().to_f64());
-            largest = sizes.filter(|&size| size < BOUND_INFINITY).fold(largest, f64::max);
+            for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
+                // What is fixed is as large as that.
+                let infinity = if lower == upper { f64::INFINITY } else { BOUND_INFINITY };
+                let sizes = [lower, upper].map(|bound| bound.abs().to_f64());
+                largest = sizes.into_iter().filter(|&size| size < infinity).fold(largest, f64::max);
+            }
         }
     }
     largest

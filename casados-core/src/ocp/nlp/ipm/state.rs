@@ -79,7 +79,7 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub best_iteration: Iteration,
     /// Infeasible, where bounds contradict each other.
     pub contradiction: Option<Status>,
-    /// Variables that are larger have no end.
+    /// Where variables are larger, it is asked whether the problem is unbounded.
     pub diverging_iterates: f64,
 }
 

@@ -11,7 +11,7 @@ use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::solver::Next;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{StageDims, Store, larger};
+use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
@@ -39,15 +39,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
-        }
-        let violation = larger(row.residuals.dynamics, row.residuals.inequalities);
-        let is_feasible = violation <= self.options.tolerance;
-        let (v, _) = ocp.iterate.vectors();
-        if is_feasible
-            && state.elastic.is_none()
-            && v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates)
-        {
-            return Next::End(Status::Unbounded);
         }
         if row.iteration >= self.options.max_iterations {
             return Next::End(Status::MaxIterations);
