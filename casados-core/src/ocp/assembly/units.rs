@@ -17,6 +17,10 @@ const FARTHEST: f64 = 1e12;
 /// Tolerances are those of the problem where units are up to this or its inverse.
 pub(in crate::ocp) const WIDE: f64 = 100.0;
 
+/// Beside the unit of forces at the guess a smaller one cannot be met where this many rounding
+/// errors of it are more than the tolerance of a QP.
+const ROUNDING_ERRORS: f64 = 10.0;
+
 /// What is known of all units.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct Sizes {
@@ -95,6 +99,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
         Sizes { force, least: least.to_f64() }
     }
+
+    /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
+    /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
+    /// `r` is large at the guess, and one at a solution nearby. With units of rows.
+    pub(in crate::ocp) fn smaller_force(
+        &self,
+        rows: &[T],
+        force: f64,
+        tolerance: f64,
+        scratch: &mut [T],
+    ) -> Option<f64> {
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
+        let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
+        let rounding = ROUNDING_ERRORS * T::EPSILON * WIDE / tolerance.max(T::EPSILON);
+        (size * WIDE < force && rounding < 1.0 / WIDE).then(|| size.max(rounding * force))
+    }
 }
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
@@ -163,7 +184,15 @@ fn units_of_row<T: Real>(
 /// changes by where the variable changes by a unit or by its size. At many guesses gradients
 /// vanish.
 fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
-    let (mut largest, fixed) = (T::ZERO, is_first_fixed(qp));
+    let [slope, change] = slopes_and_changes(qp, v, rows, scratch);
+    let mut range = Range::EMPTY;
+    range.add(slope.max(change));
+    range.unit::<T>().to_f64()
+}
+
+/// Both of them, with units of rows.
+fn slopes_and_changes<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
+    let ([mut largest, mut most], fixed) = ([T::ZERO; 2], is_first_fixed(qp));
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
@@ -176,10 +205,9 @@ fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut
             gradient.iter().zip(curvatures).zip(v).zip(units).skip(given)
         {
             let change = curvature * v.abs().max(unit);
-            largest = largest.max(slope.abs() * unit).max(change.abs() * unit);
+            largest = largest.max(slope.abs() * unit);
+            most = most.max(change.abs() * unit);
         }
     }
-    let mut range = Range::EMPTY;
-    range.add(largest);
-    range.unit::<T>().to_f64()
+    [largest, most]
 }

@@ -142,7 +142,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         (ocp.step_length, ocp.has_algebraic) = (None, false);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && state.best_residual <= self.options.acceptable_tolerance {
+        if stuck && (state.has_tightened || state.best_residual <= self.options.acceptable_tolerance) {
             outcome.status = Status::Acceptable;
         }
         ocp.complete(&mut outcome);
