@@ -3,7 +3,7 @@
 
 use crate::Test;
 use casados::ocp::{
-    Collocation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, Outcome, Problem, Status,
+    Collocation, GeneralCost, HeapIpm, HeapOcp, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Outcome, Problem, Status,
 };
 use casados::prelude::*;
 use casados::testing::Random;
@@ -30,6 +30,8 @@ enum Far {
     Offset,
     /// The objective.
     Objective,
+    /// Variables and the objective.
+    Both,
 }
 
 /// A problem and its solution: states, controls, and the objective there.
@@ -48,8 +50,9 @@ struct Known {
 /// π_{k+1}` and `r (u − u_r) = −b π_{k+1} ± λ_k` are the conditions of optimality.
 fn known(random: &mut Random, far: Far, k: i32) -> Known {
     let power = |random: &mut Random| 10.0_f64.powi(random.below(2 * k.unsigned_abs() as usize + 1) as i32 - k);
-    let [sx, su] = if far == Far::Units { [power(random), power(random)] } else { [1.0; 2] };
-    let force = if far == Far::Objective { power(random) } else { 1.0 };
+    let units = matches!(far, Far::Units | Far::Both);
+    let [sx, su] = if units { [power(random), power(random)] } else { [1.0; 2] };
+    let force = if matches!(far, Far::Objective | Far::Both) { power(random) } else { 1.0 };
     let origin = if far == Far::Offset { 10.0_f64.powi(k) } else { 0.0 };
     let (a, b) = (0.5 + 0.4 * random.symmetric(), 1.0 + 0.5 * random.symmetric());
     let (q, r) = (1.0 + 0.5 * random.symmetric(), 1.0 + 0.5 * random.symmetric());
@@ -150,6 +153,27 @@ fn solutions_far_from_one() -> Test {
                     assert!(outcome.is_converged() && error < 1e-6, "{far:?} {k} {solver}: {error:e} {outcome}");
                 }
             }
+        }
+    }
+    Ok(())
+}
+
+/// A feedback of a real-time iteration, whose solver of QPs knows no units but those that it finds,
+/// takes as many iterations in all units, up to three, and has the control of the solution.
+#[test]
+fn real_time_iterations_in_all_units() -> Test {
+    for seed in 0..200 {
+        let mut own = None;
+        for k in [0, 2, 5, 8] {
+            // The same problem, since as many numbers are drawn.
+            let known = known(&mut Random::new(seed), Far::Both, k);
+            let mut controller = HeapRealTime::exact(problem(&known, false)?)?;
+            let feedback = controller.prepare()?.feedback(&known.x[..1])?;
+            let error = (feedback.u[0] - known.u[0]).abs() / known.units[1];
+            assert!(error < 1e-6, "seed {seed}, 1e±{k}: {error:e}");
+            let iterations = feedback.statistics.iterations;
+            let own = *own.get_or_insert(iterations);
+            assert!(iterations.abs_diff(own) <= 3, "seed {seed}, 1e±{k}: {iterations}, not {own}");
         }
     }
     Ok(())

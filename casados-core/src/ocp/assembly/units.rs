@@ -18,8 +18,12 @@ const FARTHEST: f64 = 1e12;
 pub(in crate::ocp) const WIDE: f64 = 100.0;
 
 /// Beside the unit of forces at the guess a smaller one cannot be met where this many rounding
-/// errors of it are more than the tolerance of a QP.
+/// errors of it are more than what has to be met.
 const ROUNDING_ERRORS: f64 = 10.0;
+/// So many times the distance of two numbers are the last digits of a sum of some.
+const LAST_DIGITS: f64 = 4.0;
+/// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
+const BOUND_INFINITY: f64 = 1e19;
 
 /// What is known of all units.
 #[derive(Clone, Copy, Debug)]
@@ -102,19 +106,51 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
     /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
-    /// `r` is large at the guess, and one at a solution nearby. With units of rows.
+    /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
+    /// residual in units of forces that is asked for.
     pub(in crate::ocp) fn smaller_force(
         &self,
         rows: &[T],
         force: f64,
-        tolerance: f64,
+        least: f64,
         scratch: &mut [T],
     ) -> Option<f64> {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
         let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
         let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
-        let rounding = ROUNDING_ERRORS * T::EPSILON * WIDE / tolerance.max(T::EPSILON);
-        (size * WIDE < force && rounding < 1.0 / WIDE).then(|| size.max(rounding * force))
+        let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * force);
+        (smaller * WIDE < force).then_some(smaller)
+    }
+
+    /// The largest size of variables and of their bounds, at least one.
+    pub(in crate::ocp) fn largest_size(&self) -> f64 {
+        let mut largest = self.iterate.vectors().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
+        for stage in self.qp().stages() {
+            for bounds in [stage.x_bounds(), stage.u_bounds()] {
+                for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
+                    // What is fixed is as large as that.
+                    let infinity = if lower == upper { f64::INFINITY } else { BOUND_INFINITY };
+                    let sizes = [lower, upper].map(|bound| bound.abs().to_f64());
+                    largest = sizes.into_iter().filter(|&size| size < infinity).fold(largest, f64::max);
+                }
+            }
+        }
+        largest
+    }
+
+    /// What rounding leaves of gaps, and of distances to bounds: the last digits of the largest
+    /// variable of the iterate, moved into its bounds.
+    pub(in crate::ocp) fn rounding_of_gaps(&self) -> f64 {
+        let mut largest = T::ZERO;
+        for (stage, at) in self.qp().stages().zip(self.iterate.stages()) {
+            for (bounds, values) in [(stage.x_bounds(), at.x), (stage.u_bounds(), at.u)] {
+                let limits = bounds.lower.iter().zip(bounds.upper);
+                for (&value, (&lower, &upper)) in values.iter().zip(limits) {
+                    largest = largest.max(value.max(lower).min(upper).abs());
+                }
+            }
+        }
+        LAST_DIGITS * T::EPSILON * largest.to_f64()
     }
 }
 

@@ -169,9 +169,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
         let scratch = self.trial.view_mut().v;
-        let Some(smaller) = ocp.smaller_force(rows, sizes.force, self.options.tolerance, scratch) else {
-            return false;
-        };
+        // QPs are solved to a hundredth.
+        let least = self.options.tolerance / WIDE;
+        let Some(smaller) = ocp.smaller_force(rows, sizes.force, least, scratch) else { return false };
         sizes.force = power::<T>(smaller);
         state.has_tightened = true;
         true
@@ -215,7 +215,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut scale = Scale { units, way: Way::Into, judges: true };
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());
-        let (judged, _) = ocp.residuals();
+        let (mut judged, _) = ocp.residuals();
+        let rounding = ocp.rounding_of_gaps();
+        for residual in [&mut judged.dynamics, &mut judged.inequalities] {
+            *residual = if *residual <= rounding { 0.0 } else { *residual };
+        }
         scale.way = Way::Back;
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());
