@@ -6,6 +6,7 @@ mod debug;
 mod degenerate;
 mod errors;
 mod failing_intervals;
+mod far;
 mod infeasible;
 mod mass;
 mod messages;

@@ -56,12 +56,13 @@ fn problem() -> Result<(HeapOcp<Controlled>, State), Box<dyn std::error::Error>>
     Ok((ocp, x))
 }
 
-/// What a loop saw: the farthest ball, the last one, in which sample divergence was first reported,
+/// What a loop saw: the farthest ball, the farthest one at the end, in which sample divergence was first reported,
 /// and how often controls went from one bound to the other.
 #[derive(Debug, Default)]
 struct Seen {
     farthest: f64,
-    last: f64,
+    /// Over the last second.
+    settled: f64,
     diverging: Option<(usize, f64)>,
     flips: usize,
 }
@@ -101,7 +102,9 @@ fn run<C: Curvature<Irk<Plate, Gauss<2>>, f64>>(
         before = u[0];
         x = plant.solve(&x, &u, SAMPLE)?.x;
         seen.farthest = seen.farthest.max(x[0].abs());
-        seen.last = x[0].hypot(x[4]);
+        if sample as f64 * SAMPLE >= samples as f64 * SAMPLE - 1.0 {
+            seen.settled = seen.settled.max(x[0].hypot(x[4]));
+        }
         controller.shift();
     }
     println!("{seen:?}");
@@ -119,12 +122,13 @@ fn gauss_newton_diverges_and_says_so() -> Test {
     Ok(())
 }
 
-/// With exact Hessians the ball comes back and stays within 5 mm, and nothing is reported.
+/// With exact Hessians the ball comes back, is within 5 mm all of the last second, and nothing is
+/// reported.
 #[test]
 fn exact_hessians_hold_the_ball() -> Test {
     let (ocp, x) = problem()?;
-    let seen = run(HeapRealTime::exact(ocp)?, x, 110)?;
-    assert!(seen.last < 5e-3 && seen.farthest < WALL + 0.05, "{seen:?}");
+    let seen = run(HeapRealTime::exact(ocp)?, x, 160)?;
+    assert!(seen.settled < 5e-3 && seen.farthest < WALL + 0.05, "{seen:?}");
     assert_eq!(seen.diverging, None);
     Ok(())
 }

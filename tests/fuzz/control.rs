@@ -102,6 +102,8 @@ fn problems() {
             let verdict = matches!(outcome.status, Status::Converged | Status::Acceptable);
             let numbers = outcome.objective.is_finite() && outcome.residuals.largest().is_finite();
             assert!(!verdict || numbers && *finite, "seed {seed}: {outcome}");
+            // Costs are not less than −1.
+            assert!(outcome.status != Status::Unbounded, "seed {seed}: {outcome}");
         }
         match found {
             Ok((Outcome { status: Status::Converged | Status::Acceptable, .. }, _)) => counts.count("Ok"),

@@ -17,6 +17,7 @@ mod events;
 mod exported;
 mod files;
 mod fixed;
+mod horizons;
 mod source;
 mod tables;
 

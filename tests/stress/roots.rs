@@ -3,24 +3,28 @@
 //!
 //! Ten thousand starts of random models with two to four roots in each algebraic equation. The
 //! reference is Newton's method with the current Jacobian in every iteration, written here, with
-//! derivatives by hand.
+//! derivatives by hand. A tenth of them go through all integrators, multiple shooting and
+//! collocation.
 
+use casados::ocp::{Collocation, HeapSqp, Horizon, Kind, Problem as Control};
 use casados::options::{Jacobian, Newton};
 use casados::prelude::*;
 use casados::testing::Random;
 use nalgebra::{SVector, vector};
 
 /// Equations `c₀ + c₁ w + … + c₄ w⁴ + c₅ exp w + c₆ sin(c₇ w) + e sin z_{j+1} = 0` with
-/// `w_j = z_j + m z_{j+1}`, beside two states and two linear algebraic states.
+/// `w_j = z_j + m z_{j+1}`, beside two states and two linear algebraic states. Each `z_j` may be
+/// what is added to an origin: then zero is the start there.
 #[dae(N = [1, 2, 3, 4, 5])]
 fn family<const N: usize>(
     xdot: [f64; 2],
     x: [f64; 2],
     z: ([f64; 2], [f64; N]),
-    p: ([[f64; 8]; N], [f64; 2]),
+    p: ([[f64; 8]; N], [f64; 2], [f64; N]),
 ) -> ([f64; 2], [f64; 2], [f64; N]) {
     let ([first, second], roots) = z;
-    let (coefficients, [m, e]) = p;
+    let (coefficients, [m, e], origins) = p;
+    let roots: [f64; N] = core::array::from_fn(|j| origins[j] + roots[j]);
     let equations: [f64; N] = core::array::from_fn(|j| {
         let next = roots[(j + 1) % N];
         let w = roots[j] + m * next;
@@ -227,10 +231,22 @@ impl Count {
 }
 
 const H: f64 = 1e-3;
-const METHODS: [&str; 8] =
-    ["auto", "simplified", "full", "frozen", "two stages", "five steps", "batch", "adaptive"];
+const METHODS: [&str; 11] = [
+    "auto",
+    "simplified",
+    "full",
+    "frozen",
+    "two stages",
+    "five steps",
+    "batch",
+    "adaptive: consistent start values",
+    "adaptive",
+    "shooting",
+    "collocation",
+];
+type Counts = [Count; METHODS.len()];
 
-fn campaign<const N: usize>(random: &mut Random, starts: usize, reach: f64, counts: &mut [Count; 8])
+fn campaign<const N: usize>(random: &mut Random, starts: usize, reach: f64, counts: &mut Counts)
 where
     Problem<N>: Runs,
 {
@@ -253,7 +269,8 @@ macro_rules! runs {
             fn run(&self, all: bool, mut take: impl FnMut(usize, Option<bool>)) {
                 type M = Family<$n>;
                 let flat = self.coefficients.as_flattened().iter().chain(&self.coupling).copied();
-                let p = SVector::<f64, { 8 * $n + 2 }>::from_iterator(flat);
+                let mut p = SVector::<f64, { 9 * $n + 2 }>::zeros();
+                p.iter_mut().zip(flat).for_each(|(to, from)| *to = from);
                 let z = SVector::<f64, { $n + 2 }>::from_fn(|i, _| if i < 2 { 0.0 } else { self.start[i - 2] });
                 let (x0, none, zero) = (vector![1.0, 0.5], SVector::<f64, 0>::zeros(), vector![0.0, 0.0]);
                 macro_rules! irk {
@@ -289,7 +306,33 @@ macro_rules! runs {
                 radau.set_parameters(&p).unwrap();
                 radau.set_start(&zero, &z).unwrap();
                 let step = radau.solve(&x0, &none, H);
-                take(7, step.ok().map(|step| self.is_there(&step.z0.as_slice()[2..])));
+                let ends = step.ok().map(|step| [step.z0, step.z].map(|z| self.is_there(&z.as_slice()[2..])));
+                take(7, ends.map(|[there, _]| there));
+                take(8, ends.map(|[_, there]| there));
+                // The start of a model is zero: from origins it is that of the problem.
+                p.as_mut_slice()[8 * $n + 2..].copy_from_slice(self.start.as_slice());
+                macro_rules! horizon {
+                    ($index:literal, $dynamics:expr) => {
+                        // Nothing to choose, and no cost.
+                        let mut ocp = Control::new($dynamics).on(Horizon::uniform(3, H)).unwrap();
+                        ocp.set_parameters(.., p.as_slice()).unwrap().guess(x0.as_slice(), &[]).unwrap();
+                        ocp.fix_initial_state(x0.as_slice()).unwrap();
+                        let solved = HeapSqp::new(&ocp).unwrap().solve(&mut ocp);
+                        let solved = solved.is_ok_and(|outcome| outcome.is_solved());
+                        let solution = ocp.solution().ok().filter(|_| solved);
+                        take($index, solution.map(|solution| {
+                            let all = solution.series().iter().filter(|series| series.kind == Kind::Algebraic);
+                            let z: Vec<_> = all.map(|series| series.values.clone()).collect();
+                            (0..3).all(|k| {
+                                let z: Vec<_> = z[2..].iter().zip(&self.start).map(|(z, s)| z[k] + s).collect();
+                                self.is_there(&z)
+                            })
+                        }));
+                    };
+                }
+                let irk = || Irk::<M, RadauIIA<3>>::new(Options::default()).unwrap();
+                horizon!(9, irk());
+                horizon!(10, Collocation::new(irk()).unwrap());
             }
         }
     )*};
@@ -298,7 +341,7 @@ runs!(1, 2, 3, 4, 5);
 
 #[test]
 fn starts_near_a_root_end_there() {
-    let mut counts = <[Count; 8]>::default();
+    let mut counts = Counts::default();
     let mut random = Random::new(7);
     // In parts of the distance to the next root.
     let reach = 0.4;

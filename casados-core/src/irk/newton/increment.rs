@@ -186,6 +186,11 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
         for n in 0..N {
             new[n] = new[n] * weights[n];
         }
+        // By how much increments grow: what they are asked is all of it.
+        let mut change = [E::from_f64(0.0); N];
+        for n in 0..N {
+            change[n] = new[n] - old[n];
+        }
         // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only
         // where it must be.
         if self.full {
@@ -195,17 +200,17 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
             }
         } else {
             for n in 0..N {
-                excess[n] = new[n] * new[n] - self.tolerance * (old[n] - new[n]);
+                excess[n] = new[n] * new[n] + self.tolerance * change[n];
             }
         }
         for n in 0..N {
             // Where increments hardly shrink, nothing is expected but that the next one is as
             // large.
-            let expected = excess[n].max(new[n] + new[n] - old[n]);
+            let expected = excess[n].max(new[n] + change[n]);
             let own = new[n] - self.tolerance;
             // The smaller one.
             self.excess[n] = (-(-own).max(-expected)).max(self.excess[n]);
-            self.growth[n] = (new[n] - old[n]).max(self.growth[n]);
+            self.growth[n] = change[n].max(self.growth[n]);
             self.largest[n] = new[n].max(self.largest[n]);
         }
         *sizes = new;

@@ -188,8 +188,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if !status.active {
                 return self.solved(&test, policy.shared);
             }
-            let grows = !(exact || policy.renew || early) && grows_much(growth);
-            let rejected = grows && self.is_rejected(y, growth, policy.factored);
+            let rejected = grows_much(growth)
+                && !(exact || policy.renew || early)
+                && self.is_rejected(y, growth, policy.factored);
             let stale = rejected && !policy.factored;
             if stale || iteration == newton.max_iterations {
                 (self.validity.factors, self.validity.shared) = (false, false);

@@ -17,6 +17,14 @@ const FARTHEST: f64 = 1e12;
 /// Tolerances are those of the problem where units are up to this or its inverse.
 pub(in crate::ocp) const WIDE: f64 = 100.0;
 
+/// Beside the unit of forces at the guess a smaller one cannot be met where this many rounding
+/// errors of it are more than what has to be met.
+const ROUNDING_ERRORS: f64 = 10.0;
+/// So many times the distance of two numbers are the last digits of a sum of some.
+const LAST_DIGITS: f64 = 4.0;
+/// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
+const BOUND_INFINITY: f64 = 1e19;
+
 /// What is known of all units.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::ocp) struct Sizes {
@@ -95,6 +103,55 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
         Sizes { force, least: least.to_f64() }
     }
+
+    /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
+    /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
+    /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
+    /// residual in units of forces that is asked for.
+    pub(in crate::ocp) fn smaller_force(
+        &self,
+        rows: &[T],
+        force: f64,
+        least: f64,
+        scratch: &mut [T],
+    ) -> Option<f64> {
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
+        let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
+        let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * force);
+        (smaller * WIDE < force).then_some(smaller)
+    }
+
+    /// The largest size of variables and of their bounds, at least one.
+    pub(in crate::ocp) fn largest_size(&self) -> f64 {
+        let mut largest = self.iterate.vectors().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
+        for stage in self.qp().stages() {
+            for bounds in [stage.x_bounds(), stage.u_bounds()] {
+                for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
+                    // What is fixed is as large as that.
+                    let infinity = if lower == upper { f64::INFINITY } else { BOUND_INFINITY };
+                    let sizes = [lower, upper].map(|bound| bound.abs().to_f64());
+                    largest = sizes.into_iter().filter(|&size| size < infinity).fold(largest, f64::max);
+                }
+            }
+        }
+        largest
+    }
+
+    /// What rounding leaves of gaps, and of distances to bounds: the last digits of the largest
+    /// variable of the iterate, moved into its bounds.
+    pub(in crate::ocp) fn rounding_of_gaps(&self) -> f64 {
+        let mut largest = T::ZERO;
+        for (stage, at) in self.qp().stages().zip(self.iterate.stages()) {
+            for (bounds, values) in [(stage.x_bounds(), at.x), (stage.u_bounds(), at.u)] {
+                let limits = bounds.lower.iter().zip(bounds.upper);
+                for (&value, (&lower, &upper)) in values.iter().zip(limits) {
+                    largest = largest.max(value.max(lower).min(upper).abs());
+                }
+            }
+        }
+        LAST_DIGITS * T::EPSILON * largest.to_f64()
+    }
 }
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
@@ -163,7 +220,15 @@ fn units_of_row<T: Real>(
 /// changes by where the variable changes by a unit or by its size. At many guesses gradients
 /// vanish.
 fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
-    let (mut largest, fixed) = (T::ZERO, is_first_fixed(qp));
+    let [slope, change] = slopes_and_changes(qp, v, rows, scratch);
+    let mut range = Range::EMPTY;
+    range.add(slope.max(change));
+    range.unit::<T>().to_f64()
+}
+
+/// Both of them, with units of rows.
+fn slopes_and_changes<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
+    let ([mut largest, mut most], fixed) = ([T::ZERO; 2], is_first_fixed(qp));
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
@@ -176,10 +241,9 @@ fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut
             gradient.iter().zip(curvatures).zip(v).zip(units).skip(given)
         {
             let change = curvature * v.abs().max(unit);
-            largest = largest.max(slope.abs() * unit).max(change.abs() * unit);
+            largest = largest.max(slope.abs() * unit);
+            most = most.max(change.abs() * unit);
         }
     }
-    let mut range = Range::EMPTY;
-    range.add(largest);
-    range.unit::<T>().to_f64()
+    [largest, most]
 }

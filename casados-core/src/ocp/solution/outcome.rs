@@ -51,8 +51,9 @@ pub enum Status {
     Stopped,
     /// The time limit was reached.
     OutOfTime,
-    /// Variables grow without end at points that satisfy all constraints: something is missing that
-    /// bounds the objective. [`Ipm`](crate::ocp::Ipm) says so.
+    /// Variables have become very large, and from there on there is a ray of points that satisfy
+    /// all constraints, along which the objective falls without end: something is missing that
+    /// bounds it. [`Ipm`](crate::ocp::Ipm) says so.
     ///
     /// ```
     /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem, Status};

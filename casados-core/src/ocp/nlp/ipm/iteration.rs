@@ -326,6 +326,9 @@ where
         if (state.over)() {
             return Ok(Some(Status::OutOfTime));
         }
+        if self.is_unbounded(ocp, capacity, state) {
+            return Ok(Some(Status::Unbounded));
+        }
         let found = self.search(ocp, capacity, state, &mut direction)?;
         row.times.search = watch.lap();
         let accepted = match found {

@@ -165,25 +165,7 @@ where
         mu: f64,
         alpha: f64,
     ) -> Option<Measure> {
-        let part_of_step = T::from_f64(alpha);
-        ocp.step_length = Some(part_of_step);
-        {
-            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
-            self.trial.copy_from(&ocp.iterate);
-            let to = self.trial.view_mut();
-            for place in Places::<T>::new(iterate.qp.dims) {
-                let v = part_mut(to.v, place.v, place.n);
-                let from =
-                    part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
-                for (v, (&from, &step)) in v.iter_mut().zip(from) {
-                    *v = from + part_of_step * step;
-                }
-            }
-            let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
-            for (slack, (&from, &mut step)) in self.work.slacks.iter_mut().zip(steps) {
-                *slack = from + part_of_step * step;
-            }
-        }
+        self.place_trial(ocp, T::from_f64(alpha))?;
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
         let objective = if self.lengths.alone { 0.0 } else { objective };
         ocp.step_length = Some(T::ZERO);
@@ -204,6 +186,31 @@ where
             objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force,
             violation,
         })
+    }
+
+    /// The point and the slacks after a part of the step.
+    pub fn place_trial<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        part_of_step: T,
+    ) -> Option<()> {
+        ocp.step_length = Some(part_of_step);
+        let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+        self.trial.copy_from(&ocp.iterate);
+        let to = self.trial.view_mut();
+        for place in Places::<T>::new(iterate.qp.dims) {
+            let v = part_mut(to.v, place.v, place.n);
+            let from =
+                part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
+            for (v, (&from, &step)) in v.iter_mut().zip(from) {
+                *v = from + part_of_step * step;
+            }
+        }
+        let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
+        for (slack, (&from, &mut step)) in self.work.slacks.iter_mut().zip(steps) {
+            *slack = from + part_of_step * step;
+        }
+        Some(())
     }
 
     /// Second-order corrections: constraints take their values at the point that was tried.

@@ -19,24 +19,6 @@ use core::ops::ControlFlow;
 
 /// IPOPT's `diverging_iterates_tol`, as a multiple of the largest size in the data of a problem.
 const DIVERGING_ITERATES: f64 = 1e12;
-/// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
-const BOUND_INFINITY: f64 = 1e19;
-
-/// The largest size of variables at the start and of their bounds, at least one.
-fn largest_size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-    ocp: &Ocp<P, T, D, M>,
-) -> f64 {
-    let start = ocp.iterate.vectors().0.iter();
-    let mut largest = start.fold(1.0, |largest: f64, v| largest.max(v.abs().to_f64()));
-    for stage in ocp.qp().stages() {
-        for bounds in [stage.x_bounds(), stage.u_bounds()] {
-            let sizes = bounds.lower.iter().chain(bounds.upper).map(|bound| bound.abs().to_f64());
-            largest = sizes.filter(|&size| size < BOUND_INFINITY).fold(largest, f64::max);
-        }
-    }
-    largest
-}
-
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
     ///
@@ -124,7 +106,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state.has_perturbed_start = perturbed;
         state.first_objective = ocp.objective.to_f64();
         state.contradiction = ocp.contradiction(self.options.tolerance);
-        state.diverging_iterates = DIVERGING_ITERATES * largest_size(ocp);
+        state.diverging_iterates = DIVERGING_ITERATES * ocp.largest_size();
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();
@@ -138,7 +120,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         (ocp.step_length, ocp.has_algebraic) = (None, false);
         let stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && state.best_residual <= self.options.acceptable_tolerance {
+        if stuck && (state.has_tightened || state.best_residual <= self.options.acceptable_tolerance) {
             outcome.status = Status::Acceptable;
         }
         ocp.complete(&mut outcome);

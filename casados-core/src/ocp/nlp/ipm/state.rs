@@ -79,7 +79,9 @@ pub(in crate::ocp::nlp) struct State<'c> {
     pub best_iteration: Iteration,
     /// Infeasible, where bounds contradict each other.
     pub contradiction: Option<Status>,
-    /// Variables that are larger have no end.
+    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    pub has_tightened: bool,
+    /// Where variables are larger, it is asked whether the problem is unbounded.
     pub diverging_iterates: f64,
 }
 
@@ -124,6 +126,7 @@ impl<'c> State<'c> {
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
             contradiction: None,
+            has_tightened: false,
             diverging_iterates: f64::INFINITY,
         }
     }

@@ -124,7 +124,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let wrong = part * state.force();
         let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
         let permitted = if begins || state.exact { 0.0 } else { part };
-        self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()));
+        let rounding = if state.sizes.is_some() { ocp.rounding_of_gaps() } else { 0.0 };
+        self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()).max(rounding));
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(

@@ -145,6 +145,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut outcome = Outcome::new();
         let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);
         self.leave_elastic(ocp, &mut state);
+        let stuck =
+            matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
+        if stuck && state.has_tightened {
+            outcome.status = Status::Acceptable;
+        }
         // What is infeasible is said of the last iterate.
         let is_last =
             matches!(outcome.status, Status::Converged | Status::Infeasible { .. }) && result.is_ok();
@@ -321,7 +326,12 @@ where
         Ok(())
     }
 
-    fn test(&mut self, _: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>, row: &Iteration) -> Next {
+    fn test(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>, row: &Iteration) -> Next {
+        if state.error <= self.options.tolerance && self.tightens(ocp, state) {
+            state.error = self.judge(ocp, state, &row.residuals);
+            (state.best_residual, state.best_iteration) = (state.error, *row);
+            self.best.copy_from(&ocp.iterate);
+        }
         if state.error <= self.options.tolerance {
             state.best_iteration = *row;
             return Next::End(Status::Converged);

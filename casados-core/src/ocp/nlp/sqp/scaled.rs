@@ -158,6 +158,25 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    pub(super) fn tightens<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+    ) -> bool {
+        let Some(sizes) = state.sizes.as_mut().filter(|_| !(state.has_tightened || state.elastic)) else {
+            return false;
+        };
+        let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
+        let scratch = self.trial.view_mut().v;
+        // QPs are solved to a hundredth.
+        let least = self.options.tolerance / WIDE;
+        let Some(smaller) = ocp.smaller_force(rows, sizes.force, least, scratch) else { return false };
+        sizes.force = power::<T>(smaller);
+        state.has_tightened = true;
+        true
+    }
+
     /// The QP, the iterate and the solution, into units or back.
     pub(super) fn scale<P: Formulation<T>>(
         &mut self,
@@ -196,7 +215,11 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut scale = Scale { units, way: Way::Into, judges: true };
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());
-        let (judged, _) = ocp.residuals();
+        let (mut judged, _) = ocp.residuals();
+        let rounding = ocp.rounding_of_gaps();
+        for residual in [&mut judged.dynamics, &mut judged.inequalities] {
+            *residual = if *residual <= rounding { 0.0 } else { *residual };
+        }
         scale.way = Way::Back;
         scale.qp(&mut ocp.qp);
         scale.point(ocp.iterate.view_mut());

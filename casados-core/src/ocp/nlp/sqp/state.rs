@@ -51,6 +51,8 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub error: f64,
     /// Units, unless all of them are one.
     pub sizes: Option<Sizes>,
+    /// Whether the run has converged in the units of the guess, and goes on with smaller forces.
+    pub has_tightened: bool,
     /// Short steps of the merit function, but for those with penalties, less full ones.
     pub short_steps: usize,
     /// Infeasible, where bounds contradict each other.
@@ -99,6 +101,7 @@ impl<T> State<'_, T> {
             residual: f64::INFINITY,
             error: f64::INFINITY,
             sizes: None,
+            has_tightened: false,
             short_steps: 0,
             contradiction: None,
             number: PhantomData,

@@ -11,7 +11,7 @@ use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::solver::Next;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{StageDims, Store, larger};
+use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
@@ -23,7 +23,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state: &mut State<'_>,
         row: &Iteration,
     ) -> Next {
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
         if let Some(status) = state.contradiction {
             return Next::End(status);
         }
@@ -33,6 +33,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 return next;
             }
         } else if state.error <= self.options.tolerance {
+            if state.tightens(ocp, &mut work, self.options.tolerance) {
+                return Next::Evaluate;
+            }
             let cost = row.objective - ocp.objective.to_f64();
             let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
             return end.map_or(Next::Evaluate, Next::End);
@@ -40,18 +43,32 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
         }
-        let violation = larger(row.residuals.dynamics, row.residuals.inequalities);
-        let is_feasible = violation <= self.options.tolerance;
-        let (v, _) = ocp.iterate.vectors();
-        if is_feasible
-            && state.elastic.is_none()
-            && v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates)
-        {
-            return Next::End(Status::Unbounded);
-        }
         if row.iteration >= self.options.max_iterations {
             return Next::End(Status::MaxIterations);
         }
         Next::Step
+    }
+}
+
+impl State<'_> {
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    fn tightens<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        work: &mut Work<'_, T>,
+        tolerance: f64,
+    ) -> bool {
+        if self.has_tightened || self.elastic.is_some() {
+            return false;
+        }
+        let force = self.lengths.sizes.force;
+        let Some(smaller) = ocp.smaller_force(work.units, force, tolerance, work.scratch) else {
+            return false;
+        };
+        self.has_tightened = true;
+        (self.lengths.sizes.force, self.capacity.sizes.force) = (smaller, smaller);
+        self.filter.clear();
+        self.best_residual = f64::INFINITY;
+        true
     }
 }

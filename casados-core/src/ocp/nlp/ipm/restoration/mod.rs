@@ -4,3 +4,4 @@ pub(in crate::ocp::nlp::ipm) mod convergence;
 pub(in crate::ocp::nlp::ipm) mod elastic;
 pub(in crate::ocp::nlp::ipm) mod phase;
 pub(in crate::ocp::nlp::ipm) mod restart;
+pub(in crate::ocp::nlp::ipm) mod unbounded;
