@@ -409,6 +409,11 @@ pub trait Dae: 'static {
     /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`. A
     /// unit of time of an integrator takes that many units of time of the model.
     const DURATION: Option<usize> = None;
+    /// Which controls are rates of controls that are linear in time: `#[ode(linear = u)]`. The
+    /// linear controls themselves are states behind those of the model, in this order.
+    const LINEAR: &'static [u32] = &[];
+    /// How many integrals are the last states: `#[ode(integrals(energy = u * u))]`.
+    const INTEGRALS: usize = 0;
     /// How many conditions (of `if`, `max`, `abs`, ..) and tables the residual has, if known.
     const BRANCHES: usize = 0;
 

@@ -43,7 +43,7 @@ impl Panel {
     /// makes it: all that a name means, of states, algebraic states, controls, parameters and
     /// constraints. `x` are all states, `Corner[2]` is an output of a constraint.
     ///
-    /// Controls are stairs. Bounds are dashed, where they are not far from the values; where one is
+    /// Controls are stairs, those that are linear in intervals lines. Bounds are dashed, where they are not far from the values; where one is
     /// active the line is wide. Axes have the units that doc comments of the model say
     /// ([`Units`](crate::structure::Units)) or [`Trajectory::set_unit`] did; where the units of
     /// several lines differ, each name has its own.
@@ -92,13 +92,18 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
             }
         })
         .collect();
-    if series.kind == Kind::Control
+    if is_held(solution, series)
         && let (Some(&last), Some(end)) = (points.last(), times.last())
     {
         // The last control is held until the end.
         points.push(Point { time: end.to_f64(), ..last });
     }
     points
+}
+
+/// Whether values are held over intervals: of controls that are not linear, and of rates.
+fn is_held<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> bool {
+    matches!(series.kind, Kind::Control | Kind::Rate) && series.values.len() < solution.times().len()
 }
 
 /// A line with its bounds, and where they are active.
@@ -112,7 +117,7 @@ fn drawn<T: Real>(
     let over = |name: String, value: &dyn Fn(&Point) -> f64| {
         let line = points.iter().map(|point| (point.time, value(point)));
         let drawn = match series.kind {
-            Kind::Control => Curve::steps(name, line),
+            _ if is_held(solution, series) => Curve::steps(name, line),
             Kind::Terminal => Curve::dots(name, line),
             _ => Curve::line(name, line),
         };
@@ -131,7 +136,7 @@ fn drawn<T: Real>(
         .collect();
     if points.iter().any(|point| point.is_active(span)) {
         let wide = over(String::new(), &active).width(6.0);
-        drawn.push(if series.kind == Kind::Control { wide } else { wide.marked() });
+        drawn.push(if is_held(solution, series) { wide } else { wide.marked() });
     }
     drawn.push(over(name, &|point| point.value));
     drawn

@@ -255,7 +255,7 @@ fn argument(argument: &Argument, starts: [usize; 6]) -> TokenStream {
         Role::Z => starts[2],
         Role::U => starts[3],
         Role::P => starts[4],
-        Role::T => starts[5],
+        Role::T | Role::Du | Role::Q => starts[5],
     };
     let start = Literal::usize_unsuffixed(start);
     let value = match argument.length {

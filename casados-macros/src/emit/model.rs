@@ -51,6 +51,15 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
         let index = Literal::u32_unsuffixed(index);
         quote!(const DURATION: ::core::option::Option<usize> = ::core::option::Option::Some(#index);)
     });
+    let (linear, integrals) = (&model.extra.linear, model.extra.integrals);
+    let linear = (!linear.is_empty()).then(|| {
+        let controls = structure::numbers(linear);
+        quote!(const LINEAR: &'static [u32] = &[#(#controls),*];)
+    });
+    let integrals = (integrals > 0).then(|| {
+        let count = Literal::usize_unsuffixed(integrals);
+        quote!(const INTEGRALS: usize = #count;)
+    });
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
     let units = units::write(krate, &model.units);
     quote! {
@@ -62,6 +71,8 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             type Factors<B: #krate::__private::Plain> = [B; #lb];
             const STRUCTURE: #krate::__private::Structure = #structure;
             #duration
+            #linear
+            #integrals
             #domain
             #units
             #branches

@@ -24,6 +24,8 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         samplings: Vec::new(),
         reduction: None,
         duration: None,
+        extra: crate::language::Extra::default(),
+        is_model: false,
         graph,
         spans: vec![Span::call_site(); residual.len()],
         residual,

@@ -5,10 +5,13 @@
 //! - `name = Ident`: another name for the model's type;
 //! - `crate = path`: where casados is found;
 //! - `duration = p.duration`: the parameter that time is a multiple of;
+//! - `linear = u.thrust`, `linear = [u[0], u[2]]`: controls that are linear in time;
+//! - `integrals(energy = u * u)`: integrals by name;
 //! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives;
 //! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: equations may be differentiated.
 
 use super::duration::Duration;
+use super::extension::{self, Extension, Integral};
 use super::mistakes::Mistakes;
 use super::reduction::Reduction;
 use super::sampling::{self, Kind, Sampling, Setting};
@@ -20,7 +23,8 @@ use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
 /// What an attribute can say.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
-    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `nominal(x = ..)`, `range(x = ..)` and \
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `duration = p.duration`, `linear = u`, `integrals(name = ..)`, `nominal(x = ..)`, \
+    `range(x = ..)` and \
     `index_reduction`";
 
 /// More models than this in one attribute are taken for a mistake.
@@ -36,6 +40,8 @@ pub struct Arguments {
     pub reduction: Option<Reduction>,
     /// The parameter that time is a multiple of.
     pub duration: Option<Duration>,
+    /// Controls that are linear, and integrals.
+    pub extension: Extension,
     /// Groups of const parameters with the values that they take together.
     values: Vec<Values>,
     /// Nominal values and ranges.
@@ -56,6 +62,7 @@ impl Arguments {
             name: None,
             reduction: None,
             duration: None,
+            extension: Extension::default(),
             values: Vec::new(),
             settings: Vec::new(),
         };
@@ -83,6 +90,16 @@ impl Arguments {
                     let span = duration.span;
                     if arguments.duration.replace(duration).is_some() {
                         mistakes.note(Error::new(span, "`duration` is given twice"));
+                    }
+                }
+                Entry::Linear(names) => arguments.extension.linear.extend(names),
+                Entry::Integrals(integrals) => {
+                    for integral in integrals {
+                        let name = &integral.name;
+                        if arguments.extension.integrals.iter().any(|other| other.name == *name) {
+                            mistakes.note(Error::new(name.span(), format!("`{name}` is given twice")));
+                        }
+                        arguments.extension.integrals.push(integral);
                     }
                 }
                 Entry::Values(values) => {
@@ -113,7 +130,10 @@ impl Arguments {
 
     /// Refuses what is said about the model of a module in which every one has its own attribute.
     pub fn without_model(&self, module: &Ident) -> Result<()> {
-        let settings = self.name.is_some() || self.reduction.is_some() || self.duration.is_some();
+        let settings = self.name.is_some()
+            || self.reduction.is_some()
+            || self.duration.is_some()
+            || !self.extension.is_empty();
         if settings || !self.values.is_empty() || !self.settings.is_empty() {
             return Err(Error::new(
                 module.span(),
@@ -225,6 +245,8 @@ enum Entry {
     Settings(Vec<Setting>),
     Reduction(Reduction),
     Duration(Duration),
+    Linear(Vec<(String, Span)>),
+    Integrals(Vec<Integral>),
 }
 
 impl Parse for Entry {
@@ -251,6 +273,15 @@ impl Parse for Entry {
             return Ok(Self::Settings(Setting::list(kind, &content)?));
         }
         if let [name] = &names[..]
+            && name == "integrals"
+            && input.peek(syn::token::Paren)
+        {
+            let content;
+            syn::parenthesized!(content in input);
+            let list = content.parse_terminated(Integral::parse, Token![,])?;
+            return Ok(Self::Integrals(list.into_iter().collect()));
+        }
+        if let [name] = &names[..]
             && name == "index_reduction"
         {
             return Ok(Self::Reduction(Reduction::read(name.span(), input)?));
@@ -267,6 +298,9 @@ impl Parse for Entry {
         }
         if names.len() == 1 && names[0] == "duration" {
             return Ok(Self::Duration(Duration::read(span, &input.parse()?)));
+        }
+        if names.len() == 1 && names[0] == "linear" {
+            return Ok(Self::Linear(extension::names(span, &input.parse()?)));
         }
         let rows = rows(&input.parse()?, names.len())?;
         if rows.is_empty() {

@@ -102,6 +102,10 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
         let message = "a dual model has no graph whose time could be scaled: write it with `f64`";
         return Err(Error::new(duration.span, message));
     }
+    if !arguments.extension.is_empty() {
+        let message = "a dual model has no graph that more states could be added to: write it with `f64`";
+        return Err(Error::new_spanned(&function.sig.ident, message));
+    }
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();
@@ -204,7 +208,7 @@ impl Signature {
                 Role::Z => variables.z = names,
                 Role::U => variables.u = names,
                 Role::P => variables.p = names,
-                Role::T => {}
+                Role::T | Role::Du | Role::Q => {}
             }
             arguments.push(Argument { role, length, reference });
         }

@@ -15,6 +15,7 @@ mod duration;
 mod environment;
 mod evaluator;
 mod expression;
+mod extension;
 mod flatten;
 mod function;
 mod generics;
@@ -46,6 +47,7 @@ mod value;
 
 use crate::graph::{Graph, Node};
 use attribute::Arguments;
+pub use extension::Extra;
 use model::Template;
 use proc_macro2::{Span, TokenStream};
 pub use reduction::{Rates, Reduction};
@@ -134,6 +136,10 @@ pub struct Model {
     pub reduction: Option<Reduction>,
     /// Which parameter time is a multiple of, if one is.
     pub duration: Option<u32>,
+    /// States that it has beside its own.
+    pub extra: Extra,
+    /// Whether it has equations: functions have none.
+    pub is_model: bool,
     /// The expressions.
     pub graph: Graph,
     /// `f`, one node per equation.
@@ -252,6 +258,10 @@ fn parts(form: Form, arguments: &Arguments, mut module: syn::ItemMod) -> syn::Re
     for module::Marked { index, form, attribute } in marked {
         let part = Arguments::read(attribute).and_then(|own| {
             let Some(syn::Item::Fn(function)) = items.get(index) else { return Ok(None) };
+            let mut own = own;
+            if form == Form::Function {
+                own.extension = own.extension.or(&arguments.extension);
+            }
             let models = models(&own, &template(form, index, None, &own)?)?;
             Ok(Some(Part { form, original: function.sig.ident.clone(), models }))
         });
@@ -278,7 +288,7 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
     }
     let instances = arguments.instances(&template.function.sig.generics)?;
     let model = |instance| {
-        let mut model = template.model(instance)?;
+        let mut model = template.model(instance, &arguments.extension)?;
         model.samplings = arguments.samplings(&model.variables)?;
         model.reduction.clone_from(&arguments.reduction);
         if let Some(duration) = &arguments.duration {

@@ -3,6 +3,7 @@
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
+use super::extension::{Extension, Extra};
 use super::flatten;
 use super::generics::Label;
 use super::mistakes::Mistakes;
@@ -37,7 +38,7 @@ pub struct Template<'a> {
 
 impl Template<'_> {
     /// The model with these values of the const parameters.
-    pub fn model(&self, instance: Vec<Instance>) -> Result<Model> {
+    pub fn model(&self, instance: Vec<Instance>, extension: &Extension) -> Result<Model> {
         let arguments = signature::arguments(self.form, self.function)?;
         let mut evaluator = Evaluator::default();
         let items = evaluator.module(self.items.iter(), Module::default())?;
@@ -51,12 +52,24 @@ impl Template<'_> {
             .collect();
         let scope = Scope::inside(&items, Names::Variables(parameters));
         let (variables, units, values) = self.variables(&arguments, &mut evaluator, &scope)?;
-        let function = Value::Function(Rc::new(Function {
-            item: Rc::new(self.function.clone()),
-            scope: items,
-            turbofish: turbofish.into_iter().map(Generic::Const).collect(),
-            owner: None,
-        }));
+        let generics: Vec<Generic> = turbofish.into_iter().map(Generic::Const).collect();
+        let callable = |item: &ItemFn| {
+            Value::Function(Rc::new(Function {
+                item: Rc::new(item.clone()),
+                scope: items.clone(),
+                turbofish: generics.clone(),
+                owner: None,
+            }))
+        };
+        let function = callable(self.function);
+        let is_model = self.form != Form::Function;
+        let mut rates = Vec::new();
+        for integrand in if is_model { extension.integrands(self.function)? } else { Vec::new() } {
+            let value = evaluator.call(&callable(&integrand), values.clone(), &integrand.sig.ident)?;
+            rates.extend(evaluator.flatten(&value, &integrand.sig.output)?);
+        }
+        let more = self.more(&arguments, &mut evaluator, &scope)?;
+        extension.check(self.function, variables.u.len(), more)?;
         let value = evaluator.call(&function, values, &self.function.sig.ident)?;
         let numbers = evaluator.flatten(&value, &self.function.sig.output)?;
         self.check_length(&numbers, &variables)?;
@@ -71,7 +84,7 @@ impl Template<'_> {
                 })
                 .collect(),
         };
-        Ok(Model {
+        let mut model = Model {
             name: self.name.clone(),
             visibility: self.visibility.clone(),
             documentation: self.documentation.clone(),
@@ -81,6 +94,8 @@ impl Template<'_> {
             samplings: Vec::new(),
             reduction: None,
             duration: None,
+            extra: Extra::default(),
+            is_model,
             graph: evaluator.graph,
             residual,
             spans,
@@ -88,7 +103,23 @@ impl Template<'_> {
             tables: evaluator.tables,
             uses: evaluator.uses,
             krate: self.krate.clone(),
-        })
+        };
+        extension.apply(&mut model, &rates, more)?;
+        Ok(model)
+    }
+
+    /// How long the arguments `du` and `q` are.
+    fn more(
+        &self,
+        arguments: &[Argument],
+        evaluator: &mut Evaluator,
+        scope: &Rc<Scope>,
+    ) -> Result<[usize; 2]> {
+        let (_, labels) = types_and_labels(arguments, evaluator, scope)?;
+        Ok([Role::Du, Role::Q].map(|role| {
+            let position = arguments.iter().position(|argument| argument.role == role);
+            position.map_or(0, |position| labels[position].len())
+        }))
     }
 
     /// The variables of the model, and the values of the arguments in the order of the function.
@@ -103,8 +134,11 @@ impl Template<'_> {
         let variables = self.named(arguments, &names)?;
         let units = units(arguments, &labels).with_documentation(&self.documentation, &variables);
         let mut values = Vec::new();
+        let of_du = arguments.iter().position(|argument| argument.role == Role::Du);
+        let of_du = of_du.map_or(0, |position| names[position].len() as u32);
         for (argument, ty) in arguments.iter().zip(&types) {
-            let mut next = offset(&variables, argument.role);
+            let behind = if argument.role == Role::Q { of_du } else { 0 };
+            let mut next = offset(&variables, argument.role) + behind;
             values.push(evaluator.instantiate(
                 ty,
                 Label::new(argument.role.name()),
@@ -261,6 +295,7 @@ fn offset(Variables { x, z, u, p }: &Variables, role: Role) -> u32 {
         Role::U => 2 * x.len() + z.len(),
         Role::P => 2 * x.len() + z.len() + u.len(),
         Role::T => 2 * x.len() + z.len() + u.len() + p.len(),
+        Role::Du | Role::Q => 2 * x.len() + z.len() + u.len() + p.len() + 1,
     };
     offset as u32
 }

@@ -21,6 +21,10 @@ pub enum Role {
     P,
     /// Time.
     T,
+    /// Rates of linear controls, of a function.
+    Du,
+    /// Integrals, of a function.
+    Q,
 }
 
 impl Role {
@@ -47,6 +51,8 @@ impl Role {
             Self::U => "u",
             Self::P => "p",
             Self::T => "t",
+            Self::Du => "du",
+            Self::Q => "q",
         }
     }
 }
@@ -144,6 +150,13 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     // The other state of a function of two.
     if form == Form::Function && identifier.ident.to_string().trim_start_matches('_') == "x0" {
         return Ok(Role::Z);
+    }
+    if form == Form::Function {
+        match identifier.ident.to_string().trim_start_matches('_') {
+            "du" => return Ok(Role::Du),
+            "q" => return Ok(Role::Q),
+            _ => {}
+        }
     }
     match (Role::of(&identifier.ident), form) {
         (Some(Role::Xdot), Form::Ode) => Err(Error::new_spanned(

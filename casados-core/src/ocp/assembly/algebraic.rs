@@ -18,7 +18,9 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nod
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::functions::point::Cross;
 use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::instance::data::{Layout, Node, inputs, is_algebraic, kept, sizes, split};
+use crate::ocp::formulation::instance::data::{
+    Layout, Node, inputs, is_algebraic, kept, node_rows, sizes, split,
+};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
@@ -68,7 +70,7 @@ pub(in crate::ocp) struct Extended<'a, T> {
 }
 
 impl<'a, T: Real> Extended<'a, T> {
-    /// Zeros; nothing if there are no algebraic states.
+    /// Zeros; nothing where there is no memory.
     pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T], free: Free<'a>) -> Self {
         memory.fill(T::ZERO);
         let [n, nz] = sizes::<S>(free.count());
@@ -79,7 +81,7 @@ impl<'a, T: Real> Extended<'a, T> {
     }
 
     /// An element of the symmetric Hessian.
-    fn hessian(&self, i: usize, j: usize) -> T {
+    pub(in crate::ocp) fn hessian(&self, i: usize, j: usize) -> T {
         get(self.terms.hessian, i.min(j) * self.terms.ld + i.max(j))
     }
 
@@ -162,10 +164,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub(in crate::ocp) fn weigh(&mut self) -> Result<(), OcpError> {
-        if const { !is_algebraic::<P, T>() } {
+        let layout @ Layout { intervals, free, bounds_algebraic, .. } = self.layout();
+        if !(const { is_algebraic::<P, T>() } || bounds_algebraic) {
             return Ok(());
         }
-        let layout @ Layout { intervals, free } = self.layout();
         let (n, nz) = (inputs::<P::Shape>(free), P::Shape::NZ);
         let free = self.free.view();
         let data = split::<P, T>(self.data.as_mut(), layout);
@@ -173,7 +175,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let nodes = Nodes { step_length: self.step_length, ..nodes };
-        if !core::mem::take(&mut self.has_algebraic) {
+        let has_points = self.inner.count() > 0;
+        if !core::mem::take(&mut self.has_algebraic) && !has_points {
             dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, free, k, step))?;
         }
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
@@ -182,7 +185,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (z, _) = at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &stage, z, free);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
-            let factor = if *running { free.duration(stage.u) * node.factor } else { node.factor };
+            let first = self.inner.first_part();
+            let factor = if *running { free.duration(stage.u) * node.factor * first } else { node.factor };
             let place = At { stage: k, factor, exact: false, from: &[] };
             stage_cost.add(&point, node.reference, place, &mut terms)?;
             path.linearise(&point, &mut [], columns, terms.ld, Spot::new(k, free, &[]))?;
@@ -191,6 +195,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let mu = stage.g_upper.iter().zip(stage.g_lower);
                 for ((&upper, &lower), column) in mu.zip(columns.chunks_exact(terms.ld.max(1))) {
                     *nu = *nu + (upper - lower) * get(column, n + j);
+                }
+                for (i, &variable) in self.inner.variables().iter().enumerate() {
+                    if bounds_algebraic && variable == (P::Shape::NX + j, 0) {
+                        let row = node_rows::<P, T>() + self.inner.count() * P::Path::ROWS + i;
+                        *nu = *nu + get(stage.g_upper, row) - get(stage.g_lower, row);
+                    }
                 }
             }
         }

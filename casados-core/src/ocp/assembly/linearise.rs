@@ -4,6 +4,8 @@ use crate::linalg::dot;
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::assembly::curvature::Curvature;
+#[cfg(feature = "alloc")]
+use crate::ocp::assembly::inside::{Costs, Rows};
 use crate::ocp::assembly::start::link_start;
 use crate::ocp::assembly::transfer::Left;
 use crate::ocp::formulation::arrival;
@@ -13,10 +15,10 @@ use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
 use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::instance::data::{Layout, Node, inputs, path_rows, split};
+use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
+use crate::qp::{Arrays, Residuals, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -39,7 +41,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let is_free_cost = self.free.view().end().is_some() && self.problem.parts().running;
-        let mut left = Left { plain: !C::EXACT && !is_free_cost, adding: false };
+        let plain = !C::EXACT && !is_free_cost && !self.inner.is_held();
+        let mut left = Left { plain, adding: false };
         let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
             left.transfer::<P, T>(step, free, stage, at);
             watch(k, step);
@@ -64,6 +67,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         mut to: impl FnMut(usize, &IntervalResult<'_, T>, (Arrays<'_, T>, Free<'_>), &[T]),
     ) -> Result<Sums<T>, OcpError> {
         self.check()?;
+        #[cfg(feature = "alloc")]
+        if self.inner.count() > 0 {
+            return self.linearise_pieces(curvature, to);
+        }
         if C::EXACT {
             self.weigh()?;
         }
@@ -115,6 +122,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         begin: impl Fn(usize, &mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
         let layout @ Layout { intervals, .. } = self.layout();
+        let first_part = self.inner.first_part();
+        #[cfg(feature = "alloc")]
+        let inner = &mut self.inner;
         let Self { problem, qp, iterate, data, free, .. } = self;
         let free = free.view();
         let data = split::<P, T>(data.as_mut(), layout);
@@ -145,12 +155,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // Values lie where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
-            let count = if k < intervals { path_rows::<P, T>() } else { P::Terminal::ROWS };
+            let count = if k < intervals { path_rows::<P, T>(layout) } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
             // Of a running cost the end time is a factor.
             let w = free.end().filter(|_| *running && k < intervals);
             let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
-            let factor = duration * node.factor;
+            let factor = duration * node.factor * if *running { first_part } else { T::ONE };
             let place = At { stage: k, factor, exact: C::EXACT, from };
             let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
@@ -181,13 +191,25 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
             }
             if is_extended {
-                room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
+                let at_node = if k < intervals { node_rows::<P, T>() } else { count };
+                room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, at_node * ld), ld);
+            }
+            #[cfg(feature = "alloc")]
+            if k < intervals && (layout.inner > 0 || inner.is_held()) {
+                let mu = part(rest, ld, if C::EXACT { count } else { 0 });
+                let (values, columns) = (&mut *values, &mut *columns);
+                let rows = &mut Rows { values, columns, ld, terms: Some(&mut direct), mu, stage: at, k };
+                let costs =
+                    Costs { cost: &mut *stage_cost, reference: node.reference, running: *running, exact: C::EXACT };
+                let found =
+                    inner.write_rows::<P>((&mut *path, costs), (z, dz), (data.times, data.p), free, rows)?;
+                objective = objective + found;
             }
             if k < intervals {
                 link_start::<P, T>(&at, k, (values, columns, ld));
             }
             let given =
-                [&*data.lower, &*data.upper].map(|limits| part(limits, k * path_rows::<P, T>(), count));
+                [&*data.lower, &*data.upper].map(|limits| part(limits, k * path_rows::<P, T>(layout), count));
             shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
         }
         Ok(objective)
@@ -263,88 +285,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         (residuals, self.objective.to_f64() + penalties)
     }
-
-    /// The objective at some point, without penalties; and what is left of its dynamics and
-    /// constraints in `ends`: `φ` of every interval, then `g` of every stage, in the layout of
-    /// [`Ocp::ends`].
-    ///
-    /// # Errors
-    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
-        let layout @ Layout { intervals, .. } = self.layout();
-        let (nx, free) = (P::Shape::NX, self.free.view());
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
-        let (v, multipliers) = at.vectors();
-        let mut objective = arrival::cost(data.arrival, at);
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
-        let (nodes, mut of_stages) = (Nodes { step_length: self.step_length, ..nodes }, [T::ZERO; 2]);
-        dynamics.simulate(&nodes, &mut |k, step: &IntervalResult<'_, T>| {
-            objective = objective + step.cost.value;
-            if P::Dynamics::LIFTED {
-                of_stages = add_stages(of_stages, step.stages);
-            }
-            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
-            assign(part_mut(ends, k * nx, nx), step.x);
-        })?;
-        let values = ends.get_mut(intervals * nx..).unwrap_or_default();
-        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        for (k, at) in at.stages().enumerate() {
-            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
-            node.read::<P::Shape>(&mut point, &at, z, free);
-            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
-            if k < intervals {
-                let factor = if *running { free.duration(at.u) * node.factor } else { node.factor };
-                objective = objective + factor * stage_cost.value(&point, node.reference, k)?;
-                let rows = path_rows::<P, T>();
-                let values = part_mut(values, k * rows, rows);
-                path.value(&point, values, spot)?;
-                link_start::<P, T>(&at, k, (values, &mut [], 0));
-            } else {
-                objective = objective + terminal_cost.value(&point, node.reference, k)?;
-                terminal.value(&point, part_mut(values, k * path_rows::<P, T>(), P::Terminal::ROWS), spot)?;
-            }
-        }
-        self.stages = of_stages;
-        Ok(objective)
-    }
-
-    /// How many numbers `φ` of every interval and `g` of every stage are.
-    pub(crate) fn ends(&self) -> usize {
-        ends::<P, T>(self.qp.dims())
-    }
-
-    /// Rows of the path constraints.
-    pub(in crate::ocp) fn rows(&self) -> usize {
-        path_rows::<P, T>()
-    }
-
-    /// Constants of the linearised dynamics and constraints such that these are exact at some
-    /// point, whose `ends` are given: what a second-order correction solves.
-    pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
-        let layout @ Layout { intervals, .. } = self.layout();
-        let (nx, path) = (P::Shape::NX, path_rows::<P, T>());
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let (v, _) = at.vectors();
-        let values = ends.get(intervals * nx..).unwrap_or_default();
-        for (k, mut stage) in self.qp.stages_mut().enumerate() {
-            let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
-            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
-            let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
-            for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
-                *offset = x - dot(column, here);
-            }
-            let columns = matrix.get(next * ld..).unwrap_or_default();
-            let first = k * path;
-            let count = if k < intervals { path } else { P::Terminal::ROWS };
-            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
-            let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
-            assign(lower, part(values, first, count));
-            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, first, count));
-            shift_limits(columns, [n, ld], here, [lower, upper], given);
-        }
-    }
 }
 
 /// The costs of all intervals, and what is left of the equations of lifted stages.
@@ -357,7 +297,7 @@ fn is_direct<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
 }
 
 /// Bounds of what is linear, `lg − g + [C D] v`, where the values `g` are.
-fn shift_limits<T: Real>(
+pub(super) fn shift_limits<T: Real>(
     columns: &[T],
     [n, ld]: [usize; 2],
     v: &[T],
@@ -373,10 +313,14 @@ fn shift_limits<T: Real>(
 
 /// How many numbers `φ` of every interval and `g` of every stage are.
 pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
-    dims.len().saturating_sub(1) * (P::Shape::NX + path_rows::<P, T>()) + P::Terminal::ROWS
+    let path = match dims {
+        [first, .., _] => first.ng,
+        _ => 0,
+    };
+    dims.len().saturating_sub(1) * (P::Shape::NX + path) + P::Terminal::ROWS
 }
 
 /// The distance of stages in vectors `v`.
-const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
+pub(super) const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
     pad::<T>(inputs::<S>(layout.free))
 }

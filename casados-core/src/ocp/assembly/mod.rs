@@ -4,10 +4,15 @@
 pub(in crate::ocp) mod algebraic;
 pub(in crate::ocp) mod convexify;
 pub(in crate::ocp) mod curvature;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod inside;
 pub(in crate::ocp) mod kkt;
 pub(in crate::ocp) mod linearise;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod pieces;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod program;
 pub(in crate::ocp) mod start;
 pub(in crate::ocp) mod transfer;
+pub(in crate::ocp) mod trial;
 pub(in crate::ocp) mod units;

@@ -4,6 +4,7 @@
 use crate::ocp::assembly::algebraic;
 #[cfg(feature = "casadi")]
 use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::assembly::inside::{Costs, Rows};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 #[cfg(feature = "casadi")]
@@ -54,7 +55,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Where algebraic states are those of the iterate: `g` of every stage in `values`, and after
+    /// Where algebraic states and points inside are those of the iterate: `g` of every stage in `values`, and after
     /// [`Ocp::linearise`] the objective without penalties.
     ///
     /// # Errors
@@ -63,16 +64,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout @ Layout { intervals, .. } = self.layout();
         let free = self.free.view();
         let data = split::<P, T>(self.data.as_mut(), layout);
-        let Problem { path, terminal, running, .. } = self.problem.parts();
+        let inner = &mut self.inner;
+        let Problem { stage_cost, path, terminal, running, .. } = self.problem.parts();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
             node.read::<P::Shape>(&mut point, &at, z, free);
-            let values = values.get_mut(k * path_rows::<P, T>()..).unwrap_or_default();
+            let values = values.get_mut(k * path_rows::<P, T>(layout)..).unwrap_or_default();
             let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             if k < intervals {
                 path.value(&point, part_mut(values, 0, P::Path::ROWS), spot)?;
+                if layout.inner > 0 {
+                    let costs = Costs {
+                        cost: &mut *stage_cost,
+                        reference: node.reference,
+                        running: *running,
+                        exact: false,
+                    };
+                    let rows = &mut Rows::values(values, at, k);
+                    let given = (&*data.times, &*data.p);
+                    inner.write_rows::<P>((&mut *path, costs), (z, &[]), given, free, rows)?;
+                }
             } else {
                 terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), spot)?;
             }

@@ -147,6 +147,8 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
             p: structure.p,
             units: F::UNITS,
             duration: None,
+            linear: &[],
+            integrals: 0,
         }
     };
     const IS_FLOW: bool = false;

@@ -92,13 +92,14 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
         let last = nodes.len().wrapping_sub(1);
         let pi = crate::qp::part(nodes.multipliers, last.wrapping_mul(nodes.ld[1]), G::Shape::NX);
         let t = nodes.times.last().copied().unwrap_or(T::ZERO);
+        let is_end = nodes.piece.is_none_or(|[_, end]| end == T::ONE);
         let mut outcome = Ok(());
         // Second derivatives of the dynamics take other multipliers of the end: see there.
         let others = core::mem::take(&mut end.multipliers);
         let inner =
             Nodes { multipliers: if derivatives == 2 { &others } else { nodes.multipliers }, ..*nodes };
         let called = call(dynamics, &inner, &mut |k, step| {
-            if k != last {
+            if k != last || !is_end {
                 return sink(k, step);
             }
             end.evaluate(step, t, derivatives, pi);
@@ -128,6 +129,9 @@ impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for Ret
     fn terms(&self, show: Show<'_>) -> fmt::Result {
         self.dynamics.terms(show)
     }
+    fn has_pieces(&self) -> bool {
+        self.dynamics.has_pieces()
+    }
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.visit(nodes, D::simulate, 0, sink)
     }
@@ -141,6 +145,9 @@ impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for Ret
 
 impl<G: Function<Shape = D::Shape>, D: SecondOrder<T>, T: Real> SecondOrder<T> for ReturnMap<G, D, T> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        if nodes.piece.is_some_and(|[_, end]| end != T::ONE) {
+            return self.dynamics.second_order(nodes, sink);
+        }
         // Where the last interval ends says what its multipliers are.
         self.visit(nodes, D::simulate, 1, &mut |_, _| {})?;
         self.end.pull_back(nodes);

@@ -186,6 +186,11 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
         true
     }
 
+    /// Lifted stages are those of whole intervals.
+    fn has_pieces(&self) -> bool {
+        self.batch.options().newton.fixed_iterations.is_none()
+    }
+
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.each(nodes, [false; 2], |own| &mut own.nominal, &mut |k, result: &Nominal<I::Model, T>| {
             sink(k, &result.into())

@@ -32,6 +32,8 @@ pub(in crate::ocp) const fn names<M: Dae>() -> Names {
         p: structure.p,
         units: M::UNITS,
         duration: M::DURATION,
+        linear: M::LINEAR,
+        integrals: M::INTEGRALS,
     }
 }
 

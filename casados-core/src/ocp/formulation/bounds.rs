@@ -1,11 +1,12 @@
 //! Bounds by name, parameters and references.
 
-use crate::ocp::formulation::check::{Labels, first, range};
+use crate::ocp::formulation::check::{Labels, range};
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::{path_rows, split};
+use crate::ocp::formulation::inside::inner_path_row;
+use crate::ocp::formulation::instance::data::{node_rows, path_rows, split};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
@@ -18,10 +19,11 @@ use core::ops::{Range, RangeBounds};
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Bounds of a general constraint of a stage, as they were given.
     pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
-        let intervals = self.intervals();
-        let rows = intervals * path_rows::<P, T>() + P::Terminal::ROWS;
+        let (intervals, layout) = (self.intervals(), self.layout());
+        let rows = intervals * path_rows::<P, T>(layout) + P::Terminal::ROWS;
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_rows::<P, T>() + row;
+        let begin =
+            (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_rows::<P, T>(layout) + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 
@@ -51,7 +53,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // They are the same at all stages.
         let is_free =
             known.p.iter().enumerate().any(|(p, name_of_p)| self.is_meant_and_free(name, p, name_of_p));
-        if of_states.is_empty() && of_controls.is_empty() && !is_free {
+        let is_algebraic = P::Dynamics::ALGEBRAIC && known.z.iter().any(|variable| means(name, variable));
+        if of_states.is_empty() && of_controls.is_empty() && !is_free && !is_algebraic {
             let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
             return Err(OcpError::UnknownName { name: Text::new(name), known });
         }
@@ -71,18 +74,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) {
         let known = self.names();
         // Of a state that is given there is nothing to be bounded.
-        let first = usize::from(self.initial == Initial::Fixed);
+        let given = match self.initial {
+            Initial::Fixed => known.x.len(),
+            Initial::Partly => known.own_states(),
+            _ => 0,
+        };
+        let integrals = known.x.len() - known.integrals;
         let free = self.free.view();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
-            let mut visit_all = |bounds: &mut BoundsMut<'_, T>, names: &[&str], begin: usize| {
-                let variables = names.iter().enumerate().filter(|(_, variable)| means(name, variable));
-                variables.for_each(|(index, _)| visit(bounds, begin + index));
-            };
-            if k >= first && of_states.contains(&k) {
-                visit_all(&mut stage.x_bounds_mut(), known.x, 0);
+            let is_given = |index: usize| k == 0 && (index < given || index >= integrals);
+            let meant = |(_, variable): &(usize, &&str)| means(name, variable);
+            if of_states.contains(&k) {
+                let states = known.x.iter().enumerate().filter(meant).map(|(index, _)| index);
+                states.filter(|&i| !is_given(i)).for_each(|i| visit(&mut stage.x_bounds_mut(), i));
             }
             if of_controls.contains(&k) {
-                visit_all(&mut stage.u_bounds_mut(), known.u, free.count());
+                let controls = known.u.iter().enumerate().filter(meant);
+                controls.for_each(|(j, _)| visit(&mut stage.u_bounds_mut(), free.count() + j));
             }
             if of_free.contains(&k) {
                 let meant = known.p.iter().enumerate().filter(|(_, variable)| means(name, variable));
@@ -96,33 +104,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
         let known = self.names();
         let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
-        match [known.x, known.u, known.p].map(position) {
+        match [known.x, known.u, known.z, known.p].map(position) {
             [Some(index), ..] => (Labels::states::<P, T>(Part::StateBounds, stage), index),
-            [_, Some(index), _] => (Labels::controls::<P, T>(Part::ControlBounds, stage), index),
+            [_, Some(index), ..] => (Labels::controls::<P, T>(Part::ControlBounds, stage), index),
+            [_, _, Some(index), _] => (Labels::algebraic::<P, T>(Part::AlgebraicBounds, stage), index),
             [.., index] => (Labels::parameters::<P, T>(Part::ParameterBounds, 0), index.unwrap_or(0)),
         }
-    }
-
-    /// Bounds of a state, control or free parameter, or of all of them that a name means (`u` means
-    /// `u[0]`, `u[1]`, …), at some stages: `..` are all of them, the last one has no controls, and
-    /// free parameters are the same at all of them. An infinite bound is none. While the initial
-    /// state is fixed, bounds of states do not touch stage 0.
-    ///
-    /// # Errors
-    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
-    /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]: then no bound is changed.
-    pub fn bound(
-        &mut self,
-        name: &str,
-        stages: impl RangeBounds<usize>,
-        lower: T,
-        upper: T,
-    ) -> Result<&mut Self, OcpError> {
-        let found = self.find(name, &stages)?;
-        let (labels, index) = self.labels(name, first(&stages));
-        labels.check_bounds(index, lower, upper)?;
-        self.each(name, found, |bounds, index| bounds.set(index, lower, upper));
-        Ok(self)
     }
 
     /// Bounds of the path constraints at some stages.
@@ -163,38 +150,54 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
             labels.check_bounds(index, lower, upper)?;
         }
-        let layout = self.layout();
+        let (layout, points) = (self.layout(), self.inner.count());
         let data = split::<P, T>(self.data.as_mut(), layout);
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
-                crate::qp::assign(crate::qp::part_mut(bounds, k * path_rows::<P, T>(), rows), given);
+                let begin = k * path_rows::<P, T>(layout);
+                crate::qp::assign(crate::qp::part_mut(bounds, begin, rows), given);
+                for point in if part == Part::PathBounds { 1..points + 1 } else { 0..0 } {
+                    let row = inner_path_row::<P, T>(0, point);
+                    crate::qp::assign(crate::qp::part_mut(bounds, begin + row, rows), given);
+                }
             }
         }
         Ok(self)
     }
 
-    /// The state at the start.
+    /// The state at the start: without controls that are linear, which are free there, and without
+    /// integrals, which begin at zero.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn fix_initial_state(&mut self, x0: &[T]) -> Result<&mut Self, OcpError> {
-        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
-        self.qp.fix_initial_state(x0)?;
-        self.initial = Initial::Fixed;
+        let known = self.names();
+        let own = known.own_states();
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, own)?;
+        if own == P::Shape::NX {
+            self.qp.fix_initial_state(x0)?;
+        } else if let Some(mut stage) = self.qp.stage_mut(0) {
+            let (infinity, mut bounds) = (T::from_f64(f64::INFINITY), stage.x_bounds_mut());
+            for (i, &value) in x0.iter().enumerate() {
+                bounds.set(i, value, value);
+                bounds.soften(i, infinity, T::ZERO);
+            }
+        }
+        self.initial = if known.linear.is_empty() { Initial::Fixed } else { Initial::Partly };
         Ok(self)
     }
 
     /// The state at the start is free; it may be bounded like any other. If it was fixed, it has no
     /// bounds until it is given new ones.
     pub fn free_initial_state(&mut self) -> &mut Self {
-        let was_fixed = self.initial == Initial::Fixed;
+        let was_fixed = matches!(self.initial, Initial::Fixed | Initial::Partly);
+        let own = self.names().own_states();
         self.initial = Initial::Free;
         let infinity = T::from_f64(f64::INFINITY);
         if was_fixed && let Some(mut stage) = self.qp.stage_mut(0) {
-            let bounds = stage.x_bounds_mut();
-            bounds.lower.fill(-infinity);
-            bounds.upper.fill(infinity);
+            let mut bounds = stage.x_bounds_mut();
+            (0..own).for_each(|i| bounds.set(i, -infinity, infinity));
         }
         self
     }
@@ -306,6 +309,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
         let names = self.names();
         let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
+        let mut point = 0;
         let (part, (name, output)) = match field {
             QpField::StateBounds => (Part::StateBounds, (of(names.x), 0)),
             QpField::ControlBounds => match index.checked_sub(self.free.count()) {
@@ -314,11 +318,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             },
             _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
             _ => match index.checked_sub(P::Path::ROWS) {
+                Some(_) if index >= node_rows::<P, T>() => {
+                    let (row, name) = self.inner.name_of::<P>(index - node_rows::<P, T>());
+                    point = row.point();
+                    (row.part::<P, T>(), name)
+                }
                 Some(copy) => (Part::StateBounds, (self.name_of_free(copy), 0)),
                 None => (Part::PathBounds, P::Path::name(index)),
             },
         };
-        ConstraintName { part, stage, name, output, side }
+        ConstraintName { part, stage, name, output, point, side }
     }
 
     /// The constraint that makes a QP infeasible.
@@ -350,7 +359,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let rows = match field {
             QpField::A | QpField::B | QpField::Q => nx,
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
-            QpField::C | QpField::D => path_rows::<P, T>(),
+            QpField::C | QpField::D => path_rows::<P, T>(self.layout()),
             QpField::R | QpField::S => nu,
             QpField::GradientX | QpField::GradientU => 1,
             _ => return None,
@@ -362,7 +371,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let (of, output) = match field {
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::name(row),
-            QpField::C | QpField::D => P::Path::name(row),
+            QpField::C | QpField::D => {
+                let name = self.name(QpField::GeneralBounds, stage, row, Side::Lower);
+                (name.name, name.output)
+            }
             QpField::A | QpField::B | QpField::Q => (state(row), 0),
             QpField::R | QpField::S => (input(row), 0),
             _ => ("", 0),

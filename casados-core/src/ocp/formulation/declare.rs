@@ -1,15 +1,13 @@
-//! Parameters are made free: the problem gets variables for them.
+//! A problem gets variables for parameters that are found, and rows for points inside of intervals.
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::horizon::{Horizon, limits};
+use crate::ocp::formulation::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::formulation::instance::data::{self, Layout, split};
+use crate::ocp::formulation::instance::data::split;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{
-    Bounds, BoundsMut, Qp, Solution, SolutionStage, SolutionStageMut, StageDims, assign, marked, room, zeros,
-};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use crate::structure::means;
@@ -70,7 +68,13 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         for (parameter, _) in meant() {
             let w = match self.free.view().of(parameter) {
                 Some(w) => w,
-                None => self.add_free(parameter)?,
+                None => {
+                    let mut free = self.free.clone();
+                    let w = free.add(parameter, P::Shape::NP);
+                    let inner = self.inner.clone();
+                    self.rebuild(free, inner, Some(w))?;
+                    w
+                }
             };
             self.write_free(w, guess);
             if let Some(mut stage) = self.qp.stage_mut(0) {
@@ -103,91 +107,107 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         self.check_functions()
     }
 
-    /// Makes room for one more; which one it is.
-    fn add_free(&mut self, parameter: usize) -> Result<usize, OcpError> {
-        let mut free = self.free.clone();
-        let w = free.add(parameter, P::Shape::NP);
-        let (intervals, count) = (self.intervals(), free.count());
-        let mut dims: Vec<StageDims> = Vec::new();
-        room(&mut dims, intervals.saturating_add(1))?;
-        dims.resize(intervals, data::stage::<P, T>(count, false));
-        dims.push(data::stage::<P, T>(count, true));
-        let (mut qp, mut iterate) = (Qp::new(&dims)?, Solution::new(&dims)?);
-        let layout = Layout { intervals, free: count };
-        let mut data = zeros(data::length::<P, T>(layout))?;
-        self.move_qp(&mut qp, w);
-        for (k, stage) in self.iterate.stages().enumerate() {
-            if let Some(to) = iterate.stage_mut(k) {
-                copy_stage(&stage, to, w);
-            }
+    /// Points inside of every interval, as parts of it, at which path constraints hold too, with the
+    /// bounds of the node before: a constraint that holds at nodes alone may be violated between
+    /// them. Bounds of states that are given afterwards hold there too, and those of algebraic
+    /// states.
+    ///
+    /// Intervals are integrated from point to point, each piece by as many steps as the options of
+    /// the integrator say: states there are ends of steps, with exact derivatives of first and
+    /// second order. In a solution and in messages a constraint `Speed` at the part 0.5 is
+    /// `Speed@0.5`.
+    ///
+    /// It is called before bounds are given, and once. Solvers are made afterwards: dimensions
+    /// change.
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidPoint`] where parts do not increase between 0 and 1;
+    /// [`OcpError::Unsupported`] of maps and lifted stages, and where there are bounds of states
+    /// or such points already; [`OcpError::OutOfMemory`].
+    ///
+    /// # Example
+    /// A cart that comes with 1 m/s and stops before 0.3 m: where it turns round is no node.
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// /// Place and speed of a cart that is pushed.
+    /// #[ode]
+    /// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// #[function]
+    /// fn effort(_x: [f64; 2], u: f64) -> f64 { u * u }
+    ///
+    /// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+    ///     .running_cost(GeneralCost::<Effort>::new())
+    ///     .on(Horizon::uniform(2, 1.0))?;
+    /// ocp.inside(&[0.5])?.fix_initial_state(&[0.0, 1.0])?.guess(&[0.0; 2], &[0.0])?;
+    /// ocp.bound("x[0]", .., -1.0, 0.3)?;
+    /// assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// // Half a second after the start it is as far as it may be.
+    /// let solution = ocp.solution()?;
+    /// assert!((solution.inside("x[0]@0.5")?[0] - 0.3).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn inside(&mut self, parts: &[T]) -> Result<&mut Self, OcpError> {
+        self.divide(InnerPoints::with_points(parts)?)
+    }
+
+    /// Holds the controls of every interval over so many pieces of it, as moves are blocked: costs
+    /// and path constraints are those of a finer horizon, whose controls are the same in a block.
+    /// Blocks of different lengths are intervals of different lengths
+    /// ([`Horizon::nodes`](crate::ocp::Horizon::nodes)).
+    ///
+    /// Pieces are of equal length, and points between them as those of [`Ocp::inside`], by which
+    /// they are chosen too; running costs count each piece as long as it is, and a reference is
+    /// that of the interval. The QP has as many stages as there are moves.
+    ///
+    /// # Errors
+    /// As [`Ocp::inside`]; [`OcpError::InvalidOption`] of no pieces at all.
+    ///
+    /// # Example
+    /// Forty pieces, ten moves.
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[ode]
+    /// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+    /// #[function]
+    /// fn price(x: [f64; 2], u: f64) -> f64 { x[0] * x[0] + 0.1 * u * u }
+    ///
+    /// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+    ///     .running_cost(GeneralCost::<Price>::new())
+    ///     .on(Horizon::uniform(10, 0.2))?;
+    /// ocp.hold(4)?.fix_initial_state(&[1.0, 0.0])?.guess(&[0.0; 2], &[0.0])?;
+    /// ocp.bound("x[1]", .., -0.8, 0.8)?; // at all ends of pieces
+    /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// assert_eq!(ocp.solution()?.inside("x[1]@0.75")?.len(), 10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn hold(&mut self, pieces: usize) -> Result<&mut Self, OcpError> {
+        if pieces == 0 {
+            return Err(OcpError::InvalidOption { name: "pieces", value: 0.0, allowed: "from 1 on" });
         }
-        let old_layout = self.layout();
-        let (to, from) = (split::<P, T>(&mut data, layout), split::<P, T>(&mut self.data, old_layout));
-        for (to, from) in [
-            (to.times, from.times),
-            (to.p, from.p),
-            (to.references, from.references),
-            (to.lower, from.lower),
-            (to.upper, from.upper),
-            (to.arrival, from.arrival),
-        ] {
-            assign(to, from);
+        let parts: Vec<T> = (1..pieces).map(|j| T::from_whole(j) / T::from_whole(pieces)).collect();
+        self.divide(InnerPoints::with_points(&parts)?.with_costs())
+    }
+
+    /// Gives intervals these points.
+    fn divide(&mut self, inner: InnerPoints<T>) -> Result<&mut Self, OcpError> {
+        let intervals = self.intervals();
+        let is_bounded = |k: usize| {
+            let first = self.qp.view().stage(k).map(|stage| stage.x_bounds());
+            first.is_some_and(|x| x.lower.iter().chain(x.upper).any(|bound| bound.is_finite()))
+        };
+        if (1..intervals).any(is_bounded) || self.layout().inner > 0 || self.inner.count() > 0 {
+            let what = "points inside of intervals behind bounds of states: call `inside` first, and once";
+            return Err(OcpError::Unsupported { what });
         }
-        (self.qp, self.iterate, self.data, self.free) = (qp, iterate, data, free);
-        self.has_algebraic = false;
-        Ok(w)
-    }
-
-    /// Bounds and couplings, with one more variable in front of the controls from `w` on.
-    fn move_qp(&self, to: &mut Qp<T, Vec<StageDims>, Vec<T>>, w: usize) {
-        let view = self.qp.view();
-        for (from, mut to) in view.stages().zip(to.stages_mut()) {
-            copy_bounds(&from.x_bounds(), to.x_bounds_mut(), usize::MAX);
-            copy_bounds(&from.u_bounds(), to.u_bounds_mut(), w);
-            copy_bounds(&from.g_bounds(), to.g_bounds_mut(), usize::MAX);
+        if inner.count() > 0 {
+            check_pieces::<P::Dynamics, T>(&self.problem.parts().dynamics)?;
+            let free = self.free.clone();
+            self.rebuild(free, inner, None)?;
         }
-        marked(view.periodic()).for_each(|i| {
-            to.make_periodic(i);
-        });
-        marked(view.shared()).map(|j| if j < w { j } else { j + 1 }).for_each(|j| {
-            to.share(j);
-        });
-        to.share(w);
-    }
-}
-
-/// Copies a list to one with another element at `gap`.
-fn copy<T: Real>(from: &[T], to: &mut [T], gap: usize) {
-    let (before, behind) = from.split_at(gap.min(from.len()));
-    assign(to, before);
-    assign(to.get_mut(gap.saturating_add(1)..).unwrap_or_default(), behind);
-}
-
-fn copy_bounds<T: Real>(from: &Bounds<'_, T>, to: BoundsMut<'_, T>, gap: usize) {
-    for (from, to) in [
-        (from.lower, to.lower),
-        (from.upper, to.upper),
-        (from.lower_linear, to.lower_linear),
-        (from.lower_quadratic, to.lower_quadratic),
-        (from.upper_linear, to.upper_linear),
-        (from.upper_quadratic, to.upper_quadratic),
-    ] {
-        copy(from, to, gap);
-    }
-}
-
-fn copy_stage<T: Real>(from: &SolutionStage<'_, T>, to: SolutionStageMut<'_, T>, gap: usize) {
-    for (from, to) in [(from.u, to.u), (from.u_lower, to.u_lower), (from.u_upper, to.u_upper)] {
-        copy(from, to, gap);
-    }
-    for (from, to) in [
-        (from.x, to.x),
-        (from.dynamics, to.dynamics),
-        (from.x_lower, to.x_lower),
-        (from.x_upper, to.x_upper),
-        (from.g_lower, to.g_lower),
-        (from.g_upper, to.g_upper),
-    ] {
-        assign(to, from);
+        Ok(self)
     }
 }

@@ -141,6 +141,12 @@ impl Free<'_> {
         }
     }
 
+    /// Which parameter of the model one is; none of copies of elements of the first state.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn parameter(self, index: usize) -> Option<usize> {
+        self.places.iter().position(|&place| place as usize == index)
+    }
+
     /// Writes free parameters over those that were set.
     #[inline(always)]
     pub(in crate::ocp) fn write<T: Real>(self, p: &mut [T], w: &[T]) {

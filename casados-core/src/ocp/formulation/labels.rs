@@ -5,10 +5,20 @@ use crate::ocp::formulation::error::Part;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::inside::InnerRow;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
+#[cfg(feature = "alloc")]
+use crate::qp::StageDims;
 use crate::scalar::Real;
 use crate::shape::Shape;
+#[cfg(feature = "alloc")]
+use alloc::format;
+#[cfg(feature = "alloc")]
+use alloc::string::{String, ToString};
 use core::fmt;
 
 const fn names<P: Formulation<T>, T: Real>() -> Names {
@@ -59,6 +69,10 @@ impl Labels {
     pub fn controls<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| listed(names::<P, T>().u, index) }
     }
+    /// Of algebraic states.
+    pub fn algebraic<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
+        Self { part, stage, name: |index| listed(names::<P, T>().z, index) }
+    }
     /// Of parameters.
     pub fn parameters<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         Self { part, stage, name: |index| listed(names::<P, T>().p, index) }
@@ -72,5 +86,29 @@ impl Labels {
     pub fn references<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
         let name = if part == Part::TerminalReference { P::TerminalCost::name } else { P::StageCost::name };
         Self { part, stage, name }
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// What a row behind those of path constraints at nodes is called, with its place, and its
+    /// unit.
+    pub(in crate::ocp) fn inside_name(&self, index: usize) -> (String, &'static str) {
+        let units = <P::Dynamics as Dynamics<T>>::NAMES.units;
+        let of = |units: &'static [&'static str], index: usize| units.get(index).copied().unwrap_or_default();
+        let (row, (name, _)) = self.inner.name_of::<P>(index);
+        let (name, unit) = match row {
+            InnerRow::Path { row, .. } => {
+                (output::<P::Path, P::Shape, T>(row).to_string(), P::Path::unit(row))
+            }
+            InnerRow::Variable { variable, .. } => match variable.checked_sub(P::Shape::NX) {
+                None => (name.to_string(), of(units.x, variable)),
+                Some(z) => (name.to_string(), of(units.z, z)),
+            },
+        };
+        match row.point() {
+            0 => (name, unit),
+            point => (format!("{name}@{}", self.inner.part(point).to_f64()), unit),
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
 //! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
 //! | `instance/` | a problem on a horizon, with memory |
-//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them |
+//! | `free`, `inside`, `declare` | parameters and end times that are found, points inside of intervals, and how a problem gets them |
 //! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | refusals by name |
 //! | `print` | a problem as mathematics |
@@ -20,8 +20,10 @@ pub(in crate::ocp) mod error;
 pub(in crate::ocp) mod free;
 pub(in crate::ocp) mod functions;
 pub(in crate::ocp) mod horizon;
+pub(in crate::ocp) mod inside;
 pub(in crate::ocp) mod instance;
 pub(in crate::ocp) mod labels;
+pub(in crate::ocp) mod limit;
 pub(in crate::ocp) mod names;
 pub(in crate::ocp) mod print;
 pub(in crate::ocp) mod problem;

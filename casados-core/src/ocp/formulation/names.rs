@@ -36,4 +36,28 @@ pub struct Names {
     pub units: Units,
     /// Which parameter the time of the model is a multiple of, if one is: `#[ode(duration = p)]`.
     pub duration: Option<usize>,
+    /// Which controls are rates of linear ones, which are states behind those of the model.
+    pub linear: &'static [u32],
+    /// How many integrals are the last states.
+    pub integrals: usize,
+}
+
+impl Names {
+    /// How many states the model has without linear controls and integrals.
+    pub(in crate::ocp) const fn own_states(&self) -> usize {
+        self.x.len() - self.linear.len() - self.integrals
+    }
+
+    /// What a control is called, of a rate the control that has it.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn control(&self, control: usize) -> &'static str {
+        let state = self.linear_state(control).and_then(|state| self.x.get(state));
+        state.or(self.u.get(control)).copied().unwrap_or("")
+    }
+
+    /// The state that a linear control is.
+    pub(in crate::ocp) fn linear_state(&self, control: usize) -> Option<usize> {
+        let place = self.linear.iter().position(|&linear| linear as usize == control)?;
+        Some(self.own_states() + place)
+    }
 }

@@ -3,6 +3,8 @@
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::instance::data::node_rows;
 use crate::ocp::formulation::instance::data::{bounds, path_rows};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::labels::output;
@@ -131,7 +133,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     fn variables(&self, f: &mut Formatter<'_>, names: &Names) -> fmt::Result {
         f.write_str("  over   ")?;
-        let kinds = [("state", names.x), ("control", names.u)];
+        let (own, more) = names.x.split_at(names.own_states());
+        let (linear, integrals) = more.split_at(names.linear.len());
+        let kinds =
+            [("state", own), ("linear control", linear), ("integral", integrals), ("control", names.u)];
         for (i, (kind, names)) in kinds.into_iter().filter(|(_, names)| !names.is_empty()).enumerate() {
             let separator = if i == 0 { "" } else { "; " };
             let plural = if names.len() == 1 { "" } else { "s" };
@@ -172,9 +177,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         // Bounds in the QP are those of what is linear.
-        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), self.layout());
+        let layout = self.layout();
+        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), layout);
         let constraint = |k: usize, row: usize| {
-            let place = k * path_rows::<P, T>() + row;
+            let place = k * path_rows::<P, T>(layout) + row;
             let [lower, upper] = [lower, upper].map(|bounds| get(bounds, place).to_f64());
             let of = |stage: Stage<'_, T>| Sides { lower, upper, ..Sides::of(&stage.g_bounds(), row) };
             view.stage(k).map_or(Sides::NONE, of)
@@ -182,6 +188,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for row in 0..P::Path::ROWS {
             let name = output::<P::Path, P::Shape, T>(row);
             runs(f, &name, 0..intervals, count, |k| constraint(k, row))?;
+        }
+        #[cfg(feature = "alloc")]
+        for index in 0..layout.inner {
+            let name = self.inside_name(index).0;
+            runs(f, &name, 0..intervals, count, |k| constraint(k, node_rows::<P, T>() + index))?;
         }
         for row in 0..P::Terminal::ROWS {
             let name = output::<P::Terminal, P::Shape, T>(row);

@@ -3,9 +3,11 @@
 use crate::ocp::formulation::check::{Labels, first, range};
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::inside::inner_path_row;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::limit::rows_of;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{Side, StageDims};
@@ -97,7 +99,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         penalty: [T; 2],
     ) -> Result<&mut Self, OcpError> {
         let known = self.names();
-        let is_variable = known.x.iter().chain(known.u).any(|variable| means(name, variable));
+        let is_variable = known.x.iter().chain(known.u).chain(known.z).any(|variable| means(name, variable));
         let is_path = (0..P::Path::ROWS).any(|row| output::<P::Path, _, T>(row).is_meant(name));
         let is_terminal = (0..P::Terminal::ROWS).any(|row| output::<P::Terminal, _, T>(row).is_meant(name));
         let end = if !is_variable && (is_path || is_terminal) {
@@ -122,17 +124,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let found = self.find(name, stages)?;
         let (labels, index) = self.labels(name, first(stages));
         labels.check_penalty(index, linear, quadratic)?;
-        let mut is_bounded = false;
+        let of_rows = self.find_inside(name, stages, &found)?;
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
+        let rows: &dyn Fn() -> _ = &|| rows_of::<P, T>(&self.inner, name);
+        let place = |k: usize, row: usize| k * path_rows::<P, T>(layout) + row;
+        let given = |side: &Side| if *side == Side::Lower { &*data.lower } else { &*data.upper };
+        let mut is_bounded = of_rows
+            .clone()
+            .any(|k| rows().any(|row| sides.iter().any(|side| get(given(side), place(k, row)).is_finite())));
         self.each(name, found.clone(), |bounds, index| {
             let of = |&side: &Side| if side == Side::Lower { &*bounds.lower } else { &*bounds.upper };
             is_bounded |= sides.iter().map(of).any(|list| get(list, index).is_finite());
         });
         if !is_bounded {
-            return Ok(found.iter().map(|range| range.end).max());
+            return Ok(found.iter().chain([&of_rows]).map(|range| range.end).max());
         }
         self.each(name, found, |bounds, index| {
             sides.iter().for_each(|&side| bounds.soften_side(index, side, linear, quadratic));
         });
+        for (_, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| of_rows.contains(k)) {
+            for row in rows_of::<P, T>(&self.inner, name) {
+                sides.iter().for_each(|&side| stage.g_bounds_mut().soften_side(row, side, linear, quadratic));
+            }
+        }
         Ok(None)
     }
 
@@ -154,20 +169,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         let labels = Labels::constraints::<P, T>(part, range.start);
         labels.check_penalty(row.unwrap_or(0), linear, quadratic)?;
-        let layout = self.layout();
+        let (layout, points) = (self.layout(), self.inner.count());
         let data = split::<P, T>(self.data.as_mut(), layout);
         let rows = |k: usize| {
             let count = if k == last { P::Terminal::ROWS } else { P::Path::ROWS };
-            (0..count).filter(move |&row| match k == last {
+            let points = if k == last { 0 } else { points };
+            let meant = (0..count).filter(move |&row| match k == last {
                 true => output::<P::Terminal, _, T>(row).is_meant(name),
                 false => output::<P::Path, _, T>(row).is_meant(name),
-            })
+            });
+            // At the node, and at every point.
+            let at = move |row: usize| (1..=points).map(move |point| inner_path_row::<P, T>(row, point));
+            meant.flat_map(move |row| core::iter::once(row).chain(at(row)))
         };
         let has_bound = |place: usize| {
             let of = |&side: &Side| if side == Side::Lower { &*data.lower } else { &*data.upper };
             sides.iter().map(of).any(|list| get(list, place).is_finite())
         };
-        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * path_rows::<P, T>() + row))) {
+        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * path_rows::<P, T>(layout) + row))) {
             return Ok(Some(range.end));
         }
         for (k, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| range.contains(k)) {

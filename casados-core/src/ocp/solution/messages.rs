@@ -9,7 +9,10 @@ const ELSEWHERE: &str = "another guess, or bounds that keep away from there, may
 
 impl Part {
     fn is_bound(self) -> bool {
-        let of_variables = matches!(self, Self::StateBounds | Self::ControlBounds | Self::ParameterBounds);
+        let of_variables = matches!(
+            self,
+            Self::StateBounds | Self::ControlBounds | Self::ParameterBounds | Self::AlgebraicBounds
+        );
         of_variables || matches!(self, Self::PathBounds | Self::TerminalBounds)
     }
     fn verb(self) -> &'static str {
@@ -35,6 +38,7 @@ impl fmt::Display for Part {
             Self::ParameterBounds => "the ranges of free parameters",
             Self::StateBounds => "the bounds of the states",
             Self::ControlBounds => "the bounds of the controls",
+            Self::AlgebraicBounds => "the bounds of the algebraic states",
             Self::PathBounds => "the bounds of the path constraints",
             Self::TerminalBounds => "the bounds of the terminal constraints",
             Self::Penalty => "the penalties",
@@ -57,7 +61,11 @@ impl fmt::Display for ConstraintName {
         if self.part == Part::ParameterBounds {
             return Ok(());
         }
-        write!(f, " at stage {}", self.stage)
+        if self.point > 0 {
+            write!(f, " at point {} inside of interval {}", self.point, self.stage)
+        } else {
+            write!(f, " at stage {}", self.stage)
+        }
     }
 }
 
@@ -208,6 +216,11 @@ impl fmt::Display for OcpError {
                 f,
                 "the end time is free, and `{function}` depends on the time: say which parameter is the duration, \
                  as in `#[function(duration = p.duration)]`"
+            ),
+            Self::InvalidPoint { index, value } => write!(
+                f,
+                "the point {index} inside of intervals is at {value}: points are parts of an interval that \
+                 increase, between 0 and 1"
             ),
             Self::UnknownParameter { name, known } => {
                 write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;

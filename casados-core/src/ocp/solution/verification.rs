@@ -208,7 +208,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 path.value(&inside.point, &mut inside.g, Spot::new(k, free, &[]))?;
                 let states = next.map(|(next, _)| [stage.x_bounds(), next.x_bounds()]);
                 inside.states(x.as_slice(), states, time);
-                let rows = |limits: &[T]| part(limits, k * path_rows::<P, T>(), P::Path::ROWS).to_vec();
+                let rows = |limits: &[T]| part(limits, k * path_rows::<P, T>(layout), P::Path::ROWS).to_vec();
                 inside.constraints([rows(data.lower), rows(data.upper)], time);
             }
             for (i, &end) in x.as_slice().iter().enumerate() {

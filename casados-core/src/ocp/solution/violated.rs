@@ -3,7 +3,7 @@
 use crate::ocp::formulation::error::ConstraintName;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::{path_rows, split};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
@@ -38,22 +38,22 @@ impl Largest {
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The hard bound that the iterate violates most; none where functions have no value.
     pub(super) fn most_violated(&mut self) -> Option<(ConstraintName, f64)> {
-        let intervals = self.intervals();
-        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let (intervals, layout) = (self.intervals(), self.layout());
+        let path = path_rows::<P, T>(layout);
+        let rows = intervals * path + P::Terminal::ROWS;
         let mut values = zeros::<T>(rows).ok()?;
         if rows > 0 {
-            if P::Shape::NZ > 0 && P::Dynamics::ALGEBRAIC {
+            if P::Shape::NZ > 0 && P::Dynamics::ALGEBRAIC || self.inner.count() > 0 {
                 self.find_algebraic().ok()?;
             }
             self.constraints(&mut values).ok()?;
         }
-        let is_given = self.initial == Initial::Fixed;
-        let layout = self.layout();
+        let is_given = matches!(self.initial, Initial::Fixed | Initial::Partly);
         let data = split::<P, T>(self.data.as_mut(), layout);
         let mut largest = Largest { amount: 0.0, place: None };
         for (k, (stage, at)) in self.qp.view().stages().zip(self.iterate.stages()).enumerate() {
-            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
-            let of_stage = |list| part(list, k * P::Path::ROWS, count);
+            let count = if k < intervals { path } else { P::Terminal::ROWS };
+            let of_stage = |list| part(list, k * path, count);
             let [g, lower, upper] = [&values, &*data.lower, &*data.upper].map(of_stage);
             let (x, u, limits) = (stage.x_bounds(), stage.u_bounds(), stage.g_bounds());
             let states = (QpField::StateBounds, at.x, x.lower, x.upper, x);

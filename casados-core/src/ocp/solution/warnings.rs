@@ -8,6 +8,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{Bounds, Places, QpField, Side, part};
 use crate::scalar::Real;
+use crate::shape::Shape;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -62,6 +63,16 @@ pub enum Warning {
         /// By how much it is violated.
         violation: f64,
     },
+    /// A bound at the end of the horizon does not hold where the linearisation at the guess ends,
+    /// and no control, free start or free parameter changes that: no step leads there.
+    UnreachableEnd {
+        /// The bound.
+        bound: ConstraintName,
+        /// Where the linearisation ends.
+        value: f64,
+        /// The value of the bound.
+        limit: f64,
+    },
     /// Sizes of two variables, by guesses and bounds, differ by more than 1e8: other units may
     /// help.
     FarUnits {
@@ -83,6 +94,11 @@ impl fmt::Display for Warning {
                 "{constraint} is violated by {violation:.1e} at the guess, where its gradient is zero: take a guess \
                  beside this one"
             ),
+            Self::UnreachableEnd { bound, value, limit } => write!(
+                f,
+                "{bound} is {limit:e}, the linearisation at the guess ends at {value:e}, and no control, free start or \
+                 free parameter changes that: take another guess, or see what moves it"
+            ),
             Self::FarUnits { small: (small, size), large: (large, other) } => write!(
                 f,
                 "`{small}` has the size {size:.0e} and `{large}` {other:.0e}, by guesses and bounds: other units may \
@@ -94,8 +110,8 @@ impl fmt::Display for Warning {
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// What may be a mistake: guesses outside of their bounds, by name; constraints that are
-    /// violated at the guess and whose gradient is zero there; sizes of variables that differ by
-    /// more than 1e8. It writes the QP at the iterate.
+    /// violated at the guess and whose gradient is zero there; ends that its linearisation cannot
+    /// reach; sizes of variables that differ by more than 1e8. It writes the QP at the iterate.
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise)
@@ -104,6 +120,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let mut found = Vec::new();
         self.guesses_outside(&mut found);
         self.vanishing_gradients(&mut found);
+        self.unreachable_ends(&mut found);
         self.far_units(&mut found);
         Ok(found)
     }
@@ -112,7 +129,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     fn guesses_outside(&self, found: &mut Vec<Warning>) {
         // Beyond it by most: of every variable, by where it is in a stage.
         let mut worst: Vec<(QpField, usize, f64, Warning)> = Vec::new();
-        let given = usize::from(self.initial == Initial::Fixed);
+        let given = usize::from(matches!(self.initial, Initial::Fixed | Initial::Partly));
         for (stage, (view, point)) in self.qp().stages().zip(self.iterate().stages()).enumerate() {
             let states = (QpField::StateBounds, point.x, view.x_bounds());
             let controls = (QpField::ControlBounds, point.u, view.u_bounds());
@@ -168,6 +185,90 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 }
             }
         }
+    }
+
+    /// A warning for each bound of the last stage, of states and of terminal constraints.
+    fn unreachable_ends(&self, found: &mut Vec<Warning>) {
+        let (qp, last, nx) = (self.qp(), self.intervals(), P::Shape::NX);
+        let Some(stage) = qp.stage(last) else { return };
+        let view = stage.arrays();
+        let (states, rows) = (stage.x_bounds(), stage.g_bounds());
+        let mut end: Vec<T> = Vec::new();
+        let of_states = (0..nx).map(|i| (QpField::StateBounds, i, &states));
+        let of_rows = (0..rows.lower.len()).map(|i| (QpField::GeneralBounds, i, &rows));
+        for (field, index, bounds) in of_states.chain(of_rows) {
+            let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, index));
+            let [soft_below, soft_above] =
+                [bounds.lower_linear, bounds.upper_linear].map(|list| get(list, index).is_finite());
+            end.clear();
+            if field == QpField::StateBounds {
+                end.extend((0..view.n).map(|i| if i == index { T::ONE } else { T::ZERO }));
+            } else {
+                end.extend(part(view.matrix, (view.next + index) * view.ld, view.n));
+            }
+            if !(lower.is_finite() || upper.is_finite()) {
+                continue;
+            }
+            let Some(value) = self.only_end(&end) else { continue };
+            let (side, limit, soft) = if value < lower {
+                (Side::Lower, lower, soft_below)
+            } else {
+                (Side::Upper, upper, soft_above)
+            };
+            let beyond = if side == Side::Lower { lower - value } else { value - upper };
+            let size = limit.abs().max(T::ONE);
+            if !soft && beyond > T::from_f64(VANISHING_GRADIENT) * size {
+                let bound = self.name(field, last, index, side);
+                let (value, limit) = (value.to_f64(), limit.to_f64());
+                found.push(Warning::UnreachableEnd { bound, value, limit });
+            }
+        }
+    }
+
+    /// A linear function of the last stage at all ends that the linearisation has, if it has one
+    /// alone.
+    fn only_end(&self, end: &[T]) -> Option<T> {
+        let (qp, nx) = (self.qp(), P::Shape::NX);
+        let (of_states, of_others) = end.split_at_checked(nx)?;
+        let least = T::from_f64(VANISHING_GRADIENT);
+        let is_zero = |slopes: &[T], size: T| slopes.iter().all(|slope| slope.abs() <= least * size);
+        let largest = |list: &[T]| list.iter().fold(T::ZERO, |largest, value| largest.max(value.abs()));
+        let mut slopes = of_states.to_vec();
+        let mut value = T::ZERO;
+        if !is_zero(of_others, largest(&slopes)) {
+            return None;
+        }
+        let stages: Vec<_> = qp.stages().take(self.intervals()).collect();
+        for (k, stage) in stages.iter().enumerate().rev() {
+            let (view, bounds) = (stage.arrays(), stage.u_bounds());
+            let size = largest(&slopes);
+            value = value + dot(&slopes, part(view.offset, 0, nx));
+            let mut before: Vec<T> = (0..view.n).map(|_| T::ZERO).collect();
+            for (row, &slope) in view.matrix.chunks_exact(view.ld.max(1)).zip(&slopes) {
+                before.iter_mut().zip(row).for_each(|(to, &by)| *to = *to + slope * by);
+            }
+            for (j, &by) in before.iter().skip(nx).enumerate() {
+                // A control that is given is no way out.
+                let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, j));
+                if by.abs() > least * size && lower < upper {
+                    return None;
+                }
+                value = value + if lower < upper { T::ZERO } else { by * lower };
+            }
+            before.truncate(nx);
+            slopes = before;
+            if k == 0 {
+                let bounds = stage.x_bounds();
+                for (i, &by) in slopes.iter().enumerate() {
+                    let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, i));
+                    if by.abs() > least * size && lower < upper {
+                        return None;
+                    }
+                    value = value + if lower < upper { T::ZERO } else { by * lower };
+                }
+            }
+        }
+        Some(value)
     }
 
     /// A warning of the smallest and the largest variable.

@@ -161,6 +161,8 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
         samplings: Vec::new(),
         reduction: None,
         duration: None,
+        extra: crate::language::Extra::default(),
+        is_model: false,
         graph: model.graph.clone(),
         residual: outputs,
         spans,

@@ -52,6 +52,8 @@ pub fn of(invariants: &Model) -> Model {
         samplings: Vec::new(),
         reduction: None,
         duration: None,
+        extra: crate::language::Extra::default(),
+        is_model: false,
         graph,
         residual,
         spans: Vec::new(),

@@ -2,6 +2,7 @@
 
 mod branches;
 mod duration;
+mod extension;
 mod index;
 mod kinematic;
 mod reduction;
@@ -28,6 +29,8 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         samplings: Vec::new(),
         reduction: None,
         duration: None,
+        extra: crate::language::Extra::default(),
+        is_model: false,
         spans: vec![Span::call_site(); residual.len()],
         graph,
         residual,

@@ -9,4 +9,5 @@ pub(in crate::ocp) mod fits;
 pub(in crate::ocp) mod least_squares;
 pub(in crate::ocp) mod pattern;
 pub(in crate::ocp) mod point;
+pub(in crate::ocp) mod result;
 pub(in crate::ocp) mod weights;

@@ -42,6 +42,17 @@ pub(crate) struct Layout {
     pub intervals: usize,
     /// How many [free parameters](super::super::free) there are.
     pub free: usize,
+    /// Rows of every stage but the last for [points inside](super::super::inside) of intervals.
+    pub inner: usize,
+    /// Whether algebraic states have bounds at nodes.
+    pub bounds_algebraic: bool,
+}
+
+impl Layout {
+    /// Of a problem without points inside of intervals.
+    pub const fn new(intervals: usize, free: usize) -> Self {
+        Self { intervals, free, inner: 0, bounds_algebraic: false }
+    }
 }
 
 /// `NX + NU`, and the free parameters between these.
@@ -54,17 +65,25 @@ pub(in crate::ocp) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
-/// Rows of the path constraints, and of what links copies of elements of the first state to it.
-pub(in crate::ocp) const fn path_rows<P: Formulation<T>, T: Real>() -> usize {
+/// Rows of the path constraints at nodes, and of what links copies of elements of the first state
+/// to it.
+pub(in crate::ocp) const fn node_rows<P: Formulation<T>, T: Real>() -> usize {
     P::Path::ROWS + P::Terminal::STARTS
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(Layout { intervals, free }: Layout) -> [usize; 10] {
+/// All rows of a stage but the last.
+pub(in crate::ocp) const fn path_rows<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
+    node_rows::<P, T>() + layout.inner
+}
+
+const fn lengths<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
+    let Layout { intervals, free, bounds_algebraic, .. } = layout;
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-    let path = path_rows::<P, T>();
+    let path = path_rows::<P, T>(layout);
     let rows = intervals * path + P::Terminal::ROWS;
     let n = inputs::<P::Shape>(free);
-    let constraints = if path > P::Terminal::ROWS { path } else { P::Terminal::ROWS };
+    let at_node = node_rows::<P, T>();
+    let constraints = if at_node > P::Terminal::ROWS { at_node } else { P::Terminal::ROWS };
     [
         intervals + 1,
         (intervals + 1) * P::Shape::NP,
@@ -72,7 +91,7 @@ const fn lengths<P: Formulation<T>, T: Real>(Layout { intervals, free }: Layout)
         rows,
         rows,
         intervals * kept::<P::Shape>(free),
-        if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
+        if is_algebraic::<P, T>() || bounds_algebraic { intervals * P::Shape::NZ } else { 0 },
         extended::<P::Shape>(free, constraints),
         scratch::<T>(n, P::Shape::NZ),
         P::Shape::NX * (P::Shape::NX + 1),
@@ -164,11 +183,11 @@ impl<'a, T: Real> Node<'a, T> {
 }
 
 /// The dimensions of a stage.
-pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(free: usize, last: bool) -> StageDims {
+pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(layout: Layout, last: bool) -> StageDims {
     if last {
-        StageDims::new(P::Shape::NX, free, P::Terminal::ROWS)
+        StageDims::new(P::Shape::NX, layout.free, P::Terminal::ROWS)
     } else {
-        StageDims::new(P::Shape::NX, free + P::Shape::NU, path_rows::<P, T>())
+        StageDims::new(P::Shape::NX, layout.free + P::Shape::NU, path_rows::<P, T>(layout))
     }
 }
 

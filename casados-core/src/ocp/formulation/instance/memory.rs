@@ -33,14 +33,14 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
-        let (intervals, free) = (horizon.intervals(), H::STARTS);
+        let layout = Layout::new(horizon.intervals(), H::STARTS);
         let mut dims = Vec::new();
-        room(&mut dims, intervals.saturating_add(1))?;
-        dims.resize(intervals, data::stage::<Self, T>(free, false));
-        dims.push(data::stage::<Self, T>(free, true));
+        room(&mut dims, layout.intervals.saturating_add(1))?;
+        dims.resize(layout.intervals, data::stage::<Self, T>(layout, false));
+        dims.push(data::stage::<Self, T>(layout, true));
         let qp = Qp::new(&dims)?;
         let iterate = Solution::new(&dims)?;
-        let length = data::length::<Self, T>(Layout { intervals, free });
+        let length = data::length::<Self, T>(layout);
         let mut ocp = Ocp::build(self, horizon, qp, iterate, zeros(length)?)?;
         ocp.free_end(&horizon)?;
         Ok(ocp)
@@ -52,9 +52,10 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        let mut dims = [data::stage::<Self, T>(0, false); STAGES];
+        let layout = Layout::new(STAGES.saturating_sub(1), 0);
+        let mut dims = [data::stage::<Self, T>(layout, false); STAGES];
         if let Some(last) = dims.last_mut() {
-            *last = data::stage::<Self, T>(0, true);
+            *last = data::stage::<Self, T>(layout, true);
         }
         dims
     }
@@ -65,9 +66,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     where
         Self: Formulation<T>,
     {
-        Qp::<T, (), ()>::memory(dims).saturating_add(Solution::<T, (), ()>::memory(dims)).saturating_add(
-            data::length::<Self, T>(Layout { intervals: dims.len().saturating_sub(1), free: 0 }),
-        )
+        Qp::<T, (), ()>::memory(dims)
+            .saturating_add(Solution::<T, (), ()>::memory(dims))
+            .saturating_add(data::length::<Self, T>(Layout::new(dims.len().saturating_sub(1), 0)))
     }
 
     /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
@@ -102,7 +103,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
             return Err(OcpError::Length { part, stage: 0, expected, found: dims.len() });
         }
         for (stage, &dims) in dims.iter().enumerate() {
-            let given = data::stage::<Self, T>(0, stage == intervals);
+            let given = data::stage::<Self, T>(Layout::new(intervals, 0), stage == intervals);
             for (expected, found) in [(given.nx, dims.nx), (given.nu, dims.nu), (given.ng, dims.ng)] {
                 if expected != found {
                     return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });
@@ -117,5 +118,41 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         let (iterate, rest) =
             rest.split_at_mut_checked(Solution::<T, (), ()>::memory(dims)).unwrap_or_default();
         Ocp::build(self, horizon, Qp::in_memory(dims, qp)?, Solution::in_memory(dims, iterate)?, rest)
+    }
+}
+
+/// Memory that can be had anew: that on the heap.
+pub trait Renewable<V>: AsRef<[V]> + Sized {
+    /// As many elements, copies of the last one behind those that are given.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] of given memory.
+    #[doc(hidden)]
+    fn renew(first: &[V], length: usize) -> Result<Self, OcpError>;
+}
+
+#[cfg(feature = "alloc")]
+impl<V: Copy + Default> Renewable<V> for Vec<V> {
+    fn renew(first: &[V], length: usize) -> Result<Self, OcpError> {
+        let mut list = Vec::new();
+        room(&mut list, length)?;
+        list.extend_from_slice(first);
+        list.resize(length, V::default());
+        Ok(list)
+    }
+}
+
+const GIVEN: OcpError =
+    OcpError::Unsupported { what: "bounds of algebraic states in given memory: take `Problem::on`" };
+
+impl<V> Renewable<V> for &[V] {
+    fn renew(_: &[V], _: usize) -> Result<Self, OcpError> {
+        Err(GIVEN)
+    }
+}
+
+impl<V> Renewable<V> for &mut [V] {
+    fn renew(_: &[V], _: usize) -> Result<Self, OcpError> {
+        Err(GIVEN)
     }
 }

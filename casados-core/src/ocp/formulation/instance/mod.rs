@@ -2,7 +2,9 @@
 
 mod check;
 pub(in crate::ocp) mod data;
-mod memory;
+pub(in crate::ocp) mod memory;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod rebuild;
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
@@ -13,8 +15,10 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::horizon::Horizon;
+use crate::ocp::formulation::inside::InnerPoints;
 use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::element::set;
 use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -27,6 +31,8 @@ pub(in crate::ocp) enum Initial {
     /// Nothing was said.
     Unknown,
     Fixed,
+    /// Given, but for controls that are linear.
+    Partly,
     Free,
 }
 
@@ -86,6 +92,7 @@ pub struct Ocp<P, T, D, M> {
     /// the largest.
     pub(in crate::ocp) stages: [T; 2],
     pub(in crate::ocp) free: FreeParameters,
+    pub(in crate::ocp) inner: InnerPoints<T>,
     /// See [`Nodes`].
     pub(in crate::ocp) step_length: Option<T>,
     /// Whether algebraic states of the last evaluation are those of the iterate.
@@ -148,21 +155,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         terminal_cost.check(at_end)?;
         path.check(inside)?;
         terminal.check(at_end)?;
-        let Data { times, p, lower, upper, references, .. } =
-            split::<P, T>(data.as_mut(), Layout { intervals, free: P::Terminal::STARTS });
+        let layout = Layout::new(intervals, P::Terminal::STARTS);
+        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), layout);
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.
         p.fill(T::from_f64(f64::NAN));
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let (begin, starts) = (k * path_rows::<P, T>(), P::Path::ROWS);
+            let (begin, starts) = (k * path_rows::<P, T>(layout), P::Path::ROWS);
             let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
-            if k < intervals && starts < path_rows::<P, T>() {
+            if k < intervals && starts < path_rows::<P, T>(layout) {
                 // Copies of the first state are equal to it, at its stage.
                 let bound = if k == 0 { T::ZERO } else { T::from_f64(f64::INFINITY) };
                 let links = [&mut *lower, &mut *upper].into_iter().zip([T::ZERO - bound, bound]);
                 links.for_each(|(to, bound)| {
-                    part_mut(to, begin + starts, path_rows::<P, T>() - starts).fill(bound);
+                    part_mut(to, begin + starts, path_rows::<P, T>(layout) - starts).fill(bound);
                 });
             }
             let bounds = stage.g_bounds_mut();
@@ -183,6 +190,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for copy in 0..P::Terminal::STARTS {
             qp.share(copy);
         }
+        // Integrals begin at zero.
+        let integrals = P::Shape::NX - <P::Dynamics as Dynamics<T>>::NAMES.integrals..P::Shape::NX;
+        if let Some(mut first) = qp.stage_mut(0) {
+            integrals.for_each(|i| first.x_bounds_mut().set(i, T::ZERO, T::ZERO));
+        }
         Ok(Self {
             problem,
             initial: Initial::Unknown,
@@ -192,6 +204,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             objective: T::ZERO,
             stages: [T::ZERO; 2],
             free: FreeParameters::with_starts(P::Terminal::STARTS),
+            inner: InnerPoints::default(),
             step_length: None,
             has_algebraic: false,
         })
@@ -226,7 +239,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// How large it is.
     #[inline(always)]
     pub(crate) fn layout(&self) -> Layout {
-        Layout { intervals: self.intervals(), free: self.free.count() }
+        Layout {
+            inner: self.inner.rows::<P>(),
+            bounds_algebraic: self.inner.bounds_algebraic::<P>(),
+            ..Layout::new(self.intervals(), self.free.count())
+        }
     }
 
     /// The functions of the problem: weights of costs and options of integrators may be changed
@@ -275,16 +292,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
-        Labels::states::<P, T>(Part::States, 0).check_vector(x, P::Shape::NX)?;
+        Labels::states::<P, T>(Part::States, 0).check_vector(x, self.names().own_states())?;
         Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, P::Shape::NU)?;
+        let has_linear = !self.names().linear.is_empty();
         for k in 0..=self.intervals() {
-            self.guess_stage(k, x, if k < self.intervals() { u } else { &[] })?;
+            self.guess_stage(k, x, if k < self.intervals() || has_linear { u } else { &[] })?;
         }
         Ok(self)
     }
 
     /// A state and a control as the iterate at one stage, and no multipliers there. The last stage
-    /// has no control.
+    /// has no control, but those that are linear in time: their rates are zero, and integrals.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -293,11 +311,20 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Some(place) = self.iterate.stage_mut(stage) else {
             return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
         };
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
         let own = place.u.get_mut(free..).unwrap_or_default();
-        Labels::states::<P, T>(Part::States, stage).check_vector(x, place.x.len())?;
-        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, own.len())?;
+        let controls =
+            if stage == last && !u.is_empty() && !known.linear.is_empty() { P::Shape::NU } else { own.len() };
+        Labels::states::<P, T>(Part::States, stage).check_vector(x, known.own_states())?;
+        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, controls)?;
         assign(place.x, x);
         assign(own, u);
+        for (state, &control) in (known.own_states()..).zip(known.linear) {
+            if let Some(&value) = u.get(control as usize) {
+                set(place.x, state, value);
+                set(own, control as usize, T::ZERO);
+            }
+        }
         for multipliers in [
             place.dynamics,
             place.x_lower,
@@ -366,5 +393,5 @@ pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
     let ld = [pad::<T>(inputs::<S>(free.count())), pad::<T>(S::NX)];
-    Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None }
+    Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None, piece: None }
 }

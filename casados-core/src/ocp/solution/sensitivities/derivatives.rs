@@ -165,6 +165,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if self.free.count() > 0 {
             return Err(OcpError::FreeParameters);
         }
+        if self.initial == Initial::Partly {
+            let what =
+                "derivatives of solutions whose controls are linear: write these as states of the model";
+            return Err(OcpError::Unsupported { what });
+        }
+        if self.layout().inner > 0 {
+            let what =
+                "derivatives of solutions with bounds of algebraic states or at points inside of intervals";
+            return Err(OcpError::Unsupported { what });
+        }
         let value = factors.smoothing.to_f64();
         if !(value >= 0.0 && value.is_finite()) {
             return Err(OcpError::InvalidOption {

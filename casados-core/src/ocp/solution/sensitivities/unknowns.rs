@@ -38,7 +38,7 @@ impl<T: Real> Unknowns<T> {
 
     /// Those of a problem that has been linearised.
     pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let Layout { intervals, free } = ocp.layout();
+        let Layout { intervals, free, .. } = ocp.layout();
         let (nx, nu) = (P::Shape::NX, free + P::Shape::NU);
         let known = <P::Dynamics as Dynamics<T>>::NAMES;
         let qp = ocp.qp();

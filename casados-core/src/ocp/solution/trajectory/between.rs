@@ -58,24 +58,35 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let values = zeros(count)?;
         let count = T::from_whole(points + 1);
         let parts: Vec<T> = (1..=points).map(|part| T::from_whole(part) / count).collect();
-        let Some(inside) = self.inside(&parts, values)? else { return Ok(solution) };
+        let Some(inside) = self.between(&parts, values)? else { return Ok(solution) };
         let Trajectory { model, times, time_unit, series } = solution;
         let mut dense = inside.spread(&times, |k, j| {
             let [start, end] = [k, k + 1].map(|node| get(&times, node));
             start + get(&parts, j) * (end - start)
         });
         dense.truncate(dense.len() - points);
-        // Those of which there is more inside come in the order in which that was found.
-        let mut own = 0..;
-        let own = |series: &Series<T>| if series.kind.is_found_inside() { own.next() } else { None };
-        let indices: Vec<Option<usize>> = series.iter().map(own).collect();
+        // Those of which there is more inside come in the order in which that was found, but for
+        // states that are called otherwise.
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let (own, more) = known.x.split_at(known.own_states());
+        let mut next = 0..;
+        let mut place = |series: &Series<T>| match series.kind {
+            Kind::Control | Kind::Integral => {
+                more.iter().position(|name| *name == series.name).map(|state| own.len() + state)
+            }
+            kind if kind.is_found_inside() => {
+                next.next().map(|index| if index < own.len() { index } else { index + more.len() })
+            }
+            _ => None,
+        };
+        let indices: Vec<Option<usize>> = series.iter().map(&mut place).collect();
         let pairs = series.iter().zip(indices);
         let series = pairs.map(|(series, index)| inside.series(series, index)).collect();
         Ok(Trajectory { model, times: dense, time_unit, series })
     }
 
     /// What is inside of the intervals, in these places; nothing of maps.
-    fn inside(&mut self, parts: &[T], mut values: Vec<T>) -> Result<Option<Inside<T>>, OcpError> {
+    fn between(&mut self, parts: &[T], mut values: Vec<T>) -> Result<Option<Inside<T>>, OcpError> {
         let (intervals, points) = (self.intervals(), parts.len());
         let (nx, nz, np) = (P::Shape::NX, P::Shape::NZ, P::Shape::NP);
         let width = nx + nz + P::Path::ROWS;
@@ -136,7 +147,8 @@ impl<T: Real> Inside<T> {
             ..dense
         };
         // Behind the last node there is nothing.
-        if matches!(kind, Kind::State | Kind::Parameter) {
+        let is_at_nodes = matches!(kind, Kind::State | Kind::Parameter | Kind::Integral);
+        if is_at_nodes || *kind == Kind::Control && index.is_some() {
             dense.values.truncate(dense.values.len().saturating_sub(self.points));
             dense.lower.truncate(dense.values.len());
             dense.upper.truncate(dense.values.len());

@@ -7,6 +7,7 @@
 //! | `read` | a trajectory from a file, checked |
 //! | `restore` | a trajectory as the iterate of a problem, or as its guess |
 //! | `csv` | a table for other programs |
+//! | `series` | one quantity over time |
 //! | `violations` | which bounds a trajectory is beyond |
 
 mod between;
@@ -16,15 +17,16 @@ mod error;
 #[cfg(feature = "serde")]
 mod read;
 mod restore;
+mod series;
 mod violations;
 
 pub use csv::Csv;
 pub use error::TrajectoryError;
+pub use series::{Kind, Series};
 pub use violations::Violation;
 
 use crate::record::Record;
 use crate::scalar::Real;
-use crate::structure::means;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -78,155 +80,6 @@ pub struct Trajectory<T = f64> {
     /// The unit of the times, or an empty text.
     time_unit: String,
     series: Vec<Series<T>>,
-}
-
-/// What a [`Series`] is of.
-///
-/// ```
-/// # use casados::ocp::{HeapSqp, Horizon, Kind, LeastSquaresCost, Map, Problem};
-/// # use casados::prelude::*;
-/// # #[function]
-/// # fn push(x: f64, u: f64) -> f64 { x + u }
-/// # #[function]
-/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
-/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
-/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
-/// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
-/// ocp.bound("u", .., -0.5, 0.5)?;
-/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
-/// let solution = ocp.solution()?;
-/// let controls = solution.series().iter().filter(|series| series.kind == Kind::Control);
-/// assert_eq!(controls.map(|series| series.name.as_str()).collect::<Vec<_>>(), ["u"]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Kind {
-    /// A state: at every node.
-    State,
-    /// An algebraic state, at the start of every interval.
-    Algebraic,
-    /// A control, constant over every interval.
-    Control,
-    /// A parameter: at every node.
-    Parameter,
-    /// An output of a path constraint, at the start of every interval.
-    Path,
-    /// An output of a terminal constraint: at the last node.
-    Terminal,
-}
-
-/// One quantity over time. Lists of what it has not are empty.
-///
-/// ```
-/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
-/// # use casados::prelude::*;
-/// # #[function]
-/// # fn push(x: f64, u: f64) -> f64 { x + u }
-/// # #[function]
-/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
-/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
-/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
-/// #     .on(Horizon::uniform(10, 0.1))?;
-/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
-/// ocp.bound("u", .., -0.5, 0.5)?;
-/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
-/// let solution = ocp.solution()?;
-/// let push = solution.get("u")?;
-/// assert_eq!((push.values.len(), push.lower[0], push.upper[9]), (10, Some(-0.5), Some(0.5)));
-/// // From one it is pushed as hard as the bound allows; later the bound has no force.
-/// assert!(push.is_active(0, 1e-6) && !push.is_active(5, 1e-6));
-/// assert!(push.lower_multipliers[0] > 0.1);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub struct Series<T = f64> {
-    /// What it is of.
-    pub kind: Kind,
-    /// Its name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
-    /// several: `Distance`, `Corner[2]`.
-    pub name: String,
-    /// Its unit as the doc comments of the model say it
-    /// ([`Units`](crate::structure::Units)), or [`Trajectory::set_unit`] did; empty if nobody did.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub unit: String,
-    /// Which time is that of the first value.
-    pub first: usize,
-    /// The values.
-    pub values: Vec<T>,
-    /// Lower bounds of the values, where there are some.
-    pub lower: Vec<Option<T>>,
-    /// Upper bounds.
-    pub upper: Vec<Option<T>>,
-    /// Multipliers of the lower bounds, from zero on.
-    pub lower_multipliers: Vec<T>,
-    /// Multipliers of the upper bounds, from zero on.
-    pub upper_multipliers: Vec<T>,
-    /// Of a state the multipliers `π_{k+1}` of the dynamics, one for each interval.
-    pub costates: Vec<T>,
-}
-
-impl<T: Real> Series<T> {
-    fn new(kind: Kind, name: impl Into<String>, first: usize, values: Vec<T>) -> Self {
-        Self {
-            kind,
-            name: name.into(),
-            unit: String::new(),
-            first,
-            values,
-            lower: Vec::new(),
-            upper: Vec::new(),
-            lower_multipliers: Vec::new(),
-            upper_multipliers: Vec::new(),
-            costates: Vec::new(),
-        }
-    }
-
-    /// With a unit.
-    fn with_unit(self, unit: impl Into<String>) -> Self {
-        Self { unit: unit.into(), ..self }
-    }
-
-    /// Whether a name means it; of `x.cart.position` also `cart.position`.
-    fn is_meant(&self, name: &str) -> bool {
-        let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
-        means(name, &self.name) || field.is_some_and(|field| means(name, field))
-    }
-
-    /// `λ_upper − λ_lower` of every value: positive where the upper bound holds it back.
-    #[must_use]
-    pub fn multipliers(&self) -> Vec<T> {
-        self.upper_multipliers.iter().zip(&self.lower_multipliers).map(|(&u, &l)| u - l).collect()
-    }
-
-    /// By how much every value is beyond its bounds, zero inside of them: of soft bounds this is
-    /// the slack, which has a penalty.
-    #[must_use]
-    pub fn violations(&self) -> Vec<T> {
-        let beyond = |k: usize, value: T| {
-            let below = side(&self.lower, k).map_or(T::ZERO, |bound| bound - value);
-            let above = side(&self.upper, k).map_or(T::ZERO, |bound| value - bound);
-            let most = if below < above { above } else { below };
-            if T::ZERO < most { most } else { T::ZERO }
-        };
-        self.values.iter().enumerate().map(|(k, &value)| beyond(k, value)).collect()
-    }
-
-    /// Whether a value is at one of its bounds, to a distance, or beyond it.
-    #[must_use]
-    pub fn is_active(&self, index: usize, distance: T) -> bool {
-        let Some(&value) = self.values.get(index) else { return false };
-        side(&self.lower, index).is_some_and(|bound| value - bound <= distance)
-            || side(&self.upper, index).is_some_and(|bound| bound - value <= distance)
-    }
-}
-
-fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
-    bounds.get(index).copied().flatten()
 }
 
 impl<T: Real> Trajectory<T> {
@@ -386,12 +239,28 @@ impl<T: Real> Trajectory<T> {
         Ok(&self.of(name, Kind::Algebraic)?.values)
     }
 
-    /// A control at every point but the last.
+    /// A control at every point but the last; one that is linear in intervals at every point.
     ///
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn control(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.of(name, Kind::Control)?.values)
+    }
+
+    /// The rate of a linear control in every interval: `du` of `u`.
+    ///
+    /// # Errors
+    /// As [`Trajectory::get`].
+    pub fn rate(&self, name: &str) -> Result<&[T], TrajectoryError> {
+        Ok(&self.of(name, Kind::Rate)?.values)
+    }
+
+    /// An integral from the start to every node.
+    ///
+    /// # Errors
+    /// As [`Trajectory::get`].
+    pub fn integral(&self, name: &str) -> Result<&[T], TrajectoryError> {
+        Ok(&self.of(name, Kind::Integral)?.values)
     }
 
     /// A parameter at every node.
@@ -416,6 +285,15 @@ impl<T: Real> Trajectory<T> {
     /// As [`Trajectory::get`].
     pub fn terminal(&self, name: &str) -> Result<&[T], TrajectoryError> {
         Ok(&self.of(name, Kind::Terminal)?.values)
+    }
+
+    /// A path constraint or a bounded variable at a point inside of every interval, a part of it:
+    /// `Speed@0.5`.
+    ///
+    /// # Errors
+    /// As [`Trajectory::get`].
+    pub fn inside(&self, name: &str) -> Result<&[T], TrajectoryError> {
+        Ok(&self.of(name, Kind::Inside)?.values)
     }
 
     /// `λ_upper − λ_lower` of the bounds of a state, control or constraint at every node that has

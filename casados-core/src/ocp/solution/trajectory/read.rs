@@ -47,7 +47,7 @@ impl<T> Series<T> {
         }
         match (self.kind, self.costates.len()) {
             (_, 0) => Ok(()),
-            (Kind::State, length) => fits(length, count.saturating_sub(1)),
+            (Kind::State | Kind::Control | Kind::Integral, length) => fits(length, count.saturating_sub(1)),
             (_, length) => fits(length, 0),
         }
     }

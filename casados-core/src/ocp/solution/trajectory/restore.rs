@@ -4,6 +4,7 @@ use super::collect::names;
 use super::{Kind, Series, Trajectory, TrajectoryError};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::node_rows;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::{get, set};
 use crate::qp::{SolutionStageMut, StageDims};
@@ -25,16 +26,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn restore(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
         let intervals = self.intervals();
         let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let of_rows: Places<T> = |stage| [&mut [], &mut *stage.g_lower, &mut *stage.g_upper];
         let list = |names: &[&str]| names.iter().map(|&name| name.into()).collect::<Vec<String>>();
         let kinds: [(Kind, Vec<String>, Places<T>); 4] = [
             (Kind::State, list(known.x), |stage| [&mut *stage.x, &mut *stage.x_lower, &mut *stage.x_upper]),
             (Kind::Control, list(known.u), |stage| [&mut *stage.u, &mut *stage.u_lower, &mut *stage.u_upper]),
-            (Kind::Path, names::<P::Path, _, T>().collect(), |stage| {
-                [&mut [], &mut *stage.g_lower, &mut *stage.g_upper]
-            }),
-            (Kind::Terminal, names::<P::Terminal, _, T>().collect(), |stage| {
-                [&mut [], &mut *stage.g_lower, &mut *stage.g_upper]
-            }),
+            (Kind::Path, names::<P::Path, _, T>().collect(), of_rows),
+            (Kind::Terminal, names::<P::Terminal, _, T>().collect(), of_rows),
         ];
         // All is found before anything is written.
         let mut found = Vec::new();
@@ -47,16 +45,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let of_kind = trajectory.series.iter().filter(|series| series.kind == kind);
             let of_kind: Vec<_> = of_kind.collect();
             for (index, name) in names.into_iter().enumerate() {
+                let called = match kind {
+                    Kind::State => known.kind_of_state(index),
+                    Kind::Control if known.linear_state(index).is_some() => Kind::Rate,
+                    kind => kind,
+                };
                 // Functions that are there twice have the same names, in the same order.
                 let series = match of_kind.get(index).filter(|series| series.name == name) {
                     Some(&series) => series,
-                    None => trajectory.of(&name, kind)?,
+                    None => trajectory.of(&name, called)?,
                 };
                 let costates = if kind == Kind::State { intervals } else { 0 };
                 has(series, [count, count, count, costates])?;
                 let index = if kind == Kind::Control { self.free.count() + index } else { index };
                 found.push((index, first, series, places));
             }
+        }
+        for index in 0..self.layout().inner {
+            let at_node = self.inner.row::<P>(index).is_none_or(|row| row.point() == 0);
+            let kind = if at_node { Kind::Algebraic } else { Kind::Inside };
+            let series = trajectory.of(&self.inside_name(index).0, kind)?;
+            has(series, [intervals, intervals, intervals, 0])?;
+            found.push((node_rows::<P, T>() + index, 0, series, of_rows));
         }
         let mut free = Vec::new();
         for (parameter, &name) in known.p.iter().enumerate() {
@@ -133,7 +143,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let all = |names: &[&str], kind| {
             names.iter().map(|&name| trajectory.of(name, kind)).collect::<Result<Vec<_>, _>>()
         };
-        let (states, controls) = (all(known.x, Kind::State)?, all(known.u, Kind::Control)?);
+        let own = known.x.get(..known.own_states()).unwrap_or_default();
+        let controls: Vec<&str> = (0..known.u.len()).map(|control| known.control(control)).collect();
+        let (states, controls) = (all(own, Kind::State)?, all(&controls, Kind::Control)?);
         let (mut x, mut u) = (Vec::new(), Vec::new());
         for k in 0..=self.intervals() {
             let unit = if self.free.view().end().is_some() { trajectory.end_time() } else { T::ONE };
@@ -141,12 +153,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (before, along) = place(&trajectory.times, time);
             x.clear();
             u.clear();
-            x.extend(states.iter().map(|series| {
+            let linear = |series: &Series<T>| {
                 let [start, end] = [before, before + 1].map(|k| held(&series.values, k));
                 start + along * (end - start)
-            }));
-            if k < self.intervals() {
-                u.extend(controls.iter().map(|series| held(&series.values, before)));
+            };
+            x.extend(states.iter().map(|series| linear(*series)));
+            if k < self.intervals() || !known.linear.is_empty() {
+                // One that is linear has a value at the last time too.
+                let is_linear = |series: &Series<T>| series.values.len() == trajectory.times.len();
+                let at = |series: &&Series<T>| match is_linear(*series) {
+                    true => linear(*series),
+                    false => held(&series.values, before),
+                };
+                u.extend(controls.iter().map(at));
             }
             self.guess_stage(k, &x, &u)?;
         }

@@ -1,6 +1,7 @@
 //! Which bounds a trajectory is beyond, by name.
 
-use super::{Trajectory, side};
+use super::Trajectory;
+use super::series::side;
 use crate::qp::Side;
 use crate::scalar::Real;
 use alloc::vec::Vec;

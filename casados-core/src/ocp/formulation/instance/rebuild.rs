@@ -1,0 +1,166 @@
+//! A problem with more variables or more rows than it was made with.
+
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::FreeParameters;
+use crate::ocp::formulation::functions::constraint::Constraints;
+use crate::ocp::formulation::inside::{InnerPoints, InnerRow};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::{self, Layout, node_rows, path_rows, split};
+use crate::ocp::formulation::instance::memory::Renewable;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::element::get;
+use crate::qp::{
+    Bounds, BoundsMut, Qp, Solution, SolutionStage, SolutionStageMut, StageDims, assign, marked, part,
+    part_mut, room,
+};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+
+impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// With these free parameters, one more in front of the controls from `gap` on if there is one;
+    /// and with these rows, behind those that there are.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]; [`OcpError::Unsupported`] of given memory.
+    pub(in crate::ocp) fn rebuild(
+        &mut self,
+        free: FreeParameters,
+        mut inner: InnerPoints<T>,
+        gap: Option<usize>,
+    ) -> Result<(), OcpError> {
+        let (old, intervals) = (self.layout(), self.intervals());
+        let layout = Layout {
+            inner: inner.rows::<P>(),
+            bounds_algebraic: inner.bounds_algebraic::<P>(),
+            ..Layout::new(intervals, free.count())
+        };
+        let mut dims: Vec<StageDims> = Vec::new();
+        room(&mut dims, intervals.saturating_add(1))?;
+        dims.resize(intervals, data::stage::<P, T>(layout, false));
+        dims.push(data::stage::<P, T>(layout, true));
+        let count = dims.len();
+        let mut qp = Qp::in_memory(D::renew(&dims, count)?, M::renew(&[], Qp::<T, (), ()>::memory(&dims))?)?;
+        let length = Solution::<T, (), ()>::memory(&dims);
+        let mut iterate = Solution::in_memory(D::renew(&dims, count)?, M::renew(&[], length)?)?;
+        let mut data = M::renew(&[], data::length::<P, T>(layout))?;
+        let (variables, multipliers) = iterate.vectors();
+        inner.allocate::<P>(layout, [variables.len(), multipliers.len()])?;
+        self.move_qp(&mut qp, gap);
+        for (k, stage) in self.iterate.stages().enumerate() {
+            if let Some(to) = iterate.stage_mut(k) {
+                copy_stage(&stage, to, gap);
+            }
+        }
+        let (to, from) = (split::<P, T>(data.as_mut(), layout), split::<P, T>(self.data.as_mut(), old));
+        for (to, from) in [
+            (to.times, from.times),
+            (to.p, from.p),
+            (to.references, from.references),
+            (to.arrival, from.arrival),
+        ] {
+            assign(to, from);
+        }
+        let infinity = T::from_f64(f64::INFINITY);
+        let [more, less] = [layout, old].map(path_rows::<P, T>);
+        for (to, from, none) in [(to.lower, from.lower, -infinity), (to.upper, from.upper, infinity)] {
+            to.fill(none);
+            for k in 0..=intervals {
+                let rows = if k < intervals { less } else { P::Terminal::ROWS };
+                assign(part_mut(to, k * more, rows), part(from, k * less, rows));
+            }
+            if old.inner == 0 {
+                copy_to_points::<P, T>(&inner, |from, row| {
+                    for k in 0..intervals {
+                        let value = get(to, k * more + from);
+                        crate::qp::element::set(to, k * more + row, value);
+                    }
+                });
+            }
+        }
+        if old.inner == 0 {
+            for mut stage in qp.stages_mut().take(intervals) {
+                let bounds = stage.g_bounds_mut();
+                let penalties = [
+                    &mut *bounds.lower_linear,
+                    &mut *bounds.lower_quadratic,
+                    &mut *bounds.upper_linear,
+                    &mut *bounds.upper_quadratic,
+                ];
+                for list in penalties {
+                    copy_to_points::<P, T>(&inner, |from, row| {
+                        let value = get(list, from);
+                        crate::qp::element::set(list, row, value);
+                    });
+                }
+            }
+        }
+        (self.qp, self.iterate, self.data, self.free, self.inner) = (qp, iterate, data, free, inner);
+        self.has_algebraic = false;
+        Ok(())
+    }
+
+    /// Bounds and couplings, with one more variable in front of the controls from `gap` on.
+    fn move_qp(&self, to: &mut Qp<T, D, M>, gap: Option<usize>) {
+        let view = self.qp.view();
+        let gap_or_end = gap.unwrap_or(usize::MAX);
+        for (from, mut to) in view.stages().zip(to.stages_mut()) {
+            copy_bounds(&from.x_bounds(), to.x_bounds_mut(), usize::MAX);
+            copy_bounds(&from.u_bounds(), to.u_bounds_mut(), gap_or_end);
+            copy_bounds(&from.g_bounds(), to.g_bounds_mut(), usize::MAX);
+        }
+        marked(view.periodic()).for_each(|i| {
+            to.make_periodic(i);
+        });
+        marked(view.shared()).map(|j| if j < gap_or_end { j } else { j + 1 }).for_each(|j| {
+            to.share(j);
+        });
+        if let Some(w) = gap {
+            to.share(w);
+        }
+    }
+}
+
+/// Shows every row of path constraints at points, behind the row at the node.
+fn copy_to_points<P: Formulation<T>, T: Real>(inner: &InnerPoints<T>, mut copy: impl FnMut(usize, usize)) {
+    for index in 0..inner.count() * P::Path::ROWS {
+        if let Some(InnerRow::Path { row, .. }) = inner.row::<P>(index) {
+            copy(row, node_rows::<P, T>() + index);
+        }
+    }
+}
+
+/// Copies a list to one with another element at `gap`.
+fn copy<T: Real>(from: &[T], to: &mut [T], gap: usize) {
+    let (before, behind) = from.split_at(gap.min(from.len()));
+    assign(to, before);
+    assign(to.get_mut(gap.saturating_add(1)..).unwrap_or_default(), behind);
+}
+
+fn copy_bounds<T: Real>(from: &Bounds<'_, T>, to: BoundsMut<'_, T>, gap: usize) {
+    for (from, to) in [
+        (from.lower, to.lower),
+        (from.upper, to.upper),
+        (from.lower_linear, to.lower_linear),
+        (from.lower_quadratic, to.lower_quadratic),
+        (from.upper_linear, to.upper_linear),
+        (from.upper_quadratic, to.upper_quadratic),
+    ] {
+        copy(from, to, gap);
+    }
+}
+
+fn copy_stage<T: Real>(from: &SolutionStage<'_, T>, to: SolutionStageMut<'_, T>, gap: Option<usize>) {
+    for (from, to) in [(from.u, to.u), (from.u_lower, to.u_lower), (from.u_upper, to.u_upper)] {
+        copy(from, to, gap.unwrap_or(usize::MAX));
+    }
+    for (from, to) in [
+        (from.x, to.x),
+        (from.dynamics, to.dynamics),
+        (from.x_lower, to.x_lower),
+        (from.x_upper, to.x_upper),
+        (from.g_lower, to.g_lower),
+        (from.g_upper, to.g_upper),
+    ] {
+        assign(to, from);
+    }
+}

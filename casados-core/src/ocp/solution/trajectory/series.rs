@@ -1,0 +1,163 @@
+//! One quantity over time.
+
+use crate::scalar::Real;
+use crate::structure::means;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// What a [`Series`] is of.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, Kind, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// ocp.bound("u", .., -0.5, 0.5)?;
+/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let solution = ocp.solution()?;
+/// let controls = solution.series().iter().filter(|series| series.kind == Kind::Control);
+/// assert_eq!(controls.map(|series| series.name.as_str()).collect::<Vec<_>>(), ["u"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Kind {
+    /// A state: at every node.
+    State,
+    /// An algebraic state, at the start of every interval.
+    Algebraic,
+    /// A control, constant over every interval; one that is linear in intervals is at every node.
+    Control,
+    /// A parameter: at every node.
+    Parameter,
+    /// An output of a path constraint, at the start of every interval.
+    Path,
+    /// An output of a terminal constraint: at the last node.
+    Terminal,
+    /// A path constraint or a bounded variable at a point inside of every interval
+    /// ([`Ocp::inside`](crate::ocp::Ocp::inside)): `Speed@0.5`.
+    Inside,
+    /// The rate of a control that is linear in intervals.
+    Rate,
+    /// An integral from the start to every node.
+    Integral,
+}
+
+/// One quantity over time. Lists of what it has not are empty.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// ocp.bound("u", .., -0.5, 0.5)?;
+/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let solution = ocp.solution()?;
+/// let push = solution.get("u")?;
+/// assert_eq!((push.values.len(), push.lower[0], push.upper[9]), (10, Some(-0.5), Some(0.5)));
+/// // From one it is pushed as hard as the bound allows; later the bound has no force.
+/// assert!(push.is_active(0, 1e-6) && !push.is_active(5, 1e-6));
+/// assert!(push.lower_multipliers[0] > 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Series<T = f64> {
+    /// What it is of.
+    pub kind: Kind,
+    /// Its name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
+    /// several: `Distance`, `Corner[2]`; what is at a point inside of intervals with the part of these:
+    /// `Distance@0.5`.
+    pub name: String,
+    /// Its unit as the doc comments of the model say it
+    /// ([`Units`](crate::structure::Units)), or [`Trajectory::set_unit`] did; empty if nobody did.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub unit: String,
+    /// Which time is that of the first value.
+    pub first: usize,
+    /// The values.
+    pub values: Vec<T>,
+    /// Lower bounds of the values, where there are some.
+    pub lower: Vec<Option<T>>,
+    /// Upper bounds.
+    pub upper: Vec<Option<T>>,
+    /// Multipliers of the lower bounds, from zero on.
+    pub lower_multipliers: Vec<T>,
+    /// Multipliers of the upper bounds, from zero on.
+    pub upper_multipliers: Vec<T>,
+    /// Of a state the multipliers `π_{k+1}` of the dynamics, one for each interval.
+    pub costates: Vec<T>,
+}
+
+impl<T: Real> Series<T> {
+    pub(super) fn new(kind: Kind, name: impl Into<String>, first: usize, values: Vec<T>) -> Self {
+        Self {
+            kind,
+            name: name.into(),
+            unit: String::new(),
+            first,
+            values,
+            lower: Vec::new(),
+            upper: Vec::new(),
+            lower_multipliers: Vec::new(),
+            upper_multipliers: Vec::new(),
+            costates: Vec::new(),
+        }
+    }
+
+    /// With a unit.
+    pub(super) fn with_unit(self, unit: impl Into<String>) -> Self {
+        Self { unit: unit.into(), ..self }
+    }
+
+    /// Whether a name means it; of `x.cart.position` also `cart.position`.
+    pub(super) fn is_meant(&self, name: &str) -> bool {
+        let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
+        means(name, &self.name) || field.is_some_and(|field| means(name, field))
+    }
+
+    /// `λ_upper − λ_lower` of every value: positive where the upper bound holds it back.
+    #[must_use]
+    pub fn multipliers(&self) -> Vec<T> {
+        self.upper_multipliers.iter().zip(&self.lower_multipliers).map(|(&u, &l)| u - l).collect()
+    }
+
+    /// By how much every value is beyond its bounds, zero inside of them: of soft bounds this is
+    /// the slack, which has a penalty.
+    #[must_use]
+    pub fn violations(&self) -> Vec<T> {
+        let beyond = |k: usize, value: T| {
+            let below = side(&self.lower, k).map_or(T::ZERO, |bound| bound - value);
+            let above = side(&self.upper, k).map_or(T::ZERO, |bound| value - bound);
+            let most = if below < above { above } else { below };
+            if T::ZERO < most { most } else { T::ZERO }
+        };
+        self.values.iter().enumerate().map(|(k, &value)| beyond(k, value)).collect()
+    }
+
+    /// Whether a value is at one of its bounds, to a distance, or beyond it.
+    #[must_use]
+    pub fn is_active(&self, index: usize, distance: T) -> bool {
+        let Some(&value) = self.values.get(index) else { return false };
+        side(&self.lower, index).is_some_and(|bound| value - bound <= distance)
+            || side(&self.upper, index).is_some_and(|bound| bound - value <= distance)
+    }
+}
+
+pub(super) fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
+    bounds.get(index).copied().flatten()
+}
