@@ -1,4 +1,5 @@
-"""CVODES and IDAS, through CasADi, on the initial value problems: for examples/work_precision.
+"""CVODES and IDAS, through CasADi, on the initial value problems: for examples/work_precision. Where they are installed,
+SciPy's Radau, LSODA and DOP853, and CVODE through scikit-sundae, on those without algebraic states.
 
 Reads one JSON object a line from standard input and answers each with one on standard output:
 
@@ -16,6 +17,23 @@ import time
 
 import casadi as ca
 import numpy as np
+
+# Solvers that call equations in Python.
+IN_PYTHON = []
+try:
+    import scipy
+    from scipy.integrate import solve_ivp
+
+    IN_PYTHON += [(f"SciPy, {method}", method) for method in ("Radau", "LSODA", "DOP853")]
+except ImportError:
+    pass
+try:
+    import sksundae
+    from sksundae.cvode import CVODE
+
+    IN_PYTHON += [("CVODE", "CVODE")]
+except ImportError:
+    pass
 
 # A run that takes longer ends the list of tolerances.
 PATIENCE = 3.0
@@ -266,16 +284,74 @@ def one(request, solver, tolerance):
     return {"y": y, "derivatives": derivatives[0] if derivatives else [], "time": least * 1e-9}
 
 
+def in_python(request, solver, tolerance):
+    """SciPy and scikit-sundae: equations and Jacobians are CasADi's, called from Python at every evaluation."""
+    model, _ = PROBLEMS[request["problem"]]
+    nx, end = len(request["x0"]), request["t"]
+    x, t = ca.SX.sym("x", nx), ca.SX.sym("t")
+    ode = ca.cse(ca.vertcat(*model(x, None, ca.DM(request["p"]), t)[0]))
+    rates, jacobian = Rates("f", [x, t], ode), Rates("J", [x, t], ca.densify(ca.jacobian(ode, x)))
+    tolerances = {"rtol": tolerance, "atol": request["atol"] * tolerance}
+    if solver == "CVODE":
+
+        def write(t, y, to):
+            to[:] = rates(y, t)
+
+        def write_jacobian(t, y, _, to):
+            to[:] = jacobian(y, t).reshape(nx, nx, order="F")
+
+        run = CVODE(write, jacfn=write_jacobian, max_num_steps=300000, **tolerances)
+        call = lambda: run.solve(np.array([0.0, end]), np.array(request["x0"]))
+    else:
+        j = {} if solver == "DOP853" else {"jac": lambda t, y: jacobian(y, t).reshape(nx, nx, order="F")}
+        f = lambda t, y: rates(y, t)
+        call = lambda: solve_ivp(f, (0, end), request["x0"], method=solver, **j, **tolerances)
+    start = time.thread_time_ns()
+    result = call()
+    taken = time.thread_time_ns() - start
+    y = np.array(result.y)
+    y = y[-1] if solver == "CVODE" else y[:, -1]
+    if not result.success or not np.all(np.isfinite(y)):
+        raise RuntimeError("no solution")
+    return {"y": y.tolist(), "derivatives": [], "time": taken * 1e-9}
+
+
+class Rates:
+    """A function of a state and the time, into memory that stays."""
+
+    def __init__(self, name, arguments, value):
+        self.f = ca.Function(name, arguments, [value])
+        self.x, self.t = np.zeros(arguments[0].numel()), np.zeros(1)
+        self.to = np.zeros(value.numel())
+        self.buffer, self.run = self.f.buffer()
+        self.buffer.set_arg(0, memoryview(self.x))
+        self.buffer.set_arg(1, memoryview(self.t))
+        self.buffer.set_res(0, memoryview(self.to))
+
+    def __call__(self, x, t):
+        self.x[:], self.t[0] = x, t
+        self.run()
+        return self.to.copy()
+
+
 def serve(request):
     if request.get("do") == "versions":
-        return {"versions": f"CasADi {ca.__version__}"}
+        versions = [f"CasADi {ca.__version__}"]
+        if any(solver == "Radau" for _, solver in IN_PYTHON):
+            versions.append(f"SciPy {scipy.__version__}")
+        if any(solver == "CVODE" for _, solver in IN_PYTHON):
+            versions.append(f"scikit-sundae {sksundae.__version__}")
+        return {"versions": ", ".join(versions)}
     algebraic = bool(PROBLEMS[request["problem"]][1])
     runs = []
-    for solver in ["idas"] if algebraic else ["cvodes", "idas"]:
+    solvers = [("IDAS", one, "idas")] if algebraic else [("CVODES", one, "cvodes"), ("IDAS", one, "idas")]
+    if not algebraic and not request["derivatives"]:
+        solvers += [(name, in_python, solver) for name, solver in IN_PYTHON]
+    for name, solve, solver in solvers:
         for tolerance in request["tolerances"]:
-            run = {"solver": solver.upper(), "tolerance": tolerance}
+            run = {"solver": name, "tolerance": tolerance}
             try:
-                run.update(one(request, solver, tolerance))
+                run.update(solve(request, solver, tolerance))
             except Exception as error:  # A solver that fails is a line of the table, not the end of the run.
                 run["error"] = str(error).strip().splitlines()[-1]
             runs.append(run)
