@@ -76,6 +76,8 @@
 //! are dynamics too.
 
 mod assembly;
+#[cfg(feature = "alloc")]
+mod batch;
 mod dynamics;
 mod feedback;
 mod formulation;
@@ -84,6 +86,8 @@ mod solution;
 
 pub use assembly::convexify::Convexification;
 pub use assembly::curvature::{Curvature, Exact, GaussNewton};
+#[cfg(feature = "alloc")]
+pub use batch::{BatchOcp, Gradient, Gradients, OcpSolver};
 #[cfg(feature = "alloc")]
 pub use dynamics::collocation::Collocation;
 pub use dynamics::map::Map;

@@ -66,6 +66,8 @@ mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
 mod problem;
+#[cfg(feature = "alloc")]
+mod queue;
 mod residuals;
 mod solution;
 mod solver;
@@ -109,7 +111,9 @@ pub(crate) use interior::{
 };
 pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
-pub(crate) use memory::{room, zeros};
+pub(crate) use memory::{reserve, room, zeros};
+#[cfg(feature = "alloc")]
+pub(crate) use queue::{each, threads};
 pub(crate) use residuals::bounds as bound_residuals;
 pub(crate) use stage::Arrays;
 pub(crate) use statistics::larger;

@@ -329,6 +329,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             write(view.reborrow().into_stage(place));
         }
     }
+    /// Makes states, controls and multipliers zero: a seed to be written.
+    pub fn clear(&mut self) {
+        self.memory.as_mut().fill(T::ZERO);
+    }
     /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last
     /// stages stay as they are. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {
