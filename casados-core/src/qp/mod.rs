@@ -61,7 +61,11 @@ mod condense;
 mod coupling;
 pub(crate) mod element;
 mod error;
+#[cfg(feature = "alloc")]
+mod instance;
 pub(crate) mod interior;
+#[cfg(feature = "alloc")]
+mod lanes;
 mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
@@ -78,7 +82,7 @@ mod statistics;
 mod violation;
 
 #[cfg(feature = "alloc")]
-pub use batch::{BatchInteriorPoint, QpInstance};
+pub use batch::BatchInteriorPoint;
 pub use block::{Block, BlockMut};
 pub use bounds::{Bounds, BoundsMut};
 pub use check::check;
@@ -87,6 +91,8 @@ pub use clarabel::{Clarabel, SecondOrderCone};
 #[cfg(feature = "alloc")]
 pub use condense::Condensing;
 pub use error::{QpError, QpField, Side};
+#[cfg(feature = "alloc")]
+pub use instance::QpInstance;
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;
 #[cfg(feature = "alloc")]

@@ -282,6 +282,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             upper: take_mut(&mut rest, row),
         }
     }
+    /// The multipliers of lower and of upper bounds.
+    #[cfg(feature = "alloc")]
+    pub(super) fn sides(&self) -> [&[T]; 2] {
+        let [v, dynamics, row] = self.lengths;
+        [0, row].map(|side| part(self.memory.as_ref(), v + dynamics + side, row))
+    }
     /// Everything, and what is padding.
     pub(crate) fn numbers(&self) -> &[T] {
         self.memory.as_ref()

@@ -1,11 +1,12 @@
 //! Derivatives of all instances.
 
 use super::gradients::Gradients;
-use super::{BatchOcp, OcpSolver, Worker, refill};
+use super::{BatchOcp, Worker, refill};
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::solution::outcome::Outcome;
 use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};
 use crate::qp::{HeapSolution, assign, each, room};

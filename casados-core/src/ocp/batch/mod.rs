@@ -2,20 +2,21 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `solver` | what solves one of them |
+//! | `real_time` | real-time iterations of many plants |
 //! | `derivatives` | adjoints, gradients of values and forward derivatives of all |
 //! | `gradients` | what adjoints and gradients of values are |
 
 mod derivatives;
 mod gradients;
-mod solver;
+mod real_time;
 
 pub use gradients::{Gradient, Gradients};
-pub use solver::OcpSolver;
+pub use real_time::{BatchPrepared, BatchRealTime};
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::nlp::sqp::HeapSqp;
 use crate::ocp::solution::outcome::Outcome;
 use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};

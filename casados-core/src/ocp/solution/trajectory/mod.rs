@@ -18,6 +18,7 @@ mod read;
 mod restore;
 mod violations;
 
+pub(in crate::ocp) use collect::names;
 pub use csv::Csv;
 pub use error::TrajectoryError;
 pub use violations::Violation;
@@ -171,7 +172,12 @@ pub struct Series<T = f64> {
 }
 
 impl<T: Real> Series<T> {
-    fn new(kind: Kind, name: impl Into<String>, first: usize, values: Vec<T>) -> Self {
+    pub(in crate::ocp) fn new(
+        kind: Kind,
+        name: impl Into<String>,
+        first: usize,
+        values: Vec<T>,
+    ) -> Self {
         Self {
             kind,
             name: name.into(),
@@ -187,7 +193,7 @@ impl<T: Real> Series<T> {
     }
 
     /// With a unit.
-    fn with_unit(self, unit: impl Into<String>) -> Self {
+    pub(in crate::ocp) fn with_unit(self, unit: impl Into<String>) -> Self {
         Self { unit: unit.into(), ..self }
     }
 
@@ -230,6 +236,15 @@ fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
 }
 
 impl<T: Real> Trajectory<T> {
+    /// Of a model, with the unit of its times.
+    pub(in crate::ocp) fn of_series(
+        (model, time_unit): (&str, &str),
+        times: Vec<T>,
+        series: Vec<Series<T>>,
+    ) -> Self {
+        Self { model: model.into(), times, time_unit: time_unit.into(), series }
+    }
+
     /// The last of the times: the end of the horizon, which may have been
     /// [found](crate::ocp::Horizon::free).
     ///

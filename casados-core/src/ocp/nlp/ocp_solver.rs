@@ -1,4 +1,4 @@
-//! What solves the problems of a batch.
+//! What solves problems, whatever the method.
 
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
