@@ -11,6 +11,7 @@ mod runs;
 
 mod algebraic;
 mod arrival;
+mod batch;
 mod boundary;
 mod bounds;
 mod chain;

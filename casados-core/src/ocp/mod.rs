@@ -76,6 +76,8 @@
 //! are dynamics too.
 
 mod assembly;
+#[cfg(feature = "alloc")]
+mod batch;
 mod dynamics;
 mod feedback;
 mod formulation;
@@ -85,6 +87,8 @@ mod solution;
 pub use assembly::convexify::Convexification;
 pub use assembly::curvature::{Curvature, Exact, GaussNewton};
 #[cfg(feature = "alloc")]
+pub use batch::{BatchOcp, BatchPrepared, BatchRealTime, Gradient, Gradients};
+#[cfg(feature = "alloc")]
 pub use dynamics::collocation::Collocation;
 pub use dynamics::map::Map;
 #[cfg(feature = "alloc")]
@@ -92,6 +96,8 @@ pub use dynamics::return_map::ReturnMap;
 #[cfg(feature = "alloc")]
 pub use dynamics::shooting::Shooting;
 pub use dynamics::single::{IntegralCost, WithIntegral};
+#[cfg(feature = "alloc")]
+pub use feedback::closed_loop::{ClosedLoop, Controller, Sample, closed_loop, closed_loops, plant};
 pub use feedback::contraction::{Contraction, ContractionTest, Convergence};
 pub use feedback::phases::{Fallback, Feedback, Prepared};
 #[cfg(feature = "alloc")]
@@ -123,6 +129,8 @@ pub use nlp::ipm::HeapIpm;
 pub use nlp::ipm::{Barrier, Ipm, IpmOptions};
 #[cfg(feature = "alloc")]
 pub use nlp::multi_start::{MultiStart, StartOutcome};
+#[cfg(feature = "alloc")]
+pub use nlp::ocp_solver::OcpSolver;
 #[cfg(feature = "alloc")]
 pub use nlp::sqp::HeapSqp;
 pub use nlp::sqp::{Globalisation, Sqp, SqpOptions};

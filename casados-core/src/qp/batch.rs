@@ -1,32 +1,16 @@
 //! Many quadratic programs at once, shared among threads.
 
 use super::error::QpError;
+use super::instance::QpInstance;
 use super::interior::{HeapInteriorPoint, InteriorPointOptions};
+use super::lanes::{self, Size, Together};
+use super::layout::take_mut;
 use super::memory::room;
-use super::problem::HeapQp;
-use super::solution::HeapSolution;
+use super::queue::{each, threads};
 use super::solver::{QpSolver, QpStart};
 use super::statistics::QpStatistics;
 use crate::scalar::Real;
 use alloc::vec::Vec;
-
-/// A quadratic program of a batch, and the memory of its solution.
-///
-/// ```
-/// use casados::qp::{HeapQp, HeapSolution, QpInstance, StageDims};
-///
-/// let dims = [StageDims::new(2, 1, 0), StageDims::new(2, 0, 0)];
-/// let instance = QpInstance { qp: HeapQp::<f64>::new(&dims)?, solution: HeapSolution::new(&dims)? };
-/// assert_eq!(instance.qp.dims(), instance.solution.dims());
-/// # Ok::<(), casados::qp::QpError>(())
-/// ```
-#[derive(Clone, Debug)]
-pub struct QpInstance<T: Real = f64> {
-    /// The data.
-    pub qp: HeapQp<T>,
-    /// Where the solution is written, and read by warm starts.
-    pub solution: HeapSolution<T>,
-}
 
 /// What became of a problem.
 type Status = Result<QpStatistics, QpError>;
@@ -34,10 +18,16 @@ type Status = Result<QpStatistics, QpError>;
 /// An [`InteriorPoint`](super::InteriorPoint) for many problems, each with its own data,
 /// dimensions, solution and status.
 ///
-/// With the feature `parallel` consecutive problems are shared among the threads of rayon, as many
-/// for each. Solutions and statuses are those of single solves to the bit, whatever the number of
-/// threads: a problem that is infeasible or has no finite data says so by itself. Memory is
-/// allocated by the first call and by calls with larger problems only.
+/// Problems in which nothing but controls has bounds, all of them hard, and whose state at the
+/// start is given, are solved side by side in registers where their dimensions are the same: by
+/// active sets, which are exact where an interior point stops at its tolerance. What needs more
+/// than that is solved alone. A problem that is infeasible or has no finite data says so by itself;
+/// verdicts are those of single solves, and so are solutions: to the bit of problems solved alone,
+/// to the tolerance of those solved [together](BatchInteriorPoint::together).
+///
+/// With the feature `parallel` problems are shared among the threads of rayon; solutions do not
+/// depend on how many there are. Memory is allocated by the first call and by calls with larger
+/// problems only.
 ///
 /// # Example
 /// ```
@@ -72,9 +62,18 @@ pub struct BatchInteriorPoint<T: Real = f64> {
     /// How many threads share the problems at most; as many as rayon has by default.
     #[cfg(feature = "parallel")]
     pub threads: usize,
-    /// A solver for each thread.
-    solvers: Vec<HeapInteriorPoint<T>>,
+    /// Whether problems may be solved side by side in registers. Default true.
+    pub together: bool,
+    /// One for each thread.
+    workers: Vec<Worker<T>>,
     statuses: Vec<Status>,
+}
+
+/// What a thread works with.
+#[derive(Clone, Debug)]
+struct Worker<T: Real> {
+    solver: HeapInteriorPoint<T>,
+    together: Together<T>,
 }
 
 impl<T: Real> Default for BatchInteriorPoint<T> {
@@ -91,7 +90,8 @@ impl<T: Real> BatchInteriorPoint<T> {
             options: InteriorPointOptions::new::<T>(),
             #[cfg(feature = "parallel")]
             threads: usize::MAX,
-            solvers: Vec::new(),
+            together: true,
+            workers: Vec::new(),
             statuses: Vec::new(),
         }
     }
@@ -107,50 +107,69 @@ impl<T: Real> BatchInteriorPoint<T> {
         self.statuses.clear();
         room(&mut self.statuses, count)?;
         self.statuses.resize(count, Ok(QpStatistics::default()));
-        let more = threads.saturating_sub(self.solvers.len());
-        room(&mut self.solvers, more)?;
-        while self.solvers.len() < threads {
-            self.solvers.push(HeapInteriorPoint::new());
+        let more = threads.saturating_sub(self.workers.len());
+        room(&mut self.workers, more)?;
+        while self.workers.len() < threads {
+            self.workers.push(Worker { solver: HeapInteriorPoint::new(), together: Together::default() });
         }
-        let solvers = self.solvers.get_mut(..threads).unwrap_or_default();
-        for solver in &mut *solvers {
-            solver.options = self.options;
-        }
-        share(solvers, instances, &mut self.statuses, start);
+        let (options, together) = (self.options, self.together);
+        let size_of = |instance: &QpInstance<T>| lanes::size(instance, &options).filter(|_| together);
+        // A thread takes as many as registers are filled with, or one after the other.
+        let portion = match instances.first().and_then(size_of) {
+            Some(_) => count.div_ceil(threads.max(1)).next_multiple_of(PORTION).min(PORTIONS),
+            None => 1,
+        };
+        let workers = self.workers.get_mut(..threads).unwrap_or_default();
+        let items = instances.chunks_mut(portion).zip(self.statuses.chunks_mut(portion));
+        each(workers, items, |worker, (instances, statuses)| {
+            worker.solver.options = options;
+            worker.solve(instances, statuses, start, size_of);
+        });
         Ok(&self.statuses)
     }
 
     /// How many threads there are.
     fn threads(&self) -> usize {
         #[cfg(feature = "parallel")]
-        return rayon::current_num_threads().min(self.threads).max(1);
+        return threads(self.threads);
         #[cfg(not(feature = "parallel"))]
-        1
+        threads(1)
     }
 }
 
-/// Gives every solver as many problems as every other.
-fn share<T: Real>(
-    solvers: &mut [HeapInteriorPoint<T>],
-    instances: &mut [QpInstance<T>],
-    statuses: &mut [Status],
-    start: QpStart,
-) {
-    #[cfg(feature = "parallel")]
-    if solvers.len() > 1 {
-        let half = solvers.len() / 2;
-        let count = instances.len() * half / solvers.len();
-        let (solvers, other_solvers) = solvers.split_at_mut(half);
-        let (instances, other_instances) = instances.split_at_mut(count);
-        let (statuses, other_statuses) = statuses.split_at_mut(count);
-        rayon::join(
-            || share(solvers, instances, statuses, start),
-            || share(other_solvers, other_instances, other_statuses, start),
-        );
-        return;
-    }
-    let Some(solver) = solvers.first_mut() else { return };
-    for (instance, status) in instances.iter_mut().zip(statuses) {
-        *status = solver.solve(instance.qp.view(), start, instance.solution.view_mut());
+/// Problems that a thread takes: a multiple of this many, whole registers, and no more than that.
+const PORTION: usize = 16;
+const PORTIONS: usize = 64;
+
+impl<T: Real> Worker<T> {
+    /// Solves problems: neighbours of one size together.
+    fn solve(
+        &mut self,
+        mut instances: &mut [QpInstance<T>],
+        mut statuses: &mut [Status],
+        start: QpStart,
+        size_of: impl Fn(&QpInstance<T>) -> Option<Size>,
+    ) {
+        let Self { solver, together } = self;
+        while let Some(first) = instances.first() {
+            let size = size_of(first);
+            let alike = instances.iter().take_while(|instance| size_of(instance) == size).count();
+            let own = take_mut(&mut instances, alike);
+            let statuses = take_mut(&mut statuses, alike);
+            let solved = match size {
+                Some(size) => lanes::solve(together, size, (own, statuses), (&solver.options, start)).is_ok(),
+                None => false,
+            };
+            let mut alone = |index: usize| {
+                if let (Some(instance), Some(status)) = (own.get_mut(index), statuses.get_mut(index)) {
+                    *status = solver.solve(instance.qp.view(), start, instance.solution.view_mut());
+                }
+            };
+            if solved {
+                together.alone().for_each(alone);
+            } else {
+                (0..alike).for_each(&mut alone);
+            }
+        }
     }
 }

@@ -61,11 +61,17 @@ mod condense;
 mod coupling;
 pub(crate) mod element;
 mod error;
+#[cfg(feature = "alloc")]
+mod instance;
 pub(crate) mod interior;
+#[cfg(feature = "alloc")]
+mod lanes;
 mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
 mod problem;
+#[cfg(feature = "alloc")]
+mod queue;
 mod residuals;
 mod solution;
 mod solver;
@@ -76,7 +82,7 @@ mod statistics;
 mod violation;
 
 #[cfg(feature = "alloc")]
-pub use batch::{BatchInteriorPoint, QpInstance};
+pub use batch::BatchInteriorPoint;
 pub use block::{Block, BlockMut};
 pub use bounds::{Bounds, BoundsMut};
 pub use check::check;
@@ -85,6 +91,8 @@ pub use clarabel::{Clarabel, SecondOrderCone};
 #[cfg(feature = "alloc")]
 pub use condense::Condensing;
 pub use error::{QpError, QpField, Side};
+#[cfg(feature = "alloc")]
+pub use instance::QpInstance;
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;
 #[cfg(feature = "alloc")]
@@ -109,7 +117,9 @@ pub(crate) use interior::{
 };
 pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
-pub(crate) use memory::{room, zeros};
+pub(crate) use memory::{reserve, room, zeros};
+#[cfg(feature = "alloc")]
+pub(crate) use queue::{each, threads};
 pub(crate) use residuals::bounds as bound_residuals;
 pub(crate) use stage::Arrays;
 pub(crate) use statistics::larger;

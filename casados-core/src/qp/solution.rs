@@ -282,6 +282,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             upper: take_mut(&mut rest, row),
         }
     }
+    /// The multipliers of lower and of upper bounds.
+    #[cfg(feature = "alloc")]
+    pub(super) fn sides(&self) -> [&[T]; 2] {
+        let [v, dynamics, row] = self.lengths;
+        [0, row].map(|side| part(self.memory.as_ref(), v + dynamics + side, row))
+    }
     /// Everything, and what is padding.
     pub(crate) fn numbers(&self) -> &[T] {
         self.memory.as_ref()
@@ -328,6 +334,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         for place in Places::<T>::new(view.dims) {
             write(view.reborrow().into_stage(place));
         }
+    }
+    /// Makes states, controls and multipliers zero: a seed to be written.
+    pub fn clear(&mut self) {
+        self.memory.as_mut().fill(T::ZERO);
     }
     /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last
     /// stages stay as they are. Stages of different dimensions are not shifted into each other.

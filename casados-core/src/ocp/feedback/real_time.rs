@@ -302,7 +302,7 @@ where
         Ok(Prepared { controller: self })
     }
 
-    pub(super) fn linearise(&mut self) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn linearise(&mut self) -> Result<(), OcpError> {
         self.judge();
         let Self { curvature, monitor, ocp, .. } = self;
         ocp.join_controls();
@@ -315,7 +315,7 @@ where
     }
 
     /// Solves the QP with this state at its start: its solution is the plan.
-    pub(super) fn iterate(&mut self, x0: &[T], over: &mut dyn FnMut() -> bool) -> Result<Step, OcpError> {
+    pub(in crate::ocp) fn iterate(&mut self, x0: &[T], over: &mut dyn FnMut() -> bool) -> Result<Step, OcpError> {
         let Self { curvature, qp_solver, contraction_test, inertia, monitor, ocp, solution, warm } = self;
         ocp.fix_initial_state(x0)?;
         let start = if *warm { QpStart::Warm } else { QpStart::Cold };
@@ -379,7 +379,7 @@ where
 }
 
 /// What an iteration took.
-pub(super) struct Step {
+pub(in crate::ocp) struct Step {
     pub statistics: QpStatistics,
     pub regularisation: f64,
     pub convergence: Option<Convergence>,

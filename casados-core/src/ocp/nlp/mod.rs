@@ -10,6 +10,8 @@ pub(in crate::ocp) mod inertia;
 pub(in crate::ocp) mod ipm;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod multi_start;
+#[cfg(feature = "alloc")]
+pub(in crate::ocp) mod ocp_solver;
 pub(in crate::ocp) mod simulation;
 mod solver;
 pub(in crate::ocp) mod sqp;

@@ -206,6 +206,10 @@ impl fmt::Display for OcpError {
                 "derivatives of solutions are not known where parameters are free: set these with \
                  `set_parameters`, or make them states",
             ),
+            Self::NoSolution => f.write_str(
+                "the last run of this problem did not end at a solution, of which there would be derivatives: \
+                 its outcome says why",
+            ),
             Self::FixedEndTime { model } => write!(
                 f,
                 "the end time is free, and no parameter of `{model}` is a duration: say which one, as in \

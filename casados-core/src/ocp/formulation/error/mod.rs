@@ -234,6 +234,8 @@ pub enum OcpError {
     Coupled,
     /// Parameters are free: derivatives of solutions by the others are not known there.
     FreeParameters,
+    /// The last run did not end at a solution: there are no derivatives of it.
+    NoSolution,
     /// The end of the horizon is free, and no parameter of the model is its duration.
     FixedEndTime {
         /// The model.

@@ -19,7 +19,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 /// What constraints are called.
-pub(super) fn names<C: Constraints<S, T>, S: Shape, T: Real>() -> impl Iterator<Item = String> {
+pub(in crate::ocp) fn names<C: Constraints<S, T>, S: Shape, T: Real>() -> impl Iterator<Item = String> {
     (0..C::ROWS).map(|row| output::<C, S, T>(row).to_string())
 }
 

@@ -20,6 +20,7 @@ mod restore;
 mod series;
 mod violations;
 
+pub(in crate::ocp) use collect::names;
 pub use csv::Csv;
 pub use error::TrajectoryError;
 pub use series::{Kind, Series};
@@ -83,6 +84,15 @@ pub struct Trajectory<T = f64> {
 }
 
 impl<T: Real> Trajectory<T> {
+    /// Of a model, with the unit of its times.
+    pub(in crate::ocp) fn of_series(
+        (model, time_unit): (&str, &str),
+        times: Vec<T>,
+        series: Vec<Series<T>>,
+    ) -> Self {
+        Self { model: model.into(), times, time_unit: time_unit.into(), series }
+    }
+
     /// The last of the times: the end of the horizon, which may have been
     /// [found](crate::ocp::Horizon::free).
     ///

@@ -104,7 +104,7 @@ pub struct Series<T = f64> {
 }
 
 impl<T: Real> Series<T> {
-    pub(super) fn new(kind: Kind, name: impl Into<String>, first: usize, values: Vec<T>) -> Self {
+    pub(in crate::ocp) fn new(kind: Kind, name: impl Into<String>, first: usize, values: Vec<T>) -> Self {
         Self {
             kind,
             name: name.into(),
@@ -120,7 +120,7 @@ impl<T: Real> Series<T> {
     }
 
     /// With a unit.
-    pub(super) fn with_unit(self, unit: impl Into<String>) -> Self {
+    pub(in crate::ocp) fn with_unit(self, unit: impl Into<String>) -> Self {
         Self { unit: unit.into(), ..self }
     }
 

@@ -1,0 +1,186 @@
+//! Derivatives of all instances.
+
+use super::gradients::Gradients;
+use super::{BatchOcp, Worker, refill};
+use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::ocp_solver::OcpSolver;
+use crate::ocp::solution::outcome::Outcome;
+use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};
+use crate::qp::{HeapSolution, assign, each, room};
+use crate::scalar::Real;
+
+impl<P, S, T> BatchOcp<P, S, T>
+where
+    P: Formulation<T> + Clone + Send + Sync,
+    S: OcpSolver<P, T>,
+    T: Real,
+{
+    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀` and `λᵀ dw/dp` of each instance, as
+    /// [`SolutionFactors::adjoint`] has them. `seed` writes the `λ` of an instance over states and
+    /// controls, all zero before, from its number and its solution: the gradient of a loss.
+    ///
+    /// A linearisation and a factorisation for each instance, however many parameters there are.
+    /// An instance whose last run did not end at a solution has no derivatives, and says so; before
+    /// the first run all iterates count as solutions.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]: nothing was computed. Errors of an instance are in its place.
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::{BatchOcp, Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+    /// # use casados::prelude::*;
+    /// #[function]
+    /// fn push(x: f64, u: f64, _p: f64) -> f64 { x + u }
+    /// /// A place `p` to go to.
+    /// #[function]
+    /// fn away(x: f64, u: f64, p: f64) -> [f64; 2] { [x - p, u] }
+    ///
+    /// let mut ocp = Problem::new(Map::<Push, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Away>::diagonal(&[1.0; 2]))
+    ///     .on(Horizon::uniform(30, 0.1))?;
+    /// ocp.fix_initial_state(&[1.0])?.set_parameters(.., &[0.0])?.guess(&[1.0], &[0.0])?;
+    /// let mut batch = BatchOcp::new(&ocp, 10, HeapSqp::new(&ocp)?)?;
+    /// batch.solve()?;
+    /// // The loss ½ (u₀ + 1)²: how it changes with the place.
+    /// let gradients = batch.adjoint(Exact::default(), |_, ocp, seed| {
+    ///     if let (Ok(first), Some(seed)) = (ocp.stage(0), seed.stage_mut(0)) {
+    ///         seed.u[0] = first.u[0] + 1.0;
+    ///     }
+    /// })?;
+    /// // u₀ = 0.618 (p − x₀)
+    /// assert!((gradients.get(3)?.p[0] - 0.618 * (1.0 - 0.618)).abs() < 1e-4);
+    /// # Ok::<(), casados::ocp::OcpError>(())
+    /// ```
+    pub fn adjoint<C: Curvature<P::Dynamics, T> + Sync>(
+        &mut self,
+        curvature: C,
+        seed: impl Fn(usize, &HeapOcp<P, T>, &mut HeapSolution<T>) + Sync,
+    ) -> Result<Gradients<'_, T>, OcpError> {
+        self.gradients(curvature, |instance, ocp, factors, of_seed, [x0, p]| {
+            of_seed.clear();
+            seed(instance, ocp, of_seed);
+            let found = factors.adjoint(of_seed)?;
+            assign(x0, found.x0);
+            assign(p, found.p);
+            Ok(())
+        })
+    }
+
+    /// Gradients of all optimal values: `∂V/∂x₀` and `∂V/∂p` of each instance, as
+    /// [`SolutionFactors::value_gradient_x0`] and `value_gradient_p` have them. The Hessian has no
+    /// part in them: that of Gauss and Newton costs least.
+    ///
+    /// # Errors
+    /// As [`BatchOcp::adjoint`].
+    pub fn value_gradient<C: Curvature<P::Dynamics, T> + Sync>(
+        &mut self,
+        curvature: C,
+    ) -> Result<Gradients<'_, T>, OcpError> {
+        self.gradients(curvature, |_, _, factors, _, [x0, p]| {
+            assign(x0, factors.value_gradient_x0());
+            assign(p, factors.value_gradient_p());
+            Ok(())
+        })
+    }
+
+    /// Factorises each instance at its solution, and asks the factors.
+    #[allow(clippy::type_complexity)]
+    fn gradients<C: Curvature<P::Dynamics, T> + Sync>(
+        &mut self,
+        curvature: C,
+        ask: impl Fn(
+            usize,
+            &HeapOcp<P, T>,
+            &mut SolutionFactors<T>,
+            &mut HeapSolution<T>,
+            [&mut [T]; 2],
+        ) -> Result<(), OcpError>
+        + Sync,
+    ) -> Result<Gradients<'_, T>, OcpError> {
+        let (threads, smoothing) = (self.hire()?, self.smoothing);
+        let Self { instances, workers, gradients, outcomes, .. } = self;
+        let workers = workers.get_mut(..threads).unwrap_or_default();
+        let Some(first) = instances.first() else { return Ok(gradients.view()) };
+        for worker in workers.iter_mut().filter(|worker| worker.adjoint.is_none()) {
+            worker.adjoint = Some((SolutionFactors::new(first)?, HeapSolution::new(first.qp().dims())?));
+        }
+        let places = gradients.places(instances.len())?;
+        let items = instances.iter_mut().zip(places).enumerate();
+        each(workers, items, |Worker { adjoint, .. }, (i, (ocp, (status, [x0, p])))| {
+            let Some((factors, seed)) = adjoint else { return };
+            factors.smoothing = smoothing;
+            x0.fill(T::ZERO);
+            p.fill(T::ZERO);
+            *status = is_solution(outcomes, i)
+                .and_then(|()| ocp.factorise(curvature, factors))
+                .and_then(|()| ask(i, ocp, factors, seed, [x0, p]));
+        });
+        Ok(gradients.view())
+    }
+
+    /// Derivatives of all solutions by initial states and parameters, and gains, as
+    /// [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) has them: the status of each
+    /// instance. [`BatchOcp::sensitivities`] has the derivatives.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]: nothing was computed. Errors of an instance are in its place.
+    ///
+    /// # Example
+    /// ```
+    /// # use casados::ocp::{BatchOcp, Exact, HeapIpm, Horizon, LeastSquaresCost, Map, Problem};
+    /// # use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+    /// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    /// #     .on(Horizon::uniform(20, 0.1))?;
+    /// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let mut batch = BatchOcp::new(&ocp, 5, HeapIpm::new(&ocp)?)?;
+    /// batch.solve()?;
+    /// assert!(batch.differentiate(Exact::default())?.iter().all(Result::is_ok));
+    /// let fifth = batch.sensitivities(4).ok_or("there are five")?;
+    /// assert!((fifth.du(0)[0] + 0.618).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn differentiate<C: Curvature<P::Dynamics, T> + Sync>(
+        &mut self,
+        curvature: C,
+    ) -> Result<&[Result<(), OcpError>], OcpError> {
+        let (threads, smoothing) = (self.hire()?, self.smoothing);
+        let Self { instances, workers, forward, statuses, outcomes, .. } = self;
+        room(forward, instances.len().saturating_sub(forward.len()))?;
+        while let Some(ocp) = instances.get(forward.len()) {
+            forward.push(Sensitivities::new(ocp)?);
+        }
+        refill(statuses, instances.len(), || Ok(()))?;
+        let workers = workers.get_mut(..threads).unwrap_or_default();
+        let items = instances.iter_mut().zip(forward).zip(&mut *statuses).enumerate();
+        each(workers, items, |_, (i, ((ocp, result), status))| {
+            result.factors().smoothing = smoothing;
+            *status = is_solution(outcomes, i).and_then(|()| ocp.differentiate(curvature, result));
+        });
+        Ok(statuses)
+    }
+
+    /// The derivatives of the last [`BatchOcp::differentiate`]; none of an instance that has none.
+    #[must_use]
+    pub fn sensitivities(&self, instance: usize) -> Option<&Sensitivities<T>> {
+        self.statuses.get(instance)?.as_ref().ok()?;
+        self.forward.get(instance)
+    }
+}
+
+/// Whether the iterate of an instance is a solution, as far as anybody has said.
+fn is_solution(outcomes: &[Result<Outcome, OcpError>], instance: usize) -> Result<(), OcpError> {
+    match outcomes.get(instance) {
+        Some(Err(error)) => Err(*error),
+        Some(Ok(outcome)) if !outcome.is_solved() => Err(OcpError::NoSolution),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,124 @@
+//! Gradients of all instances.
+
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::problem::Formulation;
+use crate::qp::{part, reserve};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+
+/// A gradient of an instance: `λᵀ dw/d·` of its solution `w`, or `∂V/d·` of its value.
+///
+/// ```
+/// # use casados::ocp::{BatchOcp, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut batch = BatchOcp::new(&ocp, 2, HeapSqp::new(&ocp)?)?;
+/// batch.solve()?;
+/// // The value is ½ · 1.618 x².
+/// let gradients = batch.value_gradient(GaussNewton::default())?;
+/// assert!((gradients.get(0)?.x0[0] - 1.618).abs() < 1e-3);
+/// # Ok::<(), casados::ocp::OcpError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Gradient<'a, T> {
+    /// By the initial state, `NX`; zero where it is free.
+    pub x0: &'a [T],
+    /// By the parameters, `NP`, which change at all stages together.
+    pub p: &'a [T],
+}
+
+/// The gradients of all instances, or why there is none.
+///
+/// ```
+/// # use casados::ocp::{BatchOcp, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(20, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut batch = BatchOcp::new(&ocp, 2, HeapSqp::new(&ocp)?)?;
+/// batch.solve()?;
+/// let gradients = batch.value_gradient(GaussNewton::default())?;
+/// // Those that there are; others have an error in their place.
+/// let sum: f64 = gradients.iter().flatten().map(|gradient| gradient.x0[0]).sum();
+/// assert!((sum - 2.0 * 1.618).abs() < 1e-3 && gradients.get(0).is_ok());
+/// # Ok::<(), casados::ocp::OcpError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Gradients<'a, T> {
+    memory: &'a Memory<T>,
+}
+
+impl<'a, T: Real> Gradients<'a, T> {
+    /// That of an instance.
+    ///
+    /// # Errors
+    /// [`OcpError::NoSolution`] where the last run of the instance did not end at a solution, or the
+    /// error that it ended with, or where there is no such instance; those of
+    /// [`Ocp::factorise`](crate::ocp::Ocp::factorise).
+    pub fn get(&self, instance: usize) -> Result<Gradient<'a, T>, OcpError> {
+        let Memory { dims: [nx, np], x0, p, statuses } = self.memory;
+        statuses.get(instance).copied().unwrap_or(Err(OcpError::NoSolution))?;
+        Ok(Gradient { x0: part(x0, instance * nx, *nx), p: part(p, instance * np, *np) })
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Result<Gradient<'a, T>, OcpError>> + use<'a, T> {
+        let all = *self;
+        (0..self.memory.statuses.len()).map(move |instance| all.get(instance))
+    }
+}
+
+/// Where they are.
+#[derive(Clone, Debug)]
+pub struct Memory<T> {
+    /// `NX`, `NP`
+    dims: [usize; 2],
+    x0: Vec<T>,
+    p: Vec<T>,
+    statuses: Vec<Result<(), OcpError>>,
+}
+
+impl<T: Real> Memory<T> {
+    /// Of no instance.
+    pub fn new<P: Formulation<T>>() -> Self {
+        let dims = [P::Shape::NX, P::Shape::NP];
+        Self { dims, x0: Vec::new(), p: Vec::new(), statuses: Vec::new() }
+    }
+
+    /// Room for as many instances: the status and both gradients of each.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn places(
+        &mut self,
+        count: usize,
+    ) -> Result<impl Iterator<Item = (&mut Result<(), OcpError>, [&mut [T]; 2])> + Send, OcpError> {
+        let [nx, np] = self.dims;
+        super::refill(&mut self.statuses, count, || Ok(()))?;
+        reserve(&mut self.x0, count * nx)?;
+        reserve(&mut self.p, count * np)?;
+        let (mut x0, mut p) = (&mut *self.x0, &mut *self.p);
+        Ok(self.statuses.iter_mut().map(move |status| {
+            (status, [crate::qp::take_mut(&mut x0, nx), crate::qp::take_mut(&mut p, np)])
+        }))
+    }
+
+    /// To be read.
+    pub fn view(&self) -> Gradients<'_, T> {
+        Gradients { memory: self }
+    }
+}

@@ -1,0 +1,266 @@
+//! Closed loops: a controller and a plant, sample after sample.
+
+use crate::integrator::Integrator;
+use crate::model::VectorP;
+use crate::ocp::assembly::curvature::Curvature;
+pub use crate::ocp::feedback::closed_record::ClosedLoop;
+use crate::ocp::feedback::closed_record::Recorder;
+use crate::ocp::feedback::real_time::HeapRealTime;
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::functions::dynamics::vector;
+use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::nlp::ocp_solver::OcpSolver;
+use crate::ocp::nlp::watch::Watch;
+use crate::qp::{QpSolver, assign, each, room, threads, zeros};
+use crate::scalar::Real;
+use crate::shape::{Matrix as _, Shape};
+use alloc::vec::Vec;
+
+/// Where a closed loop is.
+///
+/// ```
+/// use casados::ocp::Sample;
+///
+/// /// A push of the plant, in the twentieth sample.
+/// fn push(sample: Sample<f64>, x: &mut [f64]) {
+///     if sample.index == 20 {
+///         x[1] += 1.0;
+///     }
+/// }
+/// # let _: fn(Sample<f64>, &mut [f64]) = push;
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Sample<T> {
+    /// The number of the sample, from zero.
+    pub index: usize,
+    /// Its time, from zero.
+    pub time: T,
+    /// How long it is: the first interval of the controller's horizon.
+    pub length: T,
+}
+
+/// What has a control for each state: [`HeapRealTime`], by an iteration in each sample; and a
+/// problem with a solver, `(ocp, sqp)`, by its solution. One of one's own may filter measurements, or
+/// change references and parameters before it asks another one.
+///
+/// ```
+/// use casados::ocp::{Controller, Formulation, HeapOcp, OcpError};
+///
+/// /// A controller that sees the state as a broken sensor shows it.
+/// struct Stuck<K>(K);
+///
+/// impl<P: Formulation<f64>, K: Controller<P, f64>> Controller<P, f64> for Stuck<K> {
+///     fn control(&mut self, x: &[f64], u: &mut [f64]) -> Result<(), OcpError> {
+///         let mut seen = x.to_vec();
+///         seen[0] = seen[0].clamp(-0.5, 0.5);
+///         self.0.control(&seen, u)
+///     }
+///     fn problem(&mut self) -> &mut HeapOcp<P> {
+///         self.0.problem()
+///     }
+/// }
+/// ```
+pub trait Controller<P, T: Real> {
+    /// Writes the control for a state, and makes ready for the next sample.
+    ///
+    /// # Errors
+    /// Those of the solver: then the loop goes on with the control before.
+    fn control(&mut self, x: &[T], u: &mut [T]) -> Result<(), OcpError>;
+
+    /// The problem: the costs and constraints of its first stage are those of the sample.
+    fn problem(&mut self) -> &mut HeapOcp<P, T>;
+}
+
+impl<P: Formulation<T>, S: QpSolver<T>, C: Curvature<P::Dynamics, T>, T: Real> Controller<P, T>
+    for HeapRealTime<P, S, C, T>
+{
+    fn control(&mut self, x: &[T], u: &mut [T]) -> Result<(), OcpError> {
+        assign(u, self.prepare()?.feedback(x)?.u);
+        self.shift();
+        Ok(())
+    }
+    fn problem(&mut self) -> &mut HeapOcp<P, T> {
+        self.ocp_mut()
+    }
+}
+
+impl<P: Formulation<T>, S: OcpSolver<P, T>, T: Real> Controller<P, T> for (HeapOcp<P, T>, S) {
+    fn control(&mut self, x: &[T], u: &mut [T]) -> Result<(), OcpError> {
+        let (ocp, solver) = self;
+        ocp.fix_initial_state(x)?;
+        if !solver.solve(ocp)?.is_solved() {
+            return Err(OcpError::NoSolution);
+        }
+        assign(u, ocp.stage(0)?.u);
+        ocp.shift();
+        Ok(())
+    }
+    fn problem(&mut self) -> &mut HeapOcp<P, T> {
+        &mut self.0
+    }
+}
+
+/// A plant for [`closed_loop`]: an integrator, with parameters of its own.
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Problem, closed_loop, plant};
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// /// A mass on a spring; the controller and the plant do not agree about its stiffness.
+/// #[ode]
+/// fn spring(x: [f64; 2], u: f64, p: f64) -> [f64; 2] { [x[1], u - p * x[0]] }
+/// #[function]
+/// fn all(x: [f64; 2], u: f64, _p: f64) -> [f64; 3] { [x[0], x[1], u] }
+///
+/// let mut ocp = Problem::new(Erk::<Spring, Rk4>::new(Options::default())?)
+///     .running_cost(LeastSquaresCost::<All>::diagonal(&[1.0, 0.1, 0.1]))
+///     .on(Horizon::uniform(20, 0.1))?;
+/// ocp.fix_initial_state(&[1.0, 0.0])?.set_parameters(.., &[1.0])?.guess(&[0.0; 2], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let mut erk = Erk::<Spring, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let run = closed_loop(&mut controller, plant(&mut erk, &vector![1.3]), |_, _| {}, &[1.0, 0.0], 60)?;
+/// assert!(run.trajectory.state("x[0]")?[60].abs() < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn plant<I: Integrator>(
+    integrator: &mut I,
+    p: &VectorP<I::Model, I::Number>,
+) -> impl FnMut(Sample<I::Number>, &[I::Number], &mut [I::Number]) -> Result<(), OcpError> {
+    let p = *p;
+    move |sample, u, x| {
+        integrator.set_parameters(&p)?;
+        integrator.set_time(sample.time)?;
+        let end = integrator.solve(&vector(x), &vector(u), sample.length)?;
+        assign(x, end.x.as_slice());
+        Ok(())
+    }
+}
+
+/// Simulates a closed loop: in each sample the controller gives a control for the state, the plant
+/// goes on with it, and the disturbance changes where it arrives.
+///
+/// `plant(sample, u, x)` writes the state at the end of the sample over that at its begin;
+/// [`plant`] makes one of an integrator. `disturbance(sample, x)` changes it then; `|_, _| {}` does
+/// not. Where the controller has no control the one before is held, zero at first, and
+/// [`ClosedLoop::failures`] says why.
+///
+/// Costs are those of the stage cost of the controller's problem at its first stage, at states and
+/// controls as they were; bounds and path constraints, too.
+///
+/// # Errors
+/// [`OcpError::Length`] if the state has other dimensions; [`OcpError::Unsupported`] where costs or
+/// constraints have algebraic states; errors of the plant; [`OcpError::NonFiniteFunction`] where a
+/// cost has no value; [`OcpError::OutOfMemory`].
+///
+/// # Example
+/// ```
+/// use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Problem, closed_loop, plant};
+/// use casados::prelude::*;
+/// use nalgebra::Vector0;
+///
+/// /// A pendulum that stands at zero: angle, rate.
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u + 9.81 * x[0].sin()] }
+/// #[function]
+/// fn deviation(x: [f64; 2], u: f64) -> [f64; 3] { [x[0], x[1], u] }
+///
+/// let mut ocp = Problem::new(Erk::<Pendulum, Rk4>::new(Options::default())?)
+///     .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.1, 0.01]))
+///     .on(Horizon::uniform(20, 0.05))?;
+/// ocp.fix_initial_state(&[0.3, 0.0])?.bound("u", .., -6.0, 6.0)?.guess(&[0.0; 2], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 4, ..Default::default() })?;
+/// let push = |sample: casados::ocp::Sample<f64>, x: &mut [f64]| {
+///     if sample.index == 20 {
+///         x[1] += 0.5;
+///     }
+/// };
+/// let run = closed_loop(&mut controller, plant(&mut erk, &Vector0::new()), push, &[0.3, 0.0], 80)?;
+/// assert!(run.failures.is_empty() && run.trajectory.state("x[0]")?[80].abs() < 1e-3);
+/// assert!(run.trajectory.violations(1e-6).is_empty());
+/// println!("{} in all\n{}", run.cost(), run.trajectory.csv());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn closed_loop<P: Formulation<T>, T: Real>(
+    controller: &mut impl Controller<P, T>,
+    mut plant: impl FnMut(Sample<T>, &[T], &mut [T]) -> Result<(), OcpError>,
+    mut disturbance: impl FnMut(Sample<T>, &mut [T]),
+    x0: &[T],
+    samples: usize,
+) -> Result<ClosedLoop<T>, OcpError> {
+    let (mut x, mut u) = (zeros(P::Shape::NX)?, zeros(P::Shape::NU)?);
+    let mut recorder = Recorder::new(controller.problem(), x0, samples)?;
+    assign(&mut x, x0);
+    let length = recorder.length;
+    for index in 0..samples {
+        let sample = Sample { index, time: T::from_whole(index) * length, length };
+        let mut watch = Watch::start();
+        let result = controller.control(&x, &mut u);
+        let duration = watch.lap();
+        recorder.record(controller.problem(), [&x, &u], (result, duration))?;
+        plant(sample, &u, &mut x)?;
+        disturbance(sample, &mut x);
+    }
+    recorder.end(controller.problem(), &x)
+}
+
+/// Runs many closed loops, or whatever else `run` does: `make` makes what a run works with, once
+/// for each thread, and `run` takes it with the number of the run. With the feature `parallel` runs
+/// are shared among the threads of rayon. Results are in the order of the runs, and the same
+/// whatever the number of threads if each run begins with all that it depends on.
+///
+/// # Errors
+/// Those of `make`, and [`OcpError::OutOfMemory`].
+///
+/// # Example
+/// ```
+/// use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Map, Problem, closed_loop, closed_loops};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+///
+/// let make = || {
+///     let mut ocp = Problem::new(Map::<Push, f64>::new())
+///         .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+///         .on(Horizon::uniform(10, 1.0))?;
+///     ocp.fix_initial_state(&[1.0])?.guess(&[0.0], &[0.0])?;
+///     HeapRealTime::new(ocp)
+/// };
+/// // Plants that are pushed by less or more than the controller believes.
+/// let runs = closed_loops(100, make, |controller, run| {
+///     controller.reset();
+///     controller.ocp_mut().guess(&[0.0], &[0.0])?;
+///     let gain = 0.5 + 0.01 * run as f64;
+///     let plant = |_, u: &[f64], x: &mut [f64]| {
+///         x[0] += gain * u[0];
+///         Ok(())
+///     };
+///     closed_loop(controller, plant, |_, _| {}, &[1.0], 40)
+/// })?;
+/// let worst = runs.iter().flatten().map(|run| run.cost()).fold(0.0, f64::max);
+/// assert!(runs.len() == 100 && runs.iter().all(Result::is_ok) && worst < 1.3);
+/// # Ok::<(), casados::ocp::OcpError>(())
+/// ```
+pub fn closed_loops<W: Send, R: Send>(
+    count: usize,
+    make: impl Fn() -> Result<W, OcpError>,
+    run: impl Fn(&mut W, usize) -> R + Sync,
+) -> Result<Vec<R>, OcpError> {
+    let (mut workers, mut results): (Vec<W>, Vec<Option<R>>) = (Vec::new(), Vec::new());
+    let threads = threads(count);
+    room(&mut workers, threads)?;
+    for _ in 0..threads.min(count) {
+        workers.push(make()?);
+    }
+    room(&mut results, count)?;
+    results.resize_with(count, || None);
+    each(&mut workers, results.iter_mut().enumerate(), |worker, (index, result)| {
+        *result = Some(run(worker, index));
+    });
+    Ok(results.into_iter().flatten().collect())
+}

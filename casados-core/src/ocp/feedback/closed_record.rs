@@ -1,0 +1,204 @@
+//! What is recorded of a closed loop.
+
+use crate::ocp::formulation::check::Labels;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
+use crate::ocp::formulation::functions::cost::Cost;
+use crate::ocp::formulation::functions::dynamics::Dynamics;
+use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::instance::data::{Node, is_algebraic, split};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::solution::trajectory::{Kind, Series, Trajectory, names};
+use crate::qp::{Bounds, part, part_mut, room, zeros};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::string::ToString;
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// A closed loop as it was; see [`closed_loop`](crate::ocp::closed_loop).
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Map, Problem, closed_loop};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 1.0))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[0.0], &[0.0])?;
+/// # let mut controller = HeapRealTime::new(ocp)?;
+/// # let plant = |_, u: &[f64], x: &mut [f64]| {
+/// #     x[0] += u[0];
+/// #     Ok(())
+/// # };
+/// let run = closed_loop(&mut controller, plant, |_, _| {}, &[1.0], 30)?;
+/// let (x, u) = (run.trajectory.state("x")?, run.trajectory.control("u")?);
+/// assert!(x.len() == 31 && u.len() == 30 && x[30].abs() < 1e-6);
+/// // The cost of the linear-quadratic regulator, ½ · 1.618 x₀².
+/// assert!((run.cost() - 0.809).abs() < 1e-3);
+/// let slowest = run.durations.iter().copied().fold(0.0, f64::max);
+/// println!("{slowest} s at most, of {} samples without a control", run.failures.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct ClosedLoop<T = f64> {
+    /// States at the begin of every sample and at the end, controls, and path constraints, by their
+    /// names, with the bounds of the controller's problem: to be drawn, written, and asked for
+    /// violations. Times begin at zero.
+    pub trajectory: Trajectory<T>,
+    /// The stage cost of each sample.
+    pub costs: Vec<T>,
+    /// How long the controller took in each sample, in seconds; zero where there is no clock
+    /// (without the feature `std`).
+    pub durations: Vec<f64>,
+    /// Samples without a control, in which the one before was held, and why.
+    pub failures: Vec<(usize, OcpError)>,
+}
+
+impl<T: Real> ClosedLoop<T> {
+    /// The sum of all costs.
+    #[must_use]
+    pub fn cost(&self) -> T {
+        self.costs.iter().fold(T::ZERO, |sum, &cost| sum + cost)
+    }
+}
+
+/// A loop while it runs.
+pub struct Recorder<T> {
+    /// How long a sample is.
+    pub length: T,
+    /// One row after the other: states of all samples and of the end, controls, path constraints.
+    x: Vec<T>,
+    u: Vec<T>,
+    g: Vec<T>,
+    costs: Vec<T>,
+    durations: Vec<f64>,
+    failures: Vec<(usize, OcpError)>,
+}
+
+impl<T: Real> Recorder<T> {
+    /// Of so many samples from a state on.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::Unsupported`],
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(
+        ocp: &mut HeapOcp<P, T>,
+        x0: &[T],
+        samples: usize,
+    ) -> Result<Self, OcpError> {
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
+        if is_algebraic::<P, T>() || ocp.free.count() > 0 {
+            let what = "closed loops with algebraic states in costs or constraints, or with free parameters";
+            return Err(OcpError::Unsupported { what });
+        }
+        let times = ocp.times();
+        let length = times.get(1).copied().unwrap_or(T::ONE) - times.first().copied().unwrap_or(T::ZERO);
+        let mut recorder = Self {
+            length,
+            x: Vec::new(),
+            u: Vec::new(),
+            g: zeros(P::Path::ROWS)?,
+            costs: Vec::new(),
+            durations: Vec::new(),
+            failures: Vec::new(),
+        };
+        room(&mut recorder.x, (samples.saturating_add(1)).saturating_mul(P::Shape::NX))?;
+        room(&mut recorder.u, samples.saturating_mul(P::Shape::NU))?;
+        room(&mut recorder.g, samples.saturating_mul(P::Path::ROWS))?;
+        recorder.g.clear();
+        room(&mut recorder.costs, samples)?;
+        room(&mut recorder.durations, samples)?;
+        Ok(recorder)
+    }
+
+    /// A sample: state, control, and what the controller said and took.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    pub fn record<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut HeapOcp<P, T>,
+        [x, u]: [&[T]; 2],
+        (result, duration): (Result<(), OcpError>, f64),
+    ) -> Result<(), OcpError> {
+        if let Err(error) = result {
+            self.failures.push((self.costs.len(), error));
+        }
+        self.x.extend_from_slice(x);
+        self.u.extend_from_slice(u);
+        self.durations.push(duration);
+        let layout = ocp.layout();
+        let data = split::<P, T>(&mut ocp.data, layout);
+        let Problem { stage_cost, path, running, .. } = ocp.problem.parts();
+        let given = [&*data.times, &*data.p, &*data.references];
+        let node = Node::new::<P>(0, layout.intervals, *running, given);
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        read::<P::Shape, T>(&mut point, [x, &[], u, node.p], node.time);
+        self.costs.push(stage_cost.value(&point, node.reference, 0)? * node.factor);
+        let begin = self.g.len();
+        self.g.resize(begin + P::Path::ROWS, T::ZERO);
+        let rows = part_mut(&mut self.g, begin, P::Path::ROWS);
+        path.value(&point, rows, Spot::new(0, Free::default(), &[]))
+    }
+
+    /// The whole loop.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn end<P: Formulation<T>>(
+        mut self,
+        ocp: &mut HeapOcp<P, T>,
+        x: &[T],
+    ) -> Result<ClosedLoop<T>, OcpError> {
+        self.x.extend_from_slice(x);
+        let samples = self.costs.len();
+        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let times = (0..=samples).map(|k| T::from_whole(k) * self.length).collect();
+        let qp = ocp.qp.view();
+        let mut series = Vec::new();
+        let column = |rows: &[T], width: usize, i: usize| {
+            rows.chunks_exact(width.max(1)).filter_map(|row| row.get(i).copied()).collect()
+        };
+        // The first state is given: its bounds are those of the next one.
+        let bounds = [qp.stage(1).map(|stage| stage.x_bounds()), qp.stage(0).map(|stage| stage.u_bounds())];
+        let all = [(Kind::State, known.x, known.units.x, &self.x), (Kind::Control, known.u, known.units.u, &self.u)];
+        for ((kind, names, units, rows), bounds) in all.into_iter().zip(bounds) {
+            for (i, &name) in names.iter().enumerate() {
+                let unit = units.get(i).copied().unwrap_or_default();
+                let new = Series::new(kind, name, 0, column(rows, names.len(), i)).with_unit(unit);
+                series.push(match bounds {
+                    Some(Bounds { lower, upper, .. }) => with_bounds(new, [lower, upper], i),
+                    None => new,
+                });
+            }
+        }
+        let layout = ocp.layout();
+        let data = split::<P, T>(&mut ocp.data, layout);
+        let (lower, upper) = (part(data.lower, 0, P::Path::ROWS), part(data.upper, 0, P::Path::ROWS));
+        for (row, name) in names::<P::Path, _, T>().enumerate() {
+            let values = column(&self.g, P::Path::ROWS, row);
+            let new = Series::new(Kind::Path, name.to_string(), 0, values).with_unit(P::Path::unit(row));
+            series.push(with_bounds(new, [lower, upper], row));
+        }
+        let trajectory = Trajectory::of_series((known.model, known.units.t), times, series);
+        let Self { costs, durations, failures, .. } = self;
+        Ok(ClosedLoop { trajectory, costs, durations, failures })
+    }
+}
+
+/// The same with the bounds of an element, at all times.
+fn with_bounds<T: Real>(mut series: Series<T>, bounds: [&[T]; 2], element: usize) -> Series<T> {
+    let [lower, upper] = bounds.map(|list| list.get(element).copied().filter(|bound| bound.is_finite()));
+    if lower.is_some() || upper.is_some() {
+        series.lower.resize(series.values.len(), lower);
+        series.upper.resize(series.values.len(), upper);
+    }
+    series
+}

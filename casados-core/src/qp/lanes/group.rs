@@ -1,0 +1,288 @@
+//! A group of problems, one in each lane, and the solution of their equations for given sets of
+//! active bounds.
+//!
+//! ```text
+//! M = H + [A B]ᵀ P₊ [A B],  m = g + [A B]ᵀ (p₊ + P₊ b)        of a control at a bound: its row is u = bound
+//! M_uu = L Lᵀ,  K = M_xu L⁻ᵀ,  P = M_xx − K Kᵀ,  p = m_x − K L⁻¹ m_u
+//! ```
+//!
+//! as [`interior::riccati`](super::super::interior) has it; then states and controls forwards, and
+//! multipliers backwards, with the gradients in the controls: of a control at a bound it is its
+//! multiplier, of others what is left of the equations.
+
+use super::cells::{
+    Matrix, Start, assign_negative, mirror, product, scale, subtract, subtract_scaled, subtract_transposed,
+};
+use crate::qp::layout::{StageDims, assign, part, part_mut, take_mut};
+use crate::scalar::Lanes;
+
+/// Pivots below this part of the diagonal that they are left of may be rounding errors: such a
+/// problem leaves the group.
+const WEAK: f64 = 1e-7;
+
+/// The dimensions of problems that can be in one group: all stages alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    pub nx: usize,
+    pub nu: usize,
+    pub intervals: usize,
+}
+
+impl Size {
+    /// Of stages that are alike, without general constraints, the last one without controls.
+    pub fn of(dims: &[StageDims]) -> Option<Self> {
+        let (last, before) = dims.split_last()?;
+        let StageDims { nx, nu, .. } = *before.first()?;
+        let alike = before.iter().all(|stage| *stage == StageDims::new(nx, nu, 0));
+        (alike && *last == StageDims::new(nx, 0, 0) && nx > 0 && nu > 0)
+            .then_some(Self { nx, nu, intervals: before.len() })
+    }
+    /// `nx + nu`
+    pub const fn n(&self) -> usize {
+        self.nx + self.nu
+    }
+    /// How many cells a group takes.
+    pub const fn cells(&self) -> usize {
+        let (Self { nx, nu, intervals }, n) = (*self, self.n());
+        (intervals + 1) * (n * n + 2 * n + nx)
+            + intervals * (n * nx + nx + 3 * nu + n * nu + 3 * nu)
+            + nx * nx
+            + n * nx
+            + n * n
+            + 2 * n
+            + 1
+    }
+}
+
+/// The data of a group, its sets, and its point; arrays over the horizon.
+pub struct Group<'m, C> {
+    pub size: Size,
+    /// `[A B]ᵀ`, a column for each next state.
+    pub dynamics: &'m mut [C],
+    /// Both triangles; of the last stage rows of controls are zero.
+    pub hessian: &'m mut [C],
+    pub gradient: &'m mut [C],
+    /// `b`
+    pub offset: &'m mut [C],
+    pub lower: &'m mut [C],
+    pub upper: &'m mut [C],
+    /// Which bound a control is at: −1 the lower, 1 the upper, 0 none.
+    pub active: &'m mut [C],
+    /// `(x, u)`
+    pub v: &'m mut [C],
+    /// `π` of the dynamics that lead to a stage; at the first one the gradient in its state.
+    pub multipliers: &'m mut [C],
+    /// The gradient of the Lagrangian in the controls, without multipliers of their bounds.
+    pub slope: &'m mut [C],
+    /// Whether a pivot was weak: above zero.
+    pub weak: &'m mut [C],
+    /// `(K; L)`
+    panels: &'m mut [C],
+    /// Reciprocals of pivots, and `L⁻¹ m_u`.
+    inverse: &'m mut [C],
+    y: &'m mut [C],
+    /// Of the stage at work: `P`, `−[A B]ᵀ P`, `M`, `m`, `−(p + P b)`.
+    p: &'m mut [C],
+    w: &'m mut [C],
+    m: &'m mut [C],
+    pub g: &'m mut [C],
+    pub minus: &'m mut [C],
+}
+
+impl<'m, C: Copy> Group<'m, C> {
+    /// In memory of [`Size::cells`].
+    pub fn new(size: Size, mut memory: &'m mut [C]) -> Self {
+        let (Size { nx, nu, intervals }, n) = (size, size.n());
+        let memory = &mut memory;
+        let mut take = |length| take_mut(memory, length);
+        Self {
+            size,
+            dynamics: take(intervals * n * nx),
+            hessian: take((intervals + 1) * n * n),
+            gradient: take((intervals + 1) * n),
+            offset: take(intervals * nx),
+            lower: take(intervals * nu),
+            upper: take(intervals * nu),
+            active: take(intervals * nu),
+            v: take((intervals + 1) * n),
+            multipliers: take((intervals + 1) * nx),
+            slope: take(intervals * nu),
+            weak: take(1),
+            panels: take(intervals * n * nu),
+            inverse: take(intervals * nu),
+            y: take(intervals * nu),
+            p: take(nx * nx),
+            w: take(n * nx),
+            m: take(n * n),
+            g: take(n),
+            minus: take(n),
+        }
+    }
+
+    /// The solution for the sets of active bounds.
+    #[inline(always)]
+    pub fn solve<E: Lanes<Cell = C>>(&mut self) {
+        self.backward::<E>();
+        self.forward::<E>();
+        self.multiply::<E>();
+    }
+
+    #[inline(always)]
+    fn backward<E: Lanes<Cell = C>>(&mut self) {
+        let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
+        let last = part(self.hessian, intervals * n * n, n * n);
+        for (p, h) in self.p.chunks_exact_mut(nx.max(1)).zip(last.chunks_exact(n.max(1))) {
+            assign(p, h);
+        }
+        assign(self.g, part(self.gradient, intervals * n, n));
+        let mut weak = E::from_f64(0.0);
+        for k in (0..intervals).rev() {
+            let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
+            let hessian = Matrix { data: part(self.hessian, k * n * n, n * n), ld: n };
+            let p = Matrix { data: &*self.p, ld: nx };
+            assign_negative::<E>(part_mut(self.minus, 0, nx), self.g);
+            subtract::<E>(self.minus, p, part(self.offset, k * nx, nx), [nx, nx]);
+            product::<E>((self.w, n), Start::Zero, (dynamics, p), [n, nx, nx], false);
+            let w = Matrix { data: &*self.w, ld: n };
+            product::<E>((self.m, n), Start::Matrix(hessian), (dynamics, w), [n, n, nx], true);
+            assign(self.g, part(self.gradient, k * n, n));
+            subtract::<E>(self.g, dynamics, self.minus, [n, nx]);
+            self.fix_active::<E>(k);
+            weak = weak + self.eliminate::<E>(k);
+            let panel = Matrix { data: part(self.panels, k * n * nu, n * nu), ld: n };
+            let start = Start::Matrix(Matrix { data: &*self.m, ld: n });
+            product::<E>((self.p, nx), start, (panel, panel), [nx, nx, nu], true);
+            mirror(self.p, nx);
+        }
+        for to in self.weak.iter_mut() {
+            weak.store(to);
+        }
+    }
+
+    /// Columns of controls as a panel. A control at a bound has the row and column of the identity:
+    /// what it does to the others is in their gradients.
+    #[inline(always)]
+    fn fix_active<E: Lanes<Cell = C>>(&mut self, k: usize) {
+        let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
+        let panel = part_mut(self.panels, k * n * nu, n * nu);
+        for (c, column) in panel.chunks_exact_mut(n.max(1)).enumerate() {
+            let of_controls = part(self.m, (nx + c) * n, n);
+            for (i, to) in column.iter_mut().enumerate() {
+                // Above the diagonal there is nothing.
+                let from =
+                    if i >= nx + c { of_controls.get(i) } else { self.m.get(i * n + nx + c) };
+                if let Some(&from) = from {
+                    *to = from;
+                }
+            }
+        }
+        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
+        let active = part(self.active, k * nu, nu);
+        let (lower, upper) = (part(self.lower, k * nu, nu), part(self.upper, k * nu, nu));
+        let bound = |active: E, lower: &C, upper: &C| {
+            let at_upper = E::select(E::lt(zero, active), E::load(upper), zero);
+            E::select(E::lt(active, zero), E::load(lower), at_upper)
+        };
+        let controls = || active.iter().zip(lower).zip(upper).enumerate();
+        for (c, ((active, lower), upper)) in controls() {
+            let bound = bound(E::load(active), lower, upper);
+            subtract_scaled(self.g, -bound, part(panel, c * n, n));
+        }
+        for (c, ((active, lower), upper)) in controls() {
+            let active = E::load(active);
+            let (fixed, bound) = (active * active, bound(active, lower, upper));
+            let free = one - fixed;
+            scale(part_mut(panel, c * n, n), free);
+            for column in panel.chunks_exact_mut(n.max(1)) {
+                scale(part_mut(column, nx + c, 1), free);
+            }
+            for pivot in part_mut(panel, c * n + nx + c, 1) {
+                (E::load(pivot) + fixed).store(pivot);
+            }
+            for g in part_mut(self.g, nx + c, 1) {
+                (E::load(g) * free - bound).store(g);
+            }
+        }
+    }
+
+    /// Eliminates the controls of a stage; above zero where a pivot was weak.
+    #[inline(always)]
+    fn eliminate<E: Lanes<Cell = C>>(&mut self, k: usize) -> E {
+        let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
+        let (zero, one, part_of) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(WEAK));
+        let panel = part_mut(self.panels, k * n * nu, n * nu);
+        let inverse = part_mut(self.inverse, k * nu, nu);
+        let y = part_mut(self.y, k * nu, nu);
+        let mut weak = zero;
+        for (c, (inverse, y)) in inverse.iter_mut().zip(y).enumerate() {
+            let (before, rest) = panel.split_at_mut_checked(c * n).unwrap_or_default();
+            let column = part_mut(rest, 0, n);
+            let diagonal = column.get(nx + c).map_or(one, E::load);
+            for other in before.chunks_exact(n.max(1)) {
+                let factor = other.get(nx + c).map_or(zero, E::load);
+                subtract_scaled(part_mut(column, 0, nx), factor, other);
+                subtract_scaled(part_mut(column, nx + c, nu - c), factor, part(other, nx + c, nu - c));
+            }
+            let pivot = column.get(nx + c).map_or(one, E::load);
+            weak = weak + E::select(E::lt(pivot, part_of * diagonal), one, zero);
+            let reciprocal = one / pivot.sqrt();
+            reciprocal.store(inverse);
+            scale(part_mut(column, 0, nx), reciprocal);
+            scale(part_mut(column, nx + c, nu - c), reciprocal);
+            let factor = self.g.get(nx + c).map_or(zero, E::load) * reciprocal;
+            factor.store(y);
+            subtract_scaled(part_mut(self.g, 0, nx), factor, column);
+            subtract_scaled(part_mut(self.g, nx + c, nu - c), factor, part(column, nx + c, nu - c));
+        }
+        weak
+    }
+
+    #[inline(always)]
+    fn forward<E: Lanes<Cell = C>>(&mut self) {
+        let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
+        for k in 0..intervals {
+            let panel = part(self.panels, k * n * nu, n * nu);
+            let (here, next) = self.v.split_at_mut_checked((k + 1) * n).unwrap_or_default();
+            let here = part_mut(here, k * n, n);
+            let (x, controls) = here.split_at_mut_checked(nx).unwrap_or_default();
+            // Lᵀ u = −(y + Kᵀ x)
+            assign_negative::<E>(controls, part(self.y, k * nu, nu));
+            let panels = Matrix { data: panel, ld: n };
+            subtract_transposed::<E>(controls, panels, x);
+            for c in (0..nu).rev() {
+                let (until, after) = controls.split_at_mut_checked(c + 1).unwrap_or_default();
+                let Some(u) = until.last_mut() else { break };
+                let mut sum = E::load(u);
+                for (u, factor) in after.iter().zip(part(panel, c * n + nx + c + 1, nu - c - 1)) {
+                    sum = sum.subtract_product(E::load(factor), E::load(u));
+                }
+                let inverse = self.inverse.get(k * nu + c).map_or(sum, E::load);
+                (sum * inverse).store(u);
+            }
+            let minus = part_mut(self.minus, 0, nx);
+            assign_negative::<E>(minus, part(self.offset, k * nx, nx));
+            let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
+            subtract_transposed::<E>(minus, dynamics, here);
+            assign_negative::<E>(part_mut(next, 0, nx), minus);
+        }
+    }
+
+    /// Multipliers of the dynamics, and slopes.
+    #[inline(always)]
+    fn multiply<E: Lanes<Cell = C>>(&mut self) {
+        let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
+        for k in (0..=intervals).rev() {
+            assign(self.g, part(self.gradient, k * n, n));
+            assign_negative::<E>(self.minus, part(self.v, k * n, n));
+            let hessian = Matrix { data: part(self.hessian, k * n * n, n * n), ld: n };
+            subtract::<E>(self.g, hessian, self.minus, [n, if k < intervals { n } else { nx }]);
+            if k < intervals {
+                assign_negative::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
+                let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
+                subtract::<E>(self.g, dynamics, self.minus, [n, nx]);
+                assign(part_mut(self.slope, k * nu, nu), part(self.g, nx, nu));
+            }
+            assign(part_mut(self.multipliers, k * nx, nx), part(self.g, 0, nx));
+        }
+    }
+}

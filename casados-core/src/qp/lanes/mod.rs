@@ -1,0 +1,308 @@
+//! Problems side by side, one in each lane of registers: those that need nothing else than active
+//! bounds of controls.
+//!
+//! | | |
+//! | --- | --- |
+//! | `group` | as many problems as there are lanes, and their equations for given sets |
+//! | `sets` | which bounds are active, and what is left of the conditions |
+//! | `transfer` | problems into lanes, and solutions back |
+//! | `cells` | products of matrices of registers |
+//!
+//! The method is Newton's for `min(s, λ) = 0`, as that of [`interior::active`](super::interior): M.
+//! Hintermüller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a semismooth Newton
+//! method", SIAM J. Optim. 13 (2002), begun without active bounds, or with those of a warm start. A
+//! problem of this kind has a feasible point, and where all pivots are positive one solution.
+//!
+//! Lanes that are done wait no longer than until half of a group is: then those that are left form
+//! new groups, each with its set. A problem whose sets do not settle, with a weak pivot or with
+//! numbers that are not finite is left to be solved alone, by all that a single solve can do: what
+//! is said of it is what a single solve says.
+
+mod cells;
+mod group;
+mod sets;
+mod transfer;
+
+use super::error::QpError;
+use super::instance::QpInstance;
+use super::interior::{InteriorPointOptions, is_first_fixed};
+use super::layout::Places;
+use super::memory::{reserve, room};
+use super::solver::QpStart;
+use super::stage::Row;
+use super::statistics::{QpStatistics, Residuals};
+use crate::qp::layout::part;
+use crate::scalar::lanes::second_level_cache;
+use crate::scalar::{Packed, Real, Registers, compiled};
+use alloc::vec::Vec;
+use group::Group;
+pub use group::Size;
+use sets::Judged;
+use transfer::MOST_LANES;
+
+/// Sets that are tried: of problems whose sets settle at all nearly all need less.
+const SETS: usize = 16;
+/// What a group may take of the second-level cache.
+const WORKING_SET: f64 = 5.0 / 8.0;
+/// Residuals are below this part of the tolerance: a single solve is as good, or better, in units.
+const SHARE: f64 = 0.1;
+
+/// The memory of groups.
+#[derive(Clone, Debug)]
+pub struct Together<T> {
+    numbers: Vec<T>,
+    /// Sets of active bounds of all problems.
+    sets: Vec<i8>,
+    /// The problems that are not solved.
+    pending: Vec<u32>,
+    /// Those of them that are to be solved alone.
+    alone: Vec<u32>,
+}
+
+impl<T> Default for Together<T> {
+    fn default() -> Self {
+        Self { numbers: Vec::new(), sets: Vec::new(), pending: Vec::new(), alone: Vec::new() }
+    }
+}
+
+/// The dimensions of a problem that can be solved side by side with others: the state at the start
+/// is given, others have no bounds, those of controls are hard.
+pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -> Option<Size> {
+    let QpInstance { qp, solution } = instance;
+    let qp = qp.view();
+    let size = Size::of(qp.dims)?;
+    let is_plain = options.active_sets > 0 && options.max_iterations > 0 && options.tolerance > 0.0;
+    if !is_plain || qp.is_coupled() || solution.dims() != qp.dims || !is_first_fixed(qp) {
+        return None;
+    }
+    let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
+    for place in Places::<T>::new(qp.dims) {
+        let vector =
+            |row| part(qp.data, place.data + place.row_data(row), if place.next > 0 { place.n } else { place.nx });
+        let mut good = true;
+        for (i, (&lower, &upper)) in vector(Row::Lower).iter().zip(vector(Row::Upper)).enumerate() {
+            let free = (lower <= -none) & (upper >= none);
+            let range = (lower <= upper) & (lower < infinity) & (upper > -infinity);
+            let given = (place.stage == 0) & (i < place.nx);
+            good &= range & (free | given | (i >= place.nx));
+        }
+        for row in [Row::LowerLinear, Row::UpperLinear] {
+            for (i, &penalty) in vector(row).iter().enumerate() {
+                good &= (penalty >= T::ZERO) & ((penalty == infinity) | (i < place.nx));
+            }
+        }
+        for row in [Row::LowerQuadratic, Row::UpperQuadratic] {
+            good &= vector(row).iter().all(|&penalty| (penalty >= T::ZERO) & (penalty < infinity));
+        }
+        if !good {
+            return None;
+        }
+    }
+    Some(size)
+}
+
+/// Solves problems of one size, as [`size`] has it; those that are left are in [`Together::alone`].
+///
+/// # Errors
+/// [`QpError::OutOfMemory`]
+pub fn solve<T: Real>(
+    together: &mut Together<T>,
+    size: Size,
+    problems: (&mut [QpInstance<T>], &mut [Result<QpStatistics, QpError>]),
+    (options, start): (&InteriorPointOptions, QpStart),
+) -> Result<(), QpError> {
+    let count = problems.0.len();
+    // One register more, so that the first one may begin at a line of the cache.
+    let length = size.cells().saturating_add(1).saturating_mul(MOST_LANES);
+    reserve(&mut together.numbers, length)?;
+    reserve(&mut together.sets, count.saturating_mul(size.intervals * size.nu))?;
+    for list in [&mut together.pending, &mut together.alone] {
+        list.clear();
+        room(list, count)?;
+    }
+    together.pending.extend((0..count).map(|index| index as u32));
+    T::compiled::<Solves>(Solve { together, size, problems, options, start });
+    Ok(())
+}
+
+impl<T> Together<T> {
+    /// The problems of the last call that are to be solved alone.
+    pub fn alone(&self) -> impl Iterator<Item = usize> {
+        self.alone.iter().map(|&index| index as usize)
+    }
+}
+
+/// See [`solve`].
+pub struct Solve<'r, T: Real> {
+    together: &'r mut Together<T>,
+    size: Size,
+    problems: (&'r mut [QpInstance<T>], &'r mut [Result<QpStatistics, QpError>]),
+    options: &'r InteriorPointOptions,
+    start: QpStart,
+}
+
+compiled! {
+    /// See [`Solve`].
+    pub Solves: Solve<'r, T>
+}
+
+impl<T: Real> Registers<T> for Solve<'_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(mut self) {
+        let bytes = self.size.cells().saturating_mul(size_of::<E::Cell>());
+        if E::LANES < 2 || bytes as f64 > WORKING_SET * second_level_cache() as f64 {
+            core::mem::swap(&mut self.together.pending, &mut self.together.alone);
+            return;
+        }
+        let mut numbers = core::mem::take(&mut self.together.numbers);
+        let skipped = numbers.as_ptr().align_offset(64).min(MOST_LANES);
+        let cells = E::cells_mut(numbers.get_mut(skipped..).unwrap_or_default());
+        let mut group = Group::new(self.size, cells.get_mut(..self.size.cells()).unwrap_or_default());
+        for cell in &mut *group.hessian {
+            E::from_f64(0.0).store(cell);
+        }
+        let mut first = true;
+        while !self.together.pending.is_empty() {
+            self.round::<E>(&mut group, first);
+            first = false;
+        }
+        self.together.numbers = numbers;
+    }
+}
+
+impl<T: Real> Solve<'_, T> {
+    /// Goes through what is pending, group by group.
+    #[inline(always)]
+    fn round<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, first: bool) {
+        let (count, mut kept) = (self.together.pending.len(), 0);
+        for begin in (0..count).step_by(E::LANES) {
+            let mut indices = [0; MOST_LANES];
+            let members = E::LANES.min(count - begin);
+            for (to, &index) in indices.iter_mut().zip(part(&self.together.pending, begin, members)) {
+                *to = index as usize;
+            }
+            let indices = indices.get(..members).unwrap_or_default();
+            self.place::<E>(group, indices, first);
+            let left = self.iterate::<E>(group, indices, count > E::LANES);
+            for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| left >> lane & 1 == 1) {
+                let sets = self.size.intervals * self.size.nu;
+                let set = self.together.sets.get_mut(index * sets..).and_then(|rest| rest.get_mut(..sets));
+                group.read_set::<T, E>(lane, set.unwrap_or_default());
+                if let Some(place) = self.together.pending.get_mut(kept) {
+                    *place = index as u32;
+                }
+                kept += 1;
+            }
+        }
+        self.together.pending.truncate(kept);
+    }
+
+    /// Writes problems into the lanes; lanes that are left hold the last one once more.
+    #[inline(always)]
+    fn place<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
+        let mut data: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
+        let (mut last, mut dims): (&[T], _) = (&[], &[][..]);
+        for (lane, data) in data.iter_mut().enumerate() {
+            if let Some(instance) = indices.get(lane).and_then(|&index| self.problems.0.get(index)) {
+                (last, dims) = (instance.qp.view().data, instance.qp.dims());
+            }
+            *data = last;
+        }
+        group.write::<T, E>(dims, &data, self.options.no_bound);
+        let Size { nx, nu, intervals } = self.size;
+        for (lane, &index) in indices.iter().enumerate() {
+            if !first {
+                let set = part(&self.together.sets, index * intervals * nu, intervals * nu);
+                group.write_set::<T, E>(lane, set.iter().copied());
+            } else if let (QpStart::Warm, Some(instance)) = (self.start, self.problems.0.get(index)) {
+                let least = T::from_f64(self.options.tolerance);
+                let [lower, upper] = instance.solution.sides();
+                let places = Places::<T>::new(dims).take(intervals);
+                let rows = places.flat_map(|place| place.row + nx..place.row + nx + nu);
+                let is_at = |side: &[T], row: usize| side.get(row).is_some_and(|&force| force > least);
+                let set = rows.map(|row| i8::from(is_at(upper, row)) - i8::from(is_at(lower, row)));
+                group.write_set::<T, E>(lane, set);
+            }
+        }
+    }
+
+    /// Iterates until all problems of the group are solved or given up, or, where others are
+    /// waiting, until half of them are. The lanes that are left, a bit for each.
+    #[inline(always)]
+    fn iterate<E: Packed<T>>(
+        &mut self,
+        group: &mut Group<'_, E::Cell>,
+        indices: &[usize],
+        others: bool,
+    ) -> u32 {
+        let tolerance = E::from_f64(0.5 * SHARE * self.options.tolerance);
+        let mut left = (1u32 << indices.len()) - 1;
+        loop {
+            group.solve::<E>();
+            let changes = lanes::<T, E>(group.change::<E>(tolerance));
+            let weak = group.weak.first().map_or([0.0; MOST_LANES], |weak| lanes::<T, E>(E::load(weak)));
+            let mut settled = 0;
+            let going = left;
+            for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| going >> lane & 1 == 1) {
+                let (Some(changes), Some(weak)) = (changes.get(lane), weak.get(lane)) else { return 0 };
+                let Some(Ok(statistics)) = self.problems.1.get_mut(index) else { return 0 };
+                statistics.iterations += 1;
+                let is_over = statistics.iterations >= SETS.min(self.options.max_iterations);
+                if *changes == 0.0 && *weak == 0.0 {
+                    settled |= 1 << lane;
+                } else if changes.is_nan() || *weak != 0.0 || is_over {
+                    left &= !(1 << lane);
+                    self.together.alone.push(index as u32);
+                }
+            }
+            if settled != 0 {
+                self.store::<E>(group, indices, settled);
+                left &= !settled;
+            }
+            if left == 0 || (others && 2 * left.count_ones() as usize <= indices.len()) {
+                return left;
+            }
+        }
+    }
+
+    /// Judges and stores solutions of lanes whose sets have settled.
+    #[inline(always)]
+    fn store<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize], settled: u32) {
+        let Judged { stationarity, dynamics, inequalities, objective } = group.judge::<E>();
+        let of = [stationarity, dynamics, inequalities, objective].map(|value| lanes::<T, E>(value));
+        for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| settled >> lane & 1 == 1) {
+            let [stationarity, dynamics, inequalities, objective] =
+                of.map(|lanes| lanes.get(lane).copied().unwrap_or(f64::NAN));
+            let residuals = Residuals { stationarity, dynamics, inequalities, complementarity: 0.0 };
+            let is_small = residuals.largest() <= SHARE * self.options.tolerance;
+            let problem = (self.problems.0.get_mut(index), self.problems.1.get_mut(index));
+            let (Some(instance), Some(Ok(statistics))) = problem else { return };
+            if !(is_small && objective.is_finite()) {
+                self.together.alone.push(index as u32);
+                continue;
+            }
+            let iterations = statistics.iterations;
+            *statistics = QpStatistics {
+                iterations,
+                active_sets: iterations,
+                factorisations: iterations,
+                residuals,
+                objective,
+                ..QpStatistics::default()
+            };
+            group.read::<T, E>(lane, &mut instance.solution.view_mut());
+        }
+    }
+}
+
+/// The numbers of the lanes.
+#[inline(always)]
+fn lanes<T: Real, E: Packed<T>>(register: E) -> [f64; MOST_LANES] {
+    let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
+    register.store(&mut cell);
+    let mut all = [0.0; MOST_LANES];
+    for (lane, to) in all.iter_mut().enumerate().take(E::LANES) {
+        *to = E::lane(&cell, lane);
+    }
+    all
+}

@@ -1,0 +1,155 @@
+//! Problems into the lanes of registers, and solutions back.
+
+use super::group::{Group, Size};
+use super::sets::forces;
+use crate::qp::layout::{Places, StageOffsets, assign, part, part_mut};
+use crate::qp::solution::SolutionView;
+use crate::qp::stage::Row;
+use crate::qp::{StageDims, element::set};
+use crate::scalar::{Packed, Real};
+
+/// More lanes than any register has.
+pub const MOST_LANES: usize = 16;
+
+/// Elements of several slices from `begin` on, one slice in each lane: whole registers are read from
+/// each, and transposed.
+#[inline(always)]
+fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MOST_LANES], begin: usize, to: &mut [E::Cell]) {
+    for (block, to) in to.chunks_mut(E::LANES).enumerate() {
+        let at = begin + block * E::LANES;
+        let (mut registers, mut tile) = ([E::from_f64(0.0); MOST_LANES], [zero::<T, E>(); MOST_LANES]);
+        let (Some(registers), Some(tile)) = (registers.get_mut(..E::LANES), tile.get_mut(..E::LANES)) else {
+            return;
+        };
+        for (register, from) in registers.iter_mut().zip(from) {
+            match E::cells(part(from, at, E::LANES)) {
+                [cell] => *register = E::load(cell),
+                _ => {
+                    // Behind the end there is nothing.
+                    let mut cell = zero::<T, E>();
+                    for (i, value) in from.get(at..).unwrap_or_default().iter().take(E::LANES).enumerate() {
+                        E::set_lane(&mut cell, i, value.to_f64());
+                    }
+                    *register = E::load(&cell);
+                }
+            }
+        }
+        E::transpose(registers, tile);
+        assign(to, tile);
+    }
+}
+
+#[inline(always)]
+fn zero<T: Real, E: Packed<T>>() -> E::Cell {
+    let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
+    E::from_f64(0.0).store(&mut cell);
+    cell
+}
+
+impl<C: Copy> Group<'_, C> {
+    /// Writes problems of these dimensions, given by their data, into lanes; no bound is active but
+    /// equal ones.
+    #[inline(always)]
+    pub fn write<T: Real, E: Packed<T, Cell = C>>(
+        &mut self,
+        dims: &[StageDims],
+        data: &[&[T]; MOST_LANES],
+        no_bound: f64,
+    ) {
+        let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
+        for (k, place) in Places::<T>::new(dims).enumerate() {
+            let begin = place.data;
+            let variables = if k < intervals { n } else { nx };
+            let hessian = part_mut(self.hessian, k * n * n, n * n);
+            for j in 0..variables {
+                let column = part_mut(hessian, j * n + j, variables - j);
+                gather::<T, E>(data, begin + place.matrix() + j * place.ld + j, column);
+            }
+            for j in 0..variables {
+                for i in j + 1..variables {
+                    let Some(&below) = hessian.get(j * n + i) else { return };
+                    set(hessian, i * n + j, below);
+                }
+            }
+            gather::<T, E>(data, begin + place.gradient(), part_mut(self.gradient, k * n, variables));
+            if k == 0 {
+                gather::<T, E>(data, begin + place.row_data(Row::Lower), part_mut(self.v, 0, nx));
+            }
+            if k == intervals {
+                break;
+            }
+            for j in 0..nx {
+                let column = part_mut(self.dynamics, (k * nx + j) * n, n);
+                gather::<T, E>(data, begin + j * place.ld, column);
+            }
+            gather::<T, E>(data, begin + place.offset(), part_mut(self.offset, k * nx, nx));
+            for (row, to) in [(Row::Lower, &mut *self.lower), (Row::Upper, &mut *self.upper)] {
+                gather::<T, E>(data, begin + place.row_data(row) + nx, part_mut(to, k * nu, nu));
+            }
+        }
+        for active in &mut *self.active {
+            E::from_f64(0.0).store(active);
+        }
+        self.clean_bounds::<E>(E::from_f64(no_bound));
+    }
+
+    /// Writes a set of active bounds into a lane; equal bounds stay so.
+    #[inline(always)]
+    pub fn write_set<T: Real, E: Packed<T, Cell = C>>(&mut self, lane: usize, of: impl Iterator<Item = i8>) {
+        let bounds = self.lower.iter().zip(&*self.upper);
+        for ((active, (lower, upper)), of) in self.active.iter_mut().zip(bounds).zip(of) {
+            if E::lane(lower, lane) < E::lane(upper, lane) {
+                E::set_lane(active, lane, of.into());
+            }
+        }
+    }
+
+    /// The set of active bounds of a lane.
+    #[inline(always)]
+    pub fn read_set<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, to: &mut [i8]) {
+        for (to, active) in to.iter_mut().zip(&*self.active) {
+            let active = E::lane(active, lane);
+            *to = i8::from(active > 0.0) - i8::from(active < 0.0);
+        }
+    }
+
+    /// The point of a lane, and its multipliers.
+    #[inline(always)]
+    pub fn read<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, solution: &mut SolutionView<'_, T>) {
+        let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
+        let number = |cell: &C| T::from_f64(E::lane(cell, lane));
+        let copy = |to: &mut [T], from: &[C]| {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = number(from));
+        };
+        solution.lower.fill(T::ZERO);
+        solution.upper.fill(T::ZERO);
+        for (k, place) in Places::<T>::new(solution.dims).enumerate() {
+            let StageOffsets { v, dynamics, row, .. } = place;
+            let variables = if k < intervals { n } else { nx };
+            copy(part_mut(solution.v, v, variables), part(self.v, k * n, variables));
+            if k == 0 {
+                // The state is given: its force has either sign.
+                for (i, force) in part(self.multipliers, 0, nx).iter().enumerate() {
+                    let force = number(force);
+                    set(solution.lower, row + i, force.max(T::ZERO));
+                    set(solution.upper, row + i, (-force).max(T::ZERO));
+                }
+            }
+            if k == intervals {
+                break;
+            }
+            copy(part_mut(solution.dynamics, dynamics, nx), part(self.multipliers, (k + 1) * nx, nx));
+            for i in k * nu..(k + 1) * nu {
+                let all = [&*self.active, &*self.lower, &*self.upper, &*self.slope].map(|list| list.get(i));
+                let [Some(active), Some(lower), Some(upper), Some(slope)] = all else { return };
+                let slope = E::load(slope);
+                let both = forces::<E>(active, lower, upper, slope);
+                for (to, force) in [&mut *solution.lower, &mut *solution.upper].into_iter().zip(both) {
+                    let mut cell = zero::<T, E>();
+                    force.store(&mut cell);
+                    set(to, row + nx + i - k * nu, number(&cell));
+                }
+            }
+        }
+    }
+}
