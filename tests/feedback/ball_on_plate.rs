@@ -56,8 +56,8 @@ fn problem() -> Result<(HeapOcp<Controlled>, State), Box<dyn std::error::Error>>
     Ok((ocp, x))
 }
 
-/// What a loop saw: the farthest ball, the farthest one at the end, in which sample divergence was first reported,
-/// and how often controls went from one bound to the other.
+/// What a loop saw: the farthest ball, the farthest one at the end, in which sample divergence was
+/// first reported, and how often controls went from one bound to the other.
 #[derive(Debug, Default)]
 struct Seen {
     farthest: f64,

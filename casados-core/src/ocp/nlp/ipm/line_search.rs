@@ -200,8 +200,7 @@ where
         let to = self.trial.view_mut();
         for place in Places::<T>::new(iterate.qp.dims) {
             let v = part_mut(to.v, place.v, place.n);
-            let from =
-                part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
+            let from = part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
             for (v, (&from, &step)) in v.iter_mut().zip(from) {
                 *v = from + part_of_step * step;
             }

@@ -171,7 +171,9 @@ where
             kept.fill(T::ZERO);
             sides.soft.iter().for_each(|&side| set(kept, side as usize, -infinity));
         }
-        for (i, (kept, (&row, &bound))) in kept.iter_mut().zip(sides.rows.iter().zip(&*sides.bound)).enumerate() {
+        for (i, (kept, (&row, &bound))) in
+            kept.iter_mut().zip(sides.rows.iter().zip(&*sides.bound)).enumerate()
+        {
             let distance = distance(i, row, bound);
             sum += ((*kept - distance) / at(units, row)).to_f64().max(0.0);
             if first && *kept == T::ZERO {
