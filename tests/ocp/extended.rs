@@ -47,7 +47,7 @@ mod sledge {
     }
 }
 
-/// The same with states `(place, speed, push, work, heat)` and controls `(brake, rate of the push)`.
+/// The same with states `(place, speed, push, work, heat)`, controls `(brake, rate of the push)`.
 #[dae]
 fn by_hand(xdot: [f64; 5], x: [f64; 5], z: f64, u: [f64; 2], p: f64) -> [f64; 6] {
     [
@@ -186,6 +186,47 @@ fn a_hanging_chain_has_its_length() -> Test {
     let (energy, length) = (solution.integral("energy")?, solution.integral("length")?);
     assert!((energy[N] - outcome.objective).abs() < 1e-9 && (length[N] - 4.0).abs() < 1e-6);
     assert_eq!((energy[0], length.len()), (0.0, N + 1));
+    Ok(())
+}
+
+/// Bryson and Denham: from rest to rest in the opposite direction, under a ceiling `l = 1/9`. With
+/// the least effort `½ ∫ u²` it is `4 / (9 l) = 4` (A. E. Bryson, W. F. Denham, S. E. Dreyfus,
+/// "Optimal programming problems with inequality constraints I", AIAA Journal 1, 1963), and `u` is
+/// linear up to a third, zero up to two, and linear: on this grid nothing is lost but what the
+/// ceiling lets through.
+#[ode(linear = u, integrals(effort = 0.5 * u * u))]
+mod ceiling {
+    fn ceiling(x: [f64; 2], u: f64) -> [f64; 2] {
+        [x[1], u]
+    }
+    #[function]
+    fn all_effort(_x: [f64; 2], _u: f64, q: f64) -> f64 {
+        q
+    }
+}
+
+#[test]
+fn a_ceiling_holds_between_nodes() -> Test {
+    const N: usize = 15;
+    let solved = |points: &[f64]| {
+        let mut ocp = Problem::new(Irk::<Ceiling, Gauss<2>>::new(Options::default())?)
+            .terminal_cost(GeneralCost::<AllEffort>::new())
+            .on(Horizon::uniform(N, 1.0 / N as f64))?;
+        ocp.inside(points)?.fix_initial_state(&[0.0, 1.0])?.guess(&[0.05, 0.0], &[-1.0])?;
+        ocp.bound("x[0]", .., f64::NEG_INFINITY, 1.0 / 9.0)?;
+        ocp.bound("x[0]", N.., 0.0, 0.0)?.bound("x[1]", N.., -1.0, -1.0)?;
+        let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+        assert!(outcome.is_converged(), "{outcome}");
+        let solution = ocp.dense_solution(15)?;
+        let highest = solution.state("x[0]")?.iter().fold(0.0, |highest: f64, &x| highest.max(x));
+        Ok::<_, Box<dyn std::error::Error>>((outcome.objective, highest - 1.0 / 9.0))
+    };
+    let ((at_nodes, over), (at_points, above)) = (solved(&[])?, solved(&[0.25, 0.5, 0.75])?);
+    println!("{at_nodes} {over:e} {at_points} {above:e}");
+    // The solution satisfies less and less of what is asked of this one.
+    assert!(at_nodes <= at_points + 1e-8 && at_points <= 4.0 + 1e-8);
+    assert!(4.0 - at_points < 0.1 * (4.0 - at_nodes) && above < 0.1 * over);
+    assert!((at_points - 4.0).abs() < 1e-3, "{at_points}");
     Ok(())
 }
 

@@ -64,3 +64,47 @@ fn given_states_have_no_guess() -> Test {
     assert_eq!(ocp.warnings()?, []);
     Ok(())
 }
+
+#[ode]
+fn boat(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[1] * u, 0.0]
+}
+#[function]
+fn twice(x: [f64; 2], _u: f64) -> f64 {
+    2.0 * x[0]
+}
+
+/// Without a sail no wind moves a boat: an end elsewhere is out of reach, as a bound and as a
+/// constraint. With a sail, or one that is free, it is not; nor is an end where it is anyway.
+#[test]
+fn ends_are_out_of_reach() -> Test {
+    let mut ocp = Problem::new(Irk::<Boat, Gauss<2>>::new(Options::default())?)
+        .terminal_constraints(Constraint::<Twice>::new([1.0], [4.0]))
+        .on(Horizon::uniform(3, 0.1))?;
+    ocp.fix_initial_state(&[0.25, 0.0])?.guess(&[0.25, 0.0], &[0.5])?.bound("x[0]", 3.., 1.0, 1.0)?;
+    ocp.guess_stage(3, &[1.0, 0.0], &[])?;
+    let warnings = ocp.warnings()?;
+    let [Warning::UnreachableEnd { bound, value, limit }, Warning::UnreachableEnd { bound: other, .. }] =
+        warnings[..]
+    else {
+        return Err(format!("{:?}", texts(&warnings)).into());
+    };
+    assert!((value - 0.25).abs() < 1e-12);
+    assert_eq!((bound.name, bound.stage, limit), ("x[0]", 3, 1.0));
+    assert_eq!((other.name, other.output), ("Twice", 0));
+    assert!(warnings[0].to_string().starts_with("the lower bound of `x[0]` at stage 3 is 1e0, the lin"));
+    ocp.guess_stage(3, &[0.25, 0.0], &[])?
+        .bound("x[0]", 3.., 0.25, 0.25)?
+        .set_terminal_bounds(&[0.0], &[0.5])?;
+    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+
+    ocp.bound("x[0]", 3.., 1.0, 1.0)?.set_terminal_bounds(&[1.0], &[4.0])?;
+    ocp.fix_initial_state(&[0.25, 1.0])?.guess(&[1.0, 1.0], &[0.5])?;
+    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    // Of a control that is given nothing is moved, and a free sail is a way.
+    ocp.bound("u", .., 0.5, 0.5)?;
+    assert_eq!(ocp.warnings()?.len(), 2);
+    ocp.free_initial_state();
+    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    Ok(())
+}

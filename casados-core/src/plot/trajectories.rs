@@ -43,10 +43,11 @@ impl Panel {
     /// makes it: all that a name means, of states, algebraic states, controls, parameters and
     /// constraints. `x` are all states, `Corner[2]` is an output of a constraint.
     ///
-    /// Controls are stairs, those that are linear in intervals lines. Bounds are dashed, where they are not far from the values; where one is
-    /// active the line is wide. Axes have the units that doc comments of the model say
-    /// ([`Units`](crate::structure::Units)) or [`Trajectory::set_unit`] did; where the units of
-    /// several lines differ, each name has its own.
+    /// Controls are stairs, those that are linear in intervals lines. Bounds are dashed, where they
+    /// are not far from the values; where one is active the line is wide. Axes have the units that
+    /// doc comments of the model say ([`Units`](crate::structure::Units)) or
+    /// [`Trajectory::set_unit`] did; where the units of several lines differ, each name has its
+    /// own.
     ///
     /// # Errors
     /// [`TrajectoryError::Unknown`]

@@ -16,9 +16,9 @@ use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
 use crate::ocp::formulation::functions::cost::{At, Cost};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult};
 use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::inside::memory::{PieceMemory, Place, Sizes};
-use crate::ocp::formulation::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, split};
+use crate::ocp::formulation::instance::inside::memory::{PieceMemory, Place, Sizes};
+use crate::ocp::formulation::instance::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
@@ -35,7 +35,7 @@ impl<T: Real> InnerPoints<T> {
     }
 
     /// The states of a stage at a point.
-    fn at<S: Shape>(&self, stage: usize, point: usize) -> Place<'_, T> {
+    pub(in crate::ocp) fn at<S: Shape>(&self, stage: usize, point: usize) -> Place<'_, T> {
         Sizes::of::<S, T>(self).at(&self.pieces.found, stage, point)
     }
 }
@@ -282,7 +282,7 @@ impl<T: Real> InnerPoints<T> {
 }
 
 impl<T: Real> Place<'_, T> {
-    /// The derivative of a state, or behind these of an algebraic one, by a variable in `(x, w, u)`.
+    /// The derivative of a state, or behind these of an algebraic one, by one of `(x, w, u)`.
     fn slope<S: Shape>(&self, variable: usize, by: usize, free: Free<'_>) -> T {
         let Some(column) = column::<S>(by, free) else { return T::ZERO };
         match variable.checked_sub(S::NX) {

@@ -160,7 +160,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // Of a running cost the end time is a factor.
             let w = free.end().filter(|_| *running && k < intervals);
             let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
-            let factor = duration * node.factor * if *running { first_part } else { T::ONE };
+            let factor = duration * node.factor * if *running && k < intervals { first_part } else { T::ONE };
             let place = At { stage: k, factor, exact: C::EXACT, from };
             let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
@@ -199,8 +199,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let mu = part(rest, ld, if C::EXACT { count } else { 0 });
                 let (values, columns) = (&mut *values, &mut *columns);
                 let rows = &mut Rows { values, columns, ld, terms: Some(&mut direct), mu, stage: at, k };
-                let costs =
-                    Costs { cost: &mut *stage_cost, reference: node.reference, running: *running, exact: C::EXACT };
+                let costs = Costs {
+                    cost: &mut *stage_cost,
+                    reference: node.reference,
+                    running: *running,
+                    exact: C::EXACT,
+                };
                 let found =
                     inner.write_rows::<P>((&mut *path, costs), (z, dz), (data.times, data.p), free, rows)?;
                 objective = objective + found;

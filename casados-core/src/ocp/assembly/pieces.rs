@@ -17,7 +17,7 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{IntegralTerms, IntervalResult, Nodes, Sink};
-use crate::ocp::formulation::inside::memory::{PieceMemory, Sizes};
+use crate::ocp::formulation::instance::inside::memory::{PieceMemory, Sizes};
 use crate::qp::element::get;
 use crate::qp::{assign, part, part_mut};
 use crate::scalar::Real;

@@ -55,8 +55,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Where algebraic states and points inside are those of the iterate: `g` of every stage in `values`, and after
-    /// [`Ocp::linearise`] the objective without penalties.
+    /// Where algebraic states and points inside are those of the iterate: `g` of every stage in
+    /// `values`, and after [`Ocp::linearise`] the objective without penalties.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]

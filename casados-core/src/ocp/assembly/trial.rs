@@ -81,8 +81,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     };
                     let rows = &mut Rows::values(values, at, k);
                     let given = (&*data.times, &*data.p);
-                    objective =
-                        objective + inner.write_rows::<P>((&mut *path, costs), (z, &[]), given, free, rows)?;
+                    objective = objective
+                        + inner.write_rows::<P>((&mut *path, costs), (z, &[]), given, free, rows)?;
                 }
             } else {
                 objective = objective + terminal_cost.value(&point, node.reference, k)?;

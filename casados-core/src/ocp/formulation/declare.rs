@@ -4,9 +4,9 @@ use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::horizon::{Horizon, limits};
-use crate::ocp::formulation::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::problem::Formulation;
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -107,10 +107,9 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         self.check_functions()
     }
 
-    /// Points inside of every interval, as parts of it, at which path constraints hold too, with the
-    /// bounds of the node before: a constraint that holds at nodes alone may be violated between
-    /// them. Bounds of states that are given afterwards hold there too, and those of algebraic
-    /// states.
+    /// Points inside of every interval, as parts of it, at which path constraints hold too, with
+    /// the bounds of the node before: what holds at nodes alone may be violated between them.
+    /// Bounds of states that are given afterwards hold there too, and those of algebraic states.
     ///
     /// Intervals are integrated from point to point, each piece by as many steps as the options of
     /// the integrator say: states there are ends of steps, with exact derivatives of first and

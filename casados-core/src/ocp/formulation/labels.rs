@@ -6,9 +6,9 @@ use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 #[cfg(feature = "alloc")]
-use crate::ocp::formulation::inside::InnerRow;
-#[cfg(feature = "alloc")]
 use crate::ocp::formulation::instance::Ocp;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::instance::inside::InnerRow;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 #[cfg(feature = "alloc")]

@@ -19,8 +19,8 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
     /// Bounds of a state, control, algebraic state or free parameter, or of all of them that a name
     /// means (`u` means `u[0]`, `u[1]`, …), at some stages: `..` are all of them, the last one has
     /// no controls and no algebraic states, and free parameters are the same at all of them. An
-    /// infinite bound is none. While the initial state is fixed, bounds of states do not touch stage
-    /// 0.
+    /// infinite bound is none. While the initial state is fixed, bounds of states do not touch
+    /// stage 0.
     ///
     /// Bounds of states hold at points inside of intervals too, where there are some
     /// ([`Ocp::inside`]), and so do those of algebraic states. An algebraic state gets a row of the
@@ -105,7 +105,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 /// The rows of variables at points that a name means.
 pub(in crate::ocp) fn rows_of<'a, P: Formulation<T>, T: Real>(
-    inner: &'a crate::ocp::formulation::inside::InnerPoints<T>,
+    inner: &'a crate::ocp::formulation::instance::inside::InnerPoints<T>,
     name: &'a str,
 ) -> impl Iterator<Item = usize> + 'a {
     let first = node_rows::<P, T>() + inner.count() * P::Path::ROWS;

@@ -4,9 +4,9 @@
 //! | --- | --- |
 //! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
 //! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
-//! | `instance/` | a problem on a horizon, with memory |
-//! | `free`, `inside`, `declare` | parameters and end times that are found, points inside of intervals, and how a problem gets them |
-//! | `bounds`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
+//! | `instance/` | a problem on a horizon, with memory, and points inside of its intervals |
+//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them and points inside of intervals |
+//! | `bounds`, `limit`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | refusals by name |
 //! | `print` | a problem as mathematics |
 
@@ -20,7 +20,6 @@ pub(in crate::ocp) mod error;
 pub(in crate::ocp) mod free;
 pub(in crate::ocp) mod functions;
 pub(in crate::ocp) mod horizon;
-pub(in crate::ocp) mod inside;
 pub(in crate::ocp) mod instance;
 pub(in crate::ocp) mod labels;
 pub(in crate::ocp) mod limit;

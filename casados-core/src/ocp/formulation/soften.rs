@@ -3,9 +3,9 @@
 use crate::ocp::formulation::check::{Labels, first, range};
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
-use crate::ocp::formulation::inside::inner_path_row;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{path_rows, split};
+use crate::ocp::formulation::instance::inside::inner_path_row;
 use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::limit::rows_of;
 use crate::ocp::formulation::problem::Formulation;

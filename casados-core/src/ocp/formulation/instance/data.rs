@@ -42,7 +42,7 @@ pub(crate) struct Layout {
     pub intervals: usize,
     /// How many [free parameters](super::super::free) there are.
     pub free: usize,
-    /// Rows of every stage but the last for [points inside](super::super::inside) of intervals.
+    /// Rows of every stage but the last for [points inside](super::inside) of intervals.
     pub inner: usize,
     /// Whether algebraic states have bounds at nodes.
     pub bounds_algebraic: bool,

@@ -2,6 +2,7 @@
 
 mod check;
 pub(in crate::ocp) mod data;
+pub(in crate::ocp) mod inside;
 pub(in crate::ocp) mod memory;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod rebuild;
@@ -15,8 +16,8 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
 use crate::ocp::formulation::functions::point::There;
 use crate::ocp::formulation::horizon::Horizon;
-use crate::ocp::formulation::inside::InnerPoints;
 use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, split};
+use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::set;
 use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part_mut};

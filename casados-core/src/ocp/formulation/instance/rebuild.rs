@@ -3,9 +3,9 @@
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free::FreeParameters;
 use crate::ocp::formulation::functions::constraint::Constraints;
-use crate::ocp::formulation::inside::{InnerPoints, InnerRow};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{self, Layout, node_rows, path_rows, split};
+use crate::ocp::formulation::instance::inside::{InnerPoints, InnerRow};
 use crate::ocp::formulation::instance::memory::Renewable;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;

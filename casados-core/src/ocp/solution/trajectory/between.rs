@@ -3,12 +3,12 @@
 use super::{Kind, Series, Trajectory};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
-use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
 use crate::ocp::formulation::instance::data::{Node, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
-use crate::qp::{SolutionStage, StageDims, part, part_mut, zeros};
+use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -90,15 +90,35 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (intervals, points) = (self.intervals(), parts.len());
         let (nx, nz, np) = (P::Shape::NX, P::Shape::NZ, P::Shape::NP);
         let width = nx + nz + P::Path::ROWS;
+        let has_points = self.inner.count() > 0;
+        if has_points {
+            self.simulate_pieces(None, |_, _| {})?;
+        }
         let (layout, free) = (self.layout(), self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
-        let is_there = dynamics.inside(&nodes, parts, &mut |point, step: &IntervalResult<'_, T>| {
-            let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
-            to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
-        })?;
+        // Piece by piece, where intervals are integrated so.
+        let ends = if has_points { self.inner.parts() } else { &[T::ZERO, T::ONE] };
+        let (mut starts, mut is_there) = (v.to_vec(), true);
+        for (piece, ends) in ends.windows(2).enumerate() {
+            let [from, to] = [get(ends, 0), get(ends, 1)];
+            let here = parts.iter().enumerate().filter(|(_, part)| from < **part && **part <= to);
+            let (indices, along): (Vec<usize>, Vec<T>) =
+                here.map(|(index, &part)| (index, (part - from) / (to - from))).unzip();
+            for k in 0..if piece > 0 { intervals } else { 0 } {
+                let start = self.inner.at::<P::Shape>(k, piece).x;
+                assign(part_mut(&mut starts, k * nodes.ld[0], nx), start);
+            }
+            let nodes = Nodes { v: &starts, piece: has_points.then_some([from, to]), ..nodes };
+            is_there &= dynamics.inside(&nodes, &along, &mut |point, step: &IntervalResult<'_, T>| {
+                let (interval, local) = (point / along.len(), point % along.len());
+                let point = interval * points + indices.get(local).copied().unwrap_or(0);
+                let to = part_mut(&mut values, point * width, nx + nz).iter_mut();
+                to.zip(step.x.iter().chain(step.z)).for_each(|(to, &from)| *to = from);
+            })?;
+        }
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, stage) in self.iterate.stages().enumerate().take(if is_there { intervals } else { 0 }) {
             let [start, end] = [k, k + 1].map(|node| get(data.times, node));

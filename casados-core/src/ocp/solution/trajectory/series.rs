@@ -80,8 +80,8 @@ pub struct Series<T = f64> {
     /// What it is of.
     pub kind: Kind,
     /// Its name: `x[1]`, `cart.position`; the function of a constraint, with the output if it has
-    /// several: `Distance`, `Corner[2]`; what is at a point inside of intervals with the part of these:
-    /// `Distance@0.5`.
+    /// several: `Distance`, `Corner[2]`; what is at a point inside of intervals with
+    /// the part of these: `Distance@0.5`.
     pub name: String,
     /// Its unit as the doc comments of the model say it
     /// ([`Units`](crate::structure::Units)), or [`Trajectory::set_unit`] did; empty if nobody did.

@@ -2,8 +2,8 @@
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::Constraints;
-use crate::ocp::formulation::inside::InnerPoints;
 use crate::ocp::formulation::instance::data::{Layout, inputs};
+use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::part;
 use crate::scalar::Real;

@@ -16,9 +16,9 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::error::Part;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-#[cfg(feature = "alloc")]
-use crate::ocp::formulation::inside::memory::PieceMemory;
 use crate::ocp::formulation::instance::data::node_rows;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::instance::inside::memory::PieceMemory;
 use crate::ocp::formulation::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::zeros;
