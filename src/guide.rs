@@ -26,6 +26,7 @@ chapters! {
     formulations "guide/formulations.md"
     trouble "guide/trouble.md"
     mpc "guide/mpc.md"
+    batches "guide/batches.md"
     estimation "guide/estimation.md"
     firmware "guide/firmware.md"
     testing "guide/testing.md"

@@ -224,8 +224,10 @@ fn engines_have_no_circles() {
         "linalg",
         "ocp",
         "ocp/assembly",
+        "ocp/batch",
         "ocp/dynamics",
         "ocp/dynamics/collocation",
+        "ocp/feedback",
         "ocp/formulation",
         "ocp/formulation/functions",
         "ocp/formulation/instance",
@@ -239,6 +241,7 @@ fn engines_have_no_circles() {
         "ocp/solution/trajectory",
         "qp",
         "qp/interior",
+        "qp/lanes",
         "quadrature",
         "structure",
     ];

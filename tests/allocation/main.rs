@@ -6,6 +6,7 @@ mod models;
 
 mod adaptive;
 mod irk;
+mod ocp;
 mod qp;
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -42,6 +42,27 @@ fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
     assert!(count(QpStart::Cold)? > 0);
     assert_eq!(count(QpStart::Cold)?, 0);
     assert_eq!(count(QpStart::Warm)?, 0);
+    // Side by side in registers: nothing but controls has bounds.
+    let mut dims = dims;
+    dims.iter_mut().for_each(|dims| dims.ng = 0);
+    let mut plain = HeapQp::<f64>::new(&dims)?;
+    for mut stage in plain.stages_mut() {
+        stage.a_mut().set_diagonal([1.0, 0.9, 0.8]);
+        stage.b_mut().fill_with(|i, j| (i + j) as f64);
+        stage.q_mut().set_diagonal([1.0; 3]);
+        stage.r_mut().set_diagonal([0.1; 2]);
+        stage.u_bounds_mut().set(0, -0.5, 0.5);
+    }
+    plain.fix_initial_state(&[1.0, 2.0, 1.0])?;
+    let mut instances = vec![QpInstance { qp: plain, solution: HeapSolution::new(&dims)? }; 21];
+    let mut count = |start| {
+        let before = COUNT.get();
+        let result = batch.solve(&mut instances, start);
+        result.map(|statuses| (COUNT.get() - before, statuses.iter().all(Result::is_ok)))
+    };
+    assert!(count(QpStart::Cold)?.0 > 0);
+    assert_eq!(count(QpStart::Cold)?, (0, true));
+    assert_eq!(count(QpStart::Warm)?, (0, true));
     let mut condensing = Condensing::new(3, HeapInteriorPoint::new());
     let mut count = |start| {
         let before = COUNT.get();

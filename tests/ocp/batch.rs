@@ -4,8 +4,9 @@
 use crate::Test;
 use crate::runs::{Counts, kind, seeds};
 use casados::ocp::{
-    BatchOcp, Exact, ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, OcpError, OcpSolver,
-    Outcome, Problem, SolutionFactors, Status,
+    BatchOcp, BatchRealTime, ConvexCost, Exact, ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapRealTime,
+    HeapSqp, Horizon, LeastSquaresCost, OcpError, OcpSolver, Outcome, Problem, PseudoHuber, Sample,
+    SolutionFactors, Status, closed_loop, plant,
 };
 use casados::prelude::*;
 use casados::qp::HeapSolution;
@@ -230,6 +231,140 @@ fn derivatives_are_those_of_solutions() -> Test {
         let found = batch.sensitivities(11 * start).ok_or("it was differentiated")?;
         close(&[found.du(0), found.du_dp(0)].concat(), &slopes(&controls, start));
     }
+    Ok(())
+}
+
+#[function]
+fn output(x: [f64; 2], u: [f64; 1], p: [f64; 3]) -> [f64; 2] {
+    [x[0] + 0.1 * u[0].sin(), x[1] + p[2] * x[0] * x[0]]
+}
+#[function]
+fn torque(_x: [f64; 2], u: [f64; 1], _p: [f64; 3]) -> f64 {
+    u[0]
+}
+#[function]
+fn rest(x: [f64; 2], _u: [f64; 1], _p: [f64; 3]) -> [f64; 2] {
+    x
+}
+
+/// Gradients by references against central differences, as above: of least squares with coupled
+/// weights, of a convex function beside it, and of the terminal cost.
+#[test]
+fn derivatives_by_references() -> Test {
+    let weights = nalgebra::matrix![2.0, 0.5; 0.5, 1.0];
+    let huber = PseudoHuber { weights: [1.0], delta: [0.7] };
+    let mut ocp = Problem::new(Erk::<Pendulum, Rk4>::new(Options::default())?)
+        .running_cost((LeastSquaresCost::<Output>::new(&weights), ConvexCost::<Torque, _>::new(huber)))
+        .terminal_cost(LeastSquaresCost::<Rest>::diagonal(&[3.0, 1.0]))
+        .on(Horizon::uniform(4, 0.1))?;
+    ocp.fix_initial_state(&[0.3, 0.1])?.set_parameters(.., &[2.0, 0.2, 0.1])?.guess(&[0.0; 2], &[0.0])?;
+    // Three references of each of four stages, and two at the end.
+    let (h, count) = (1e-5, 4 * 3 + 2);
+    let mut batch = BatchOcp::new(&ocp, 1 + 2 * count, HeapSqp::new(&ocp)?)?;
+    batch.configure(|sqp| sqp.options.tolerance = 1e-11);
+    for (i, instance) in batch.instances_mut().iter_mut().enumerate() {
+        let mut references: Vec<f64> = (0..count).map(|j| 0.1 * (j as f64).sin()).collect();
+        if let Some(moved) = i.checked_sub(1) {
+            references[moved / 2] += if moved % 2 == 0 { h } else { -h };
+        }
+        for k in 0..4 {
+            instance.set_reference(k..=k, &references[3 * k..3 * k + 3])?;
+        }
+        instance.set_terminal_reference(&references[12..])?;
+    }
+    let outcomes = batch.solve()?;
+    assert!(outcomes.iter().all(|outcome| outcome.as_ref().is_ok_and(Outcome::is_converged)));
+    let values: Vec<_> = outcomes.iter().flatten().map(|outcome| outcome.objective).collect();
+    let mut sums = Vec::new();
+    for instance in batch.instances() {
+        sums.push(instance.stage(0)?.u[0] + 0.5 * instance.stage(3)?.x[0]);
+    }
+    let check = |found: &[f64], of: &[f64]| {
+        assert_eq!(found.len(), count);
+        for (i, found) in found.iter().enumerate() {
+            let expected = (of[1 + 2 * i] - of[2 + 2 * i]) / (2.0 * h);
+            assert!((found - expected).abs() < 1e-5, "{i}: {found} {expected}");
+        }
+    };
+    check(batch.value_gradient(Exact::default())?.get(0)?.references, &values);
+    let gradients = batch.adjoint(Exact::default(), |_, _, seed| {
+        seed.stage_mut(0).into_iter().for_each(|stage| stage.u[0] = 1.0);
+        seed.stage_mut(3).into_iter().for_each(|stage| stage.x[0] = 0.5);
+    })?;
+    check(gradients.get(0)?.references, &sums);
+    Ok(())
+}
+
+/// Many plants at once: controls and statuses are those of controllers alone, and one that is
+/// broken leaves the others alone.
+#[test]
+fn many_plants_in_real_time() -> Test {
+    let ocp = problem()?;
+    let mut together = BatchRealTime::new(&ocp, 7)?.with_curvature(Exact::default());
+    let mut alone: Vec<_> =
+        (0..7).map(|_| HeapRealTime::exact(ocp.clone())).collect::<Result<_, _>>()?;
+    let mut erk = Erk::<Pendulum, Rk4>::new(Options::default())?;
+    erk.set_parameters(&nalgebra::vector![2.0, 0.2, 0.1])?;
+    let mut x: Vec<f64> = (0..14).map(|i| 0.1 * (i as f64).sin()).collect();
+    for sample in 0..10 {
+        // A sensor is broken for a moment.
+        let seen = if sample == 4 { f64::NAN } else { x[6] };
+        let measured: Vec<f64> = x.iter().enumerate().map(|(i, &x)| if i == 6 { seen } else { x }).collect();
+        let u = together.prepare()?.feedback(&measured)?.to_vec();
+        for (i, controller) in alone.iter_mut().enumerate() {
+            match controller.prepare()?.feedback(&measured[2 * i..2 * i + 2]) {
+                Ok(feedback) => assert_eq!(feedback.u[0].to_bits(), u[i].to_bits()),
+                Err(_) => assert!(i == 3 && sample == 4),
+            }
+            assert_eq!(together.statuses()[i].is_err(), i == 3 && sample == 4);
+            controller.shift();
+            let end = erk.solve(&nalgebra::vector![x[2 * i], x[2 * i + 1]], &nalgebra::vector![u[i]], 0.1)?;
+            x[2 * i..2 * i + 2].copy_from_slice(end.x.as_slice());
+        }
+        together.shift();
+    }
+    assert!(matches!(together.prepare()?.feedback(&[0.0; 13]), Err(OcpError::Length { found: 13, .. })));
+    Ok(())
+}
+
+/// A controller that solves to the end gives the closed loop that was planned: nothing disturbs it,
+/// the plant is the model, and the horizon is long.
+#[test]
+fn a_closed_loop_goes_as_planned() -> Test {
+    let mut ocp = problem()?;
+    ocp.guess(&[0.0; 2], &[0.0])?;
+    let mut plan = ocp.clone();
+    assert!(HeapSqp::new(&plan)?.solve(&mut plan)?.is_converged());
+    let sqp = HeapSqp::new(&ocp)?;
+    let mut controller = (ocp, sqp);
+    let mut erk = Erk::<Pendulum, Rk4>::new(Options::default())?;
+    let p = nalgebra::vector![2.0, 0.2, 0.1];
+    let run = closed_loop(&mut controller, plant(&mut erk, &p), |_, _| {}, &[0.5, 0.0], 30)?;
+    assert!(run.failures.is_empty() && run.costs.len() == 30 && run.durations.len() == 30);
+    let (x, u) = (run.trajectory.state("x[0]")?, run.trajectory.control("u")?);
+    assert_eq!((x.len(), u.len(), run.trajectory.times()[30]), (31, 30, 30.0 * 0.1));
+    assert!((u[0] - plan.stage(0)?.u[0]).abs() < 1e-6 && (x[1] - plan.stage(1)?.x[0]).abs() < 1e-6);
+    // Costs are those of the states and controls as they were, over samples of 0.1 s.
+    let mut sum = 0.0;
+    for (k, cost) in run.costs.iter().enumerate() {
+        let at = ([x[k], run.trajectory.state("x[1]")?[k]], [u[k]], [2.0, 0.2, 0.1]);
+        assert!((cost - 0.1 * price(at.0, at.1, at.2)).abs() < 1e-12);
+        sum += cost;
+    }
+    assert!((run.cost() - sum).abs() < 1e-12 && x[30].abs() < 1e-2);
+    assert_eq!(run.trajectory.get("u")?.lower[3], Some(-1.0));
+    assert!(run.trajectory.violations(1e-6).is_empty());
+    // A controller that cannot see holds its control, and says why.
+    let blind = |sample: Sample<f64>, x: &mut [f64]| {
+        if sample.index == 5 {
+            x[0] = 100.0;
+        }
+    };
+    controller.0.bound("x[0]", .., -3.0, 3.0)?.guess(&[0.0; 2], &[0.0])?;
+    let run = closed_loop(&mut controller, plant(&mut erk, &p), blind, &[0.5, 0.0], 8)?;
+    assert!(!run.failures.is_empty() && run.failures[0].0 == 6);
+    assert_eq!(run.trajectory.control("u")?[6], run.trajectory.control("u")?[5]);
+    assert!(!run.trajectory.violations(1.0).is_empty());
     Ok(())
 }
 

@@ -15,6 +15,7 @@ mod hard;
 mod infeasible;
 mod known;
 mod random;
+mod together;
 mod units;
 mod unstable;
 

@@ -1,15 +1,18 @@
 //! The 128 control-bounded LQRs of "Differentiable nonlinear model predictive control" (J. Frey et
-//! al., arXiv 2505.01353, table 1), one after the other on one thread: iterations and CPU time.
+//! al., arXiv 2505.01353, table 1): one after the other, and side by side in registers, in CPU time
+//! of one thread; and side by side on all threads, in time on the clock.
 //!
 //! ```text
-//! cargo run --release --manifest-path benches/Cargo.toml --bin lqr            times
-//! valgrind --tool=callgrind target/release/lqr 1 2                            |u| ≤ 1, twice: instructions
+//! cargo run --release --manifest-path benches/Cargo.toml --features parallel --bin lqr    times
+//! valgrind --tool=callgrind target/release/lqr 1 2        |u| ≤ 1, twice: instructions; TOGETHER=1: side by side
 //! ```
 
-use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
+use casados::qp::{
+    BatchInteriorPoint, HeapInteriorPoint, HeapQp, HeapSolution, QpInstance, QpSolver, QpStart, StageDims,
+};
 use casados_benches::record::{load, numbers};
-use casados_benches::time::pin;
 use cpu_time::ThreadTime;
+use std::time::Instant;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -60,18 +63,49 @@ fn solve(most: f64, rounds: usize) -> Result<(usize, usize, f64), Failure> {
     Ok((sum, largest, best))
 }
 
+/// The same side by side: iterations of all, the most of one, and the least milliseconds of CPU
+/// time of one thread, and on the clock with all threads.
+fn together(most: f64, rounds: usize) -> Result<(usize, usize, [f64; 2]), Failure> {
+    let mut instances = Vec::new();
+    for qp in problems(most)? {
+        let solution = HeapSolution::new(qp.dims())?;
+        instances.push(QpInstance { qp, solution });
+    }
+    let mut best = [f64::INFINITY; 2];
+    let (mut sum, mut largest) = (0, 0);
+    for (threads, best) in [1, usize::MAX].into_iter().zip(&mut best) {
+        let mut batch = BatchInteriorPoint::new();
+        batch.threads = threads;
+        for _ in 0..rounds {
+            let (cpu, clock) = (ThreadTime::now(), Instant::now());
+            let statuses = batch.solve(&mut instances, QpStart::Cold)?;
+            let passed = if threads == 1 { cpu.elapsed() } else { clock.elapsed() };
+            *best = best.min(passed.as_secs_f64() * 1e3);
+            let iterations = || statuses.iter().flatten().map(|statistics| statistics.iterations);
+            (sum, largest) = (iterations().sum(), iterations().max().unwrap_or(0));
+        }
+    }
+    Ok((sum, largest, best))
+}
+
 fn main() -> Result<(), Failure> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     if let [most, rounds] = &arguments[..] {
-        solve(most.parse()?, rounds.parse()?)?;
+        if std::env::var_os("TOGETHER").is_some() {
+            together(most.parse()?, rounds.parse()?)?;
+        } else {
+            solve(most.parse()?, rounds.parse()?)?;
+        }
         return Ok(());
     }
-    println!("pinned: {}", pin());
-    println!("| controls | iterations | most | ms | µs an iteration |");
+    println!("| 128 LQRs | iterations | most | ms | µs an iteration |");
     println!("| --- | --- | --- | --- | --- |");
     for most in [1e4, 1.0] {
         let (sum, largest, best) = solve(most, 30)?;
-        println!("| ±{most} | {sum} | {largest} | {best:.2} | {:.1} |", best * 1e3 / sum as f64);
+        println!("| ±{most}, alone | {sum} | {largest} | {best:.2} | {:.1} |", best * 1e3 / sum as f64);
+        let (sum, largest, [best, clock]) = together(most, 60)?;
+        println!("| ±{most}, together | {sum} | {largest} | {best:.2} | {:.1} |", best * 1e3 / sum as f64);
+        println!("| ±{most}, together, all threads | {sum} | {largest} | {clock:.2} on the clock | |");
     }
     Ok(())
 }

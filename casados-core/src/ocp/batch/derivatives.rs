@@ -18,8 +18,9 @@ where
     S: OcpSolver<P, T>,
     T: Real,
 {
-    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀` and `λᵀ dw/dp` of each instance, as
-    /// [`SolutionFactors::adjoint`] has them. `seed` writes the `λ` of an instance over states and
+    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀`, `λᵀ dw/dp` and `λᵀ dw/dr` of each instance,
+    /// by initial state, parameters and references, as [`SolutionFactors::adjoint`] and
+    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) have them. `seed` writes the `λ` of an instance over states and
     /// controls, all zero before, from its number and its solution: the gradient of a loss.
     ///
     /// A linearisation and a factorisation for each instance, however many parameters there are.
@@ -60,17 +61,17 @@ where
         curvature: C,
         seed: impl Fn(usize, &HeapOcp<P, T>, &mut HeapSolution<T>) + Sync,
     ) -> Result<Gradients<'_, T>, OcpError> {
-        self.gradients(curvature, |instance, ocp, factors, of_seed, [x0, p]| {
+        self.gradients(curvature, |instance, ocp, factors, of_seed, [x0, p, references]| {
             of_seed.clear();
             seed(instance, ocp, of_seed);
             let found = factors.adjoint(of_seed)?;
             assign(x0, found.x0);
             assign(p, found.p);
-            Ok(())
+            ocp.adjoint_by_references(factors, references)
         })
     }
 
-    /// Gradients of all optimal values: `∂V/∂x₀` and `∂V/∂p` of each instance, as
+    /// Gradients of all optimal values: `∂V/∂x₀`, `∂V/∂p` and `∂V/∂r` of each instance, as
     /// [`SolutionFactors::value_gradient_x0`] and `value_gradient_p` have them. The Hessian has no
     /// part in them: that of Gauss and Newton costs least.
     ///
@@ -80,10 +81,10 @@ where
         &mut self,
         curvature: C,
     ) -> Result<Gradients<'_, T>, OcpError> {
-        self.gradients(curvature, |_, _, factors, _, [x0, p]| {
+        self.gradients(curvature, |_, ocp, factors, _, [x0, p, references]| {
             assign(x0, factors.value_gradient_x0());
             assign(p, factors.value_gradient_p());
-            Ok(())
+            ocp.value_gradient_by_references(references)
         })
     }
 
@@ -94,10 +95,10 @@ where
         curvature: C,
         ask: impl Fn(
             usize,
-            &HeapOcp<P, T>,
+            &mut HeapOcp<P, T>,
             &mut SolutionFactors<T>,
             &mut HeapSolution<T>,
-            [&mut [T]; 2],
+            [&mut [T]; 3],
         ) -> Result<(), OcpError>
         + Sync,
     ) -> Result<Gradients<'_, T>, OcpError> {
@@ -110,14 +111,14 @@ where
         }
         let places = gradients.places(instances.len())?;
         let items = instances.iter_mut().zip(places).enumerate();
-        each(workers, items, |Worker { adjoint, .. }, (i, (ocp, (status, [x0, p])))| {
+        each(workers, items, |Worker { adjoint, .. }, (i, (ocp, (status, places)))| {
             let Some((factors, seed)) = adjoint else { return };
             factors.smoothing = smoothing;
-            x0.fill(T::ZERO);
-            p.fill(T::ZERO);
+            let mut places = places;
+            places.iter_mut().for_each(|place| place.fill(T::ZERO));
             *status = is_solution(outcomes, i)
                 .and_then(|()| ocp.factorise(curvature, factors))
-                .and_then(|()| ask(i, ocp, factors, seed, [x0, p]));
+                .and_then(|()| ask(i, ocp, factors, seed, places));
         });
         Ok(gradients.view())
     }

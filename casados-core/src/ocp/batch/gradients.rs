@@ -2,7 +2,8 @@
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{part, reserve};
+use crate::ocp::solution::sensitivities::references;
+use crate::qp::{part, reserve, take_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -34,6 +35,9 @@ pub struct Gradient<'a, T> {
     pub x0: &'a [T],
     /// By the parameters, `NP`, which change at all stages together.
     pub p: &'a [T],
+    /// By the references of all stages, one after the other, and then of the terminal cost, as
+    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) has it.
+    pub references: &'a [T],
 }
 
 /// The gradients of all instances, or why there is none.
@@ -66,13 +70,17 @@ impl<'a, T: Real> Gradients<'a, T> {
     /// That of an instance.
     ///
     /// # Errors
-    /// [`OcpError::NoSolution`] where the last run of the instance did not end at a solution, or the
-    /// error that it ended with, or where there is no such instance; those of
+    /// [`OcpError::NoSolution`] where the last run of the instance did not end at a solution, or
+    /// the error that it ended with, or where there is no such instance; those of
     /// [`Ocp::factorise`](crate::ocp::Ocp::factorise).
     pub fn get(&self, instance: usize) -> Result<Gradient<'a, T>, OcpError> {
-        let Memory { dims: [nx, np], x0, p, statuses } = self.memory;
+        let Memory { dims: [nx, np, nr], x0, p, references, statuses } = self.memory;
         statuses.get(instance).copied().unwrap_or(Err(OcpError::NoSolution))?;
-        Ok(Gradient { x0: part(x0, instance * nx, *nx), p: part(p, instance * np, *np) })
+        Ok(Gradient {
+            x0: part(x0, instance * nx, *nx),
+            p: part(p, instance * np, *np),
+            references: part(references, instance * nr, *nr),
+        })
     }
 
     /// All of them.
@@ -85,35 +93,37 @@ impl<'a, T: Real> Gradients<'a, T> {
 /// Where they are.
 #[derive(Clone, Debug)]
 pub struct Memory<T> {
-    /// `NX`, `NP`
-    dims: [usize; 2],
+    /// `NX`, `NP`, and how many references there are.
+    dims: [usize; 3],
     x0: Vec<T>,
     p: Vec<T>,
+    references: Vec<T>,
     statuses: Vec<Result<(), OcpError>>,
 }
 
 impl<T: Real> Memory<T> {
     /// Of no instance.
-    pub fn new<P: Formulation<T>>() -> Self {
-        let dims = [P::Shape::NX, P::Shape::NP];
-        Self { dims, x0: Vec::new(), p: Vec::new(), statuses: Vec::new() }
+    pub fn new<P: Formulation<T>>(intervals: usize) -> Self {
+        let dims = [P::Shape::NX, P::Shape::NP, references::count::<P, T>(intervals)];
+        Self { dims, x0: Vec::new(), p: Vec::new(), references: Vec::new(), statuses: Vec::new() }
     }
 
-    /// Room for as many instances: the status and both gradients of each.
+    /// Room for as many instances: the status and the three gradients of each.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn places(
         &mut self,
         count: usize,
-    ) -> Result<impl Iterator<Item = (&mut Result<(), OcpError>, [&mut [T]; 2])> + Send, OcpError> {
-        let [nx, np] = self.dims;
+    ) -> Result<impl Iterator<Item = (&mut Result<(), OcpError>, [&mut [T]; 3])> + Send, OcpError> {
+        let [nx, np, nr] = self.dims;
         super::refill(&mut self.statuses, count, || Ok(()))?;
         reserve(&mut self.x0, count * nx)?;
         reserve(&mut self.p, count * np)?;
-        let (mut x0, mut p) = (&mut *self.x0, &mut *self.p);
+        reserve(&mut self.references, count * nr)?;
+        let (mut x0, mut p, mut references) = (&mut *self.x0, &mut *self.p, &mut *self.references);
         Ok(self.statuses.iter_mut().map(move |status| {
-            (status, [crate::qp::take_mut(&mut x0, nx), crate::qp::take_mut(&mut p, np)])
+            (status, [take_mut(&mut x0, nx), take_mut(&mut p, np), take_mut(&mut references, nr)])
         }))
     }
 

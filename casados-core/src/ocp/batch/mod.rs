@@ -117,7 +117,7 @@ where
             instances,
             outcomes: Vec::new(),
             workers,
-            gradients: Memory::new::<P>(),
+            gradients: Memory::new::<P>(ocp.intervals()),
             forward: Vec::new(),
             statuses: Vec::new(),
         })

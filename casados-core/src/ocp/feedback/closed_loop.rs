@@ -42,8 +42,8 @@ pub struct Sample<T> {
 }
 
 /// What has a control for each state: [`HeapRealTime`], by an iteration in each sample; and a
-/// problem with a solver, `(ocp, sqp)`, by its solution. One of one's own may filter measurements, or
-/// change references and parameters before it asks another one.
+/// problem with a solver, `(ocp, sqp)`, by its solution. One of one's own may filter measurements,
+/// or change references and parameters before it asks another one.
 ///
 /// ```
 /// use casados::ocp::{Controller, Formulation, HeapOcp, OcpError};

@@ -81,8 +81,8 @@ fn tile<E: Lanes, const R: usize, const C: usize>(
     }
 }
 
-/// `to (rows × columns) = start − X (rows × depth) Y (columns × depth)ᵀ`; with `lower` nothing above
-/// the diagonal counts.
+/// `to (rows × columns) = start − X (rows × depth) Y (columns × depth)ᵀ`; with `lower` nothing
+/// above the diagonal counts.
 #[inline(always)]
 pub fn product<E: Lanes>(
     (to, ld): (&mut [Cell<E>], usize),

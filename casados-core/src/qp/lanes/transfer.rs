@@ -11,8 +11,8 @@ use crate::scalar::{Packed, Real};
 /// More lanes than any register has.
 pub const MOST_LANES: usize = 16;
 
-/// Elements of several slices from `begin` on, one slice in each lane: whole registers are read from
-/// each, and transposed.
+/// Elements of several slices from `begin` on, one slice in each lane: whole registers are read
+/// from each, and transposed.
 #[inline(always)]
 fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MOST_LANES], begin: usize, to: &mut [E::Cell]) {
     for (block, to) in to.chunks_mut(E::LANES).enumerate() {

@@ -3,7 +3,7 @@
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::cost::{At, Cost, Show};
-use crate::ocp::formulation::functions::least_squares::Square;
+use crate::ocp::formulation::functions::least_squares::{Square, refer};
 use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape};
@@ -359,6 +359,19 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
         if at.exact {
             cross.curvature::<F>(v, mu, at.factor, hessian);
         }
+        Ok(())
+    }
+
+    fn refer(
+        &mut self,
+        (v, direction): (&ArrayV<F, T>, Option<&ArrayV<F, T>>),
+        reference: &[T],
+        at: At<'_, T>,
+        to: &mut [T],
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        self.evaluate(reference, at.stage)?;
+        refer::<F, T>((&self.phi, &self.mu), (&self.jacobian, direction), at.factor, to);
         Ok(())
     }
 }

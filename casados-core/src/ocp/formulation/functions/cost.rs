@@ -122,6 +122,23 @@ pub trait Cost<S: Shape, T: Real> {
         at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError>;
+
+    /// Adds what the reference changes, times the factor: of the value at a point, or, of a
+    /// direction over its variables, of the slope of the value along this direction.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn refer(
+        &mut self,
+        point: (&S::ArrayV<T>, Option<&S::ArrayV<T>>),
+        reference: &[T],
+        at: At<'_, T>,
+        to: &mut [T],
+    ) -> Result<(), OcpError> {
+        let _ = (point, reference, at, to);
+        Ok(())
+    }
 }
 
 /// What takes terms of an objective.
@@ -220,6 +237,18 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
         self.0.cross(v, first, at, cross)?;
         self.1.cross(v, second, at, cross)
+    }
+    fn refer(
+        &mut self,
+        point: (&S::ArrayV<T>, Option<&S::ArrayV<T>>),
+        reference: &[T],
+        at: At<'_, T>,
+        to: &mut [T],
+    ) -> Result<(), OcpError> {
+        let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
+        let (to_first, to_second) = to.split_at_mut_checked(A::REFERENCES).unwrap_or_default();
+        self.0.refer(point, first, at, to_first)?;
+        self.1.refer(point, second, at, to_second)
     }
 }
 

@@ -118,6 +118,26 @@ fn weigh<F: Function, T: Real>(
     }
 }
 
+/// Subtracts `φ′`, or of a direction `d` `φ″ J d`, times a factor: what the reference changes of
+/// `φ(y − r)`.
+pub(in crate::ocp) fn refer<F: Function, T: Real>(
+    (second, first): (&MatrixYY<F, T>, &ArrayY<F, T>),
+    (jacobian, direction): (&F::Jacobian<T>, Option<&ArrayV<F, T>>),
+    factor: T,
+    to: &mut [T],
+) {
+    let Some(direction) = direction else {
+        to.iter_mut().zip(first.as_ref()).for_each(|(to, &mu)| *to = *to - factor * mu);
+        return;
+    };
+    for ((output, variable), &slope) in F::STRUCTURE.jacobian.iter().zip(jacobian.as_ref()) {
+        let along = factor * slope * direction.as_ref().get(variable).copied().unwrap_or(T::ZERO);
+        for (k, to) in to.iter_mut().enumerate() {
+            *to = *to - second[(k, output)] * along;
+        }
+    }
+}
+
 #[diagnostic::do_not_recommend]
 impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<F, T> {
     const REFERENCES: usize = F::Outputs::NY;
@@ -192,6 +212,19 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
         if at.exact {
             cross.curvature::<F>(v, mu, at.factor, hessian);
         }
+        Ok(())
+    }
+
+    fn refer(
+        &mut self,
+        (v, direction): (&ArrayV<F, T>, Option<&ArrayV<F, T>>),
+        reference: &[T],
+        at: At<'_, T>,
+        to: &mut [T],
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        self.square(reference, at.stage)?;
+        refer::<F, T>((&self.weights, &self.mu), (&self.jacobian, direction), at.factor, to);
         Ok(())
     }
 }

@@ -5,7 +5,7 @@
 //! | `factors` | the conditions of optimality, factorised: adjoints, derivatives of the value |
 //! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
 //! | `column`, `border` | solutions by its factors, and what couples stages |
-//! | `parameters` | what parameters change of the conditions |
+//! | `parameters`, `references` | what these change of the conditions |
 //! | `covariance` | the covariance of an estimate, and what data say nothing of |
 //! | `unknowns`, `gram` | its unknowns, and the reduced Hessian over these |
 
@@ -19,6 +19,7 @@ mod factors;
 mod gram;
 mod parameters;
 mod recursion;
+pub(in crate::ocp) mod references;
 mod solve;
 mod unknowns;
 

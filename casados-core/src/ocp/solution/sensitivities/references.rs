@@ -1,0 +1,118 @@
+//! What references change of solutions and of the optimal value.
+
+use super::factors::SolutionFactors;
+use crate::ocp::assembly::algebraic;
+use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::functions::cost::{At, Cost};
+use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::instance::data::{Node, split};
+use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::qp::{StageDims, take_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+/// How many references a problem with so many intervals has: those of the stages, one after the
+/// other, then that of the end.
+pub(in crate::ocp) fn count<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
+    intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES
+}
+
+/// What is asked.
+#[derive(Clone, Copy)]
+enum Of<'a, T> {
+    Value,
+    Adjoint(&'a SolutionFactors<T>),
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// `λᵀ dw/dr` of the last [`SolutionFactors::adjoint`], by the references `r` of all stages, one
+    /// after the other, and then of the terminal cost: those of
+    /// [`LeastSquaresCost`](crate::ocp::LeastSquaresCost) and
+    /// [`ConvexCost`](crate::ocp::ConvexCost).
+    ///
+    /// # Errors
+    /// [`OcpError::Length`] if there is no room for just as many; [`OcpError::NonFiniteFunction`]
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SolutionFactors};
+    /// use casados::prelude::*;
+    /// # #[function]
+    /// # fn push(x: f64, u: f64) -> f64 { x + u }
+    /// # #[function]
+    /// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    /// let mut ocp = Problem::new(Map::<Push, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    ///     .on(Horizon::uniform(2, 1.0))?;
+    /// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    /// let mut factors = SolutionFactors::new(&ocp)?;
+    /// ocp.factorise(Exact::default(), &mut factors)?;
+    /// let mut seed = casados::qp::HeapSolution::new(ocp.qp().dims())?;
+    /// seed.stage_mut(0).ok_or("a stage")?.u[0] = 1.0;
+    /// factors.adjoint(&seed)?;
+    /// let mut by_references = [0.0; 4];
+    /// ocp.adjoint_by_references(&factors, &mut by_references)?;
+    /// // min ½ (u₀ − r₁)² + ½ (x₁ − r₂)² with x₁ = 1 + u₀: u₀ = (r₁ + r₂ − 1) / 2.
+    /// let expected = [0.0, 0.5, 0.5, 0.0];
+    /// assert!(by_references.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn adjoint_by_references(
+        &mut self,
+        factors: &SolutionFactors<T>,
+        to: &mut [T],
+    ) -> Result<(), OcpError> {
+        self.by_references(Of::Adjoint(factors), to)
+    }
+
+    /// `∂V/∂r` of the optimal value at the iterate, which must be a solution; as
+    /// [`Ocp::adjoint_by_references`].
+    ///
+    /// # Errors
+    /// As [`Ocp::adjoint_by_references`].
+    pub fn value_gradient_by_references(&mut self, to: &mut [T]) -> Result<(), OcpError> {
+        self.by_references(Of::Value, to)
+    }
+
+    fn by_references(&mut self, of: Of<'_, T>, mut to: &mut [T]) -> Result<(), OcpError> {
+        let (intervals, free) = (self.intervals(), self.free.view());
+        let (expected, found) = (count::<P, T>(intervals), to.len());
+        if expected != found {
+            return Err(OcpError::Length { part: Part::Reference, stage: 0, expected, found });
+        }
+        to.fill(T::ZERO);
+        let layout = self.layout();
+        let data = split::<P, T>(self.data.as_mut(), layout);
+        let Problem { stage_cost, terminal_cost, running, .. } = self.problem.parts();
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, at) in self.iterate.stages().enumerate() {
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
+            node.read::<P::Shape>(&mut point, &at, z, free);
+            let mut direction = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+            if let Of::Adjoint(factors) = of {
+                let (x, u) = (factors.column.state(k), factors.column.control(k));
+                read::<P::Shape, T>(&mut direction, [x, &[], u, &[]], T::ZERO);
+                let n = P::Shape::NX + P::Shape::NU;
+                let of_z = direction.as_mut().get_mut(2 * P::Shape::NX..).unwrap_or_default();
+                for (of_z, row) in of_z.iter_mut().zip(dz.chunks_exact(n.max(1))) {
+                    let products = row.iter().zip(x.iter().chain(u)).map(|(&a, &b)| a * b);
+                    *of_z = products.fold(T::ZERO, |sum, product| sum + product);
+                }
+            }
+            let place = At { stage: k, factor: node.factor, exact: true, from: &[] };
+            let direction = matches!(of, Of::Adjoint(_)).then_some(&direction);
+            if k < intervals {
+                let to = take_mut(&mut to, P::StageCost::REFERENCES);
+                stage_cost.refer((&point, direction), node.reference, place, to)?;
+            } else {
+                terminal_cost.refer((&point, direction), node.reference, place, to)?;
+                break;
+            }
+        }
+        Ok(())
+    }
+}
