@@ -26,6 +26,7 @@ mod free_parameters;
 mod guesses;
 mod ipm;
 mod lifted;
+mod linear_equations;
 mod options;
 mod random;
 mod real_time;

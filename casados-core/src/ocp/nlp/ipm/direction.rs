@@ -3,7 +3,7 @@
 use super::Ipm;
 use super::barrier;
 use super::kkt::lengths::Lengths;
-use super::kkt::newton::{evaluate, kkt_view, resolve};
+use super::kkt::newton::{evaluate, kkt_view, refine, resolve};
 use super::kkt::work::Work;
 use super::predictor;
 use super::state::State;
@@ -104,6 +104,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.filter.clear();
         }
         row.barrier = state.mu;
+        refine(&mut iterate, units)?;
         Ok(is_corrected)
     }
 }

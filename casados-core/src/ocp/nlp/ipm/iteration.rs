@@ -3,7 +3,7 @@
 use super::barrier;
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, resolve};
+use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, refine, resolve};
 use super::kkt::scaling::{Relative, relative};
 use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
 use super::predictor::{self, needs_equal_steps};
@@ -221,6 +221,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             let here = direction.expected.here;
             let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
+            refine(&mut iterate, Work::new(ocp.ends(), capacity, self.work.as_mut()).units)?;
             *direction = self.along(ocp, capacity, state, here, false)?;
             self.expand(ocp, state)?;
         }

@@ -35,7 +35,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     {
         let stalls = end.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || stalls) || state.second_attempt || P::Dynamics::LIFTED {
+        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::Dynamics::LIFTED {
             return false;
         }
         let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
