@@ -1,7 +1,7 @@
 //! Kinds of problems on which solvers creep: a path equality of controls from guesses where its
 //! gradient vanishes or that are far from it, a constraint of third order, swing-ups in many
-//! swings, many shared parameters with large data. References are IPOPT's (CasADi 3.8.2, the same discretisation and guess, a tolerance of
-//! 1e-10, bounds not relaxed).
+//! swings, many shared parameters with large data. References are IPOPT's (CasADi 3.8.2, the same
+//! discretisation and guess, a tolerance of 1e-10, bounds not relaxed).
 
 use super::ocps::line;
 use super::units::fix;
@@ -11,8 +11,8 @@ use casados::ocp::{
     Outcome, Problem, SecondOrder,
 };
 use casados::prelude::*;
-use casados::{Erk, Rk4};
 use casados::qp::residuals;
+use casados::{Erk, Rk4};
 use core::f64::consts::PI;
 
 /// By both solvers, with the conditions of optimality judged by code that is not the solvers'.

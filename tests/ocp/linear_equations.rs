@@ -58,9 +58,8 @@ fn ends_that_are_given() -> Test {
 fn ends_by_constraints() -> Test {
     for distance in [1.0, 50.0] {
         let to = [distance; 2];
-        let ocp = problem!()
-            .terminal_constraints(Constraint::<End>::new(to, to))
-            .on(Horizon::uniform(20, 0.05))?;
+        let ocp =
+            problem!().terminal_constraints(Constraint::<End>::new(to, to)).on(Horizon::uniform(20, 0.05))?;
         holds(ocp, distance)?;
     }
     Ok(())

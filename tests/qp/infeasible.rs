@@ -46,8 +46,8 @@ fn spread(mut iterations: Vec<usize>) -> String {
 }
 
 /// With at most thirty iterations, for a caller with ways out of its own: an infeasible problem is
-/// said to be one, or nothing is said; and so is one feasible problem of a hundred, since multipliers
-/// are nearly a proof only.
+/// said to be one, or nothing is said; and so is one feasible problem of a hundred, since
+/// multipliers are nearly a proof only.
 #[test]
 fn limited() -> Test {
     const MOST: usize = 30;

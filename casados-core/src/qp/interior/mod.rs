@@ -336,8 +336,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         if self.limit.is_none() {
             return self.again(qp, start, error, over, &mut solution);
         }
-        let (worst, _) =
-            violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row));
+        let (worst, _) = violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row));
         Err(worst.filter(|_| suspected).map_or(error, QpError::from))
     }
 

@@ -20,8 +20,8 @@ const MOST_AT_FIRST: f64 = 1e-2;
 const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
-/// QPs with hard bounds have this part of [`max_qp_iterations`](super::SqpOptions::max_qp_iterations),
-/// and those with penalties so much of what is left.
+/// QPs with hard bounds have this part of the iterations of QPs, and those with penalties so much
+/// of what is left.
 const HARD_SHARE: f64 = 0.35;
 const ELASTIC_SHARE: f64 = 0.6;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.

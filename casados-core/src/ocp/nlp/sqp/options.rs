@@ -79,8 +79,8 @@ pub struct SqpOptions {
     pub max_qp_iterations: usize,
     /// The shortest step of a line search; above 0, at most 1. Default 1e-6.
     pub shortest_step: f64,
-    /// Whether a run begins at a point beside a guess at which the gradient of a violated constraint
-    /// vanishes: its linearisation says nothing of where it holds. Default true.
+    /// Whether a run begins at a point beside a guess at which the gradient of a violated
+    /// constraint vanishes: its linearisation says nothing of where it holds. Default true.
     pub perturb_start: bool,
     /// Whether a run that fails, or leads nowhere for long, begins once more: at a simulation with
     /// the controls of the guess, or beside it where violations are still those of the guess.

@@ -300,7 +300,8 @@ where
             // The line search has linearised here already.
             Some(seconds) => row.times.linearise = seconds,
             None if row.iteration == 0 => {
-                row.perturbed = ocp.linearise_guess(self.curvature, &mut self.trial, self.options.perturb_start)?;
+                row.perturbed =
+                    ocp.linearise_guess(self.curvature, &mut self.trial, self.options.perturb_start)?;
                 if row.perturbed {
                     self.weights.copy_from(&ocp.iterate);
                 }

@@ -3,11 +3,11 @@
 use super::acceptance::Search;
 use super::options::{Globalisation, SqpOptions};
 use super::run::Attempt;
-use crate::qp::QpError;
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
+use crate::qp::QpError;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
