@@ -48,6 +48,29 @@ fn options_are_validated() -> Test {
     Ok(())
 }
 
+/// QPs of an iteration share their iterations, whatever they end with: on the way to a verdict, and
+/// to a solution.
+#[test]
+fn iterations_of_qps_are_limited() -> Test {
+    for most in [12, 30, 100] {
+        for time in [1.0, 50.0] {
+            let mut ocp = car_within(time, GIVEN)?;
+            let mut sqp = HeapSqp::new(&ocp)?;
+            sqp.options.max_qp_iterations = most;
+            let outcome = sqp.solve(&mut ocp)?;
+            println!("{}{outcome}", sqp.log());
+            assert!(sqp.log().0.iter().all(|row| row.qp_iterations <= most), "{most}: {outcome}");
+            assert!(!outcome.is_converged() || time > 1.0, "{outcome}");
+        }
+    }
+    let mut ocp = car_within(50.0, GIVEN)?;
+    let mut sqp = HeapSqp::new(&ocp)?;
+    sqp.options.max_qp_iterations = 3;
+    let refused = sqp.solve(&mut ocp);
+    assert!(matches!(refused, Err(OcpError::InvalidOption { name: "max_qp_iterations", .. })));
+    Ok(())
+}
+
 /// The log grows with what happens, not with what may.
 #[test]
 fn any_number_of_iterations_is_a_limit() -> Test {

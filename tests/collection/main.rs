@@ -8,6 +8,7 @@ mod creeping;
 mod guesses;
 mod held;
 mod infeasible;
+mod kinds;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;
@@ -26,6 +27,7 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     let mut sqp = HeapSqp::new(ocp)?;
     let outcome = sqp.solve(ocp)?;
     println!("{}{outcome}", sqp.log());
+    assert!(sqp.log().0.iter().all(|row| row.qp_iterations <= sqp.options.max_qp_iterations));
     // The bounds that are hard are as hard as they were, whatever happened.
     let linear = |b: casados::qp::Bounds<'_, f64>| b.lower_linear.iter().all(|p| p.is_infinite());
     assert!(ocp.qp().stages().all(|stage| linear(stage.x_bounds()) && linear(stage.u_bounds())));

@@ -30,6 +30,7 @@ mod guesses;
 mod inside;
 mod ipm;
 mod lifted;
+mod linear_equations;
 mod options;
 mod random;
 mod real_time;

@@ -45,6 +45,58 @@ fn spread(mut iterations: Vec<usize>) -> String {
     format!("{} | {} | {} | {}", iterations.len(), at(0.5), at(0.9), at(1.0))
 }
 
+/// With at most thirty iterations, for a caller with ways out of its own: an infeasible problem is
+/// said to be one, or nothing is said; and so is one feasible problem of a hundred, since
+/// multipliers are nearly a proof only.
+#[test]
+fn limited() -> Test {
+    const MOST: usize = 30;
+    let (mut suspected, mut told, mut count) = ([0, 0], [0, 0], [0, 0]);
+    for seed in 1..=400 {
+        let mut random = Numbers::new(seed);
+        let mut qp = problem(&mut random, &PLAIN)?.qp;
+        if seed % 2 == 0 {
+            move_bounds(&mut random, &mut qp)?;
+        }
+        let mut solution = HeapSolution::new(qp.dims())?;
+        let feasible = match Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut()) {
+            Ok(_) => 1,
+            Err(QpError::Infeasible { .. }) => 0,
+            Err(_) => continue,
+        };
+        let mut solver = HeapInteriorPoint::new();
+        solver.limit(Some(MOST));
+        let mut asked = 0;
+        let mut over = || {
+            asked += 1;
+            false
+        };
+        let found = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over);
+        assert!(asked <= MOST + 1, "{seed}: {asked}");
+        count[feasible] += 1;
+        match found {
+            Ok(statistics) => {
+                assert!(feasible == 1 && statistics.iterations <= MOST, "{seed}");
+                let (r, _) = residuals(qp.view(), &solution);
+                assert!(r.largest() < 1e2 * TOLERANCE, "{seed}: {r}");
+                told[1] += 1;
+            }
+            Err(QpError::Infeasible { violation, .. }) => {
+                assert!(violation > 0.0, "{seed}: {violation:e}");
+                suspected[feasible] += 1;
+                told[0] += 1;
+            }
+            Err(QpError::MaxIterations { .. } | QpError::Stalled { .. }) => {}
+            Err(error) => return Err(format!("{seed}: {error}").into()),
+        }
+    }
+    println!("{count:?} {told:?} {suspected:?}");
+    assert!(count[0] >= 30 && count[1] >= 200, "{count:?}");
+    assert!(100 * suspected[1] <= count[1], "{suspected:?} of {count:?}");
+    assert!(10 * suspected[0] >= 9 * count[0], "{suspected:?} of {count:?}");
+    Ok(())
+}
+
 /// Iterations are what the solver asks the clock for: errors have no number of them.
 fn told_apart(name: &str, kind: &Kind) -> Test {
     let (mut feasible, mut infeasible, mut given_up) = (Vec::new(), Vec::new(), 0);

@@ -130,4 +130,12 @@ pub trait QpSolver<T> {
     fn require(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
+
+    /// Limits the iterations of each call to come, all attempts in sum, for a caller that has ways
+    /// out of its own: a call ends with [`QpError::Infeasible`] where multipliers are nearly a
+    /// proof, and nobody looks for what cannot be satisfied. With nothing calls are as options say
+    /// again. A solver that cannot make use of it does nothing.
+    fn limit(&mut self, iterations: Option<usize>) {
+        let _ = iterations;
+    }
 }

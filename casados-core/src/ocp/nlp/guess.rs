@@ -11,8 +11,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Linearises at the guess; where something has no value there, at the point nearest to it that
     /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
     ///
-    /// Where the gradient of a violated constraint vanishes, the start is a point beside it.
-    /// Whether it is.
+    /// Where the gradient of a violated constraint vanishes, the start is a point beside it, if it
+    /// `perturbs`. Whether it is.
     ///
     /// # Errors
     /// That at the guess, if there is none at that point either.
@@ -20,8 +20,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         &mut self,
         curvature: C,
         copy: &mut Solution<T, D, M>,
+        perturbs: bool,
     ) -> Result<bool, OcpError> {
         let Err(error) = self.linearise(curvature) else {
+            if !perturbs {
+                return Ok(false);
+            }
             return self.leave_degenerate_start(copy, |ocp| ocp.linearise(curvature));
         };
         if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {

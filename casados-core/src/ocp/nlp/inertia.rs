@@ -15,7 +15,7 @@ const MAX_DELTA: f64 = 1e10;
 /// What it grows by where it is not enough, and shrinks by from one iteration to the next.
 const DELTA_FACTOR: f64 = 4.0;
 /// It grows so many times because a QP was not solved for a reason that is not known.
-const MAX_UNSOLVED: usize = 3;
+const MAX_UNSOLVED: usize = 1;
 
 /// The regularisation of the last QP that needed one, and less after those that did not.
 #[derive(Clone, Copy, Debug, Default)]

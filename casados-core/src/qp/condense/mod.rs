@@ -126,6 +126,9 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
     fn require(&mut self, tolerance: f64) {
         self.solver.require(tolerance);
     }
+    fn limit(&mut self, iterations: Option<usize>) {
+        self.solver.limit(iterations);
+    }
 
     fn solve_until(
         &mut self,

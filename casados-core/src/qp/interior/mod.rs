@@ -100,6 +100,8 @@ pub struct InteriorPoint<T, N, I> {
     pub options: InteriorPointOptions,
     /// A tolerance above that of the options is asked for.
     relaxed: T,
+    /// The iterations of a call, where the caller has ways out of its own.
+    limit: Option<usize>,
     numbers: N,
     indices: I,
     number: PhantomData<T>,
@@ -182,6 +184,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         Self {
             options: InteriorPointOptions::new::<T>(),
             relaxed: T::ZERO,
+            limit: None,
             numbers,
             indices,
             number: PhantomData,
@@ -320,15 +323,25 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
             proximal: false,
             statistics: QpStatistics::default(),
             iterations: self.options.max_iterations,
-            suspects: self.options.locate,
+            suspects: self.options.locate || self.limit.is_some(),
         };
-        match self.run(qp, attempt, over, &mut solution).0 {
-            // A number that is not finite is found here, not in every call.
-            Err(error) => {
-                super::check::check(qp).and_then(|()| self.again(qp, start, error, over, &mut solution))
-            }
-            solved => solved,
+        let attempt = match self.limit {
+            Some(limit) => Attempt { iterations: limit.min(attempt.iterations), ..attempt },
+            None => attempt,
+        };
+        let (result, suspected) = self.run(qp, attempt, over, &mut solution);
+        let Err(error) = result else { return result };
+        // A number that is not finite is found here, not in every call.
+        super::check::check(qp)?;
+        if self.limit.is_none() {
+            return self.again(qp, start, error, over, &mut solution);
         }
+        let (worst, _) = violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row));
+        Err(worst.filter(|_| suspected).map_or(error, QpError::from))
+    }
+
+    fn limit(&mut self, iterations: Option<usize>) {
+        self.limit = iterations;
     }
 
     fn permit(&mut self, tolerance: f64) {

@@ -15,6 +15,12 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.push(factor);
         self.solve::<E>(factor)?;
         self.sides.steps();
+        let weight = T::ONE / self.sides.compliance;
+        let sides = &mut self.sides;
+        let equations = sides.equations.iter().zip(&mut *sides.free_step).zip(&*sides.equation_residual);
+        for (((&row, change), &residual), &stiffness) in equations.zip(&*sides.stiffness) {
+            *change = *change - weight * stiffness * (at(self.step, row) + residual);
+        }
         Ok(())
     }
 
@@ -59,6 +65,7 @@ impl<T: Real> Iterate<'_, T> {
                 *g = *g + weight * stiffness * residual;
             }
         }
+        scatter(self.gradient, sides.equations, sides.free_step, |g, &change| g - change);
         if factor {
             self.weights.fill(T::ZERO);
             if self.proximal > T::ZERO {
@@ -96,13 +103,9 @@ impl<T: Real> Iterate<'_, T> {
     }
 
     fn go_with_multipliers(&mut self, of_sides: T, of_equations: T) {
-        let weight = T::ONE / self.sides.compliance;
         let sides = &mut self.sides;
         add_scaled(sides.multiplier, of_sides, sides.multiplier_step);
-        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&*sides.equation_residual);
-        for (((&row, free), &residual), &stiffness) in equations.zip(&*sides.stiffness) {
-            *free = *free - of_equations * (weight * stiffness) * (at(self.step, row) + residual);
-        }
+        add_scaled(sides.free, of_equations, sides.free_step);
     }
 
     /// Goes a part of the step.

@@ -47,7 +47,8 @@ pub struct Run<'r, 'a, 's, T> {
     pub attempt: Attempt,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<QpStatistics, QpError>,
-    /// Whether the multipliers prove that no point satisfies all constraints.
+    /// Whether the multipliers prove that no point satisfies all constraints; of the problem as it
+    /// is, whether they are nearly a proof.
     pub infeasible: &'r mut bool,
 }
 
@@ -87,7 +88,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                     iterate.forget();
                 }
                 iterate.begin::<E>(options, &attempt, &limits, solution);
-                iterate.iterations::<E>(&attempt, &limits, over, solution)
+                iterate.iterations::<E>(&attempt, &limits, over, solution, infeasible)
             }
         };
         if attempt.penalties == Penalties::Hard {
@@ -188,6 +189,7 @@ impl<T: Real> Iterate<'_, T> {
         limits: &Limits<T>,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
+        suspected: &mut bool,
     ) -> Result<QpStatistics, QpError> {
         let mut out_of_time = false;
         let Attempt { mut statistics, iterations: most, .. } = *attempt;
@@ -237,6 +239,7 @@ impl<T: Real> Iterate<'_, T> {
             if attempt.suspects {
                 let (done, judged) = (statistics.iterations - first.0, (residuals, limits));
                 if self.is_suspicious::<E>(done, first.1, judged, solution.dynamics) {
+                    *suspected = true;
                     break true;
                 }
             }

@@ -210,6 +210,9 @@ pub struct Sides<'a, T> {
     pub equation_bound: &'a mut [T],
     /// How much stiffer equations are than `1 / δ`.
     pub stiffness: &'a mut [T],
+    /// Changes of multipliers of equations, where they are remembered: by what equations give way,
+    /// Newton's equations are solved again from these.
+    pub free_step: &'a mut [T],
 }
 
 impl<'a, T: Real> Sides<'a, T> {
@@ -240,6 +243,7 @@ impl<'a, T: Real> Sides<'a, T> {
             equation_residual: take_mut(numbers, counts.equations),
             equation_bound: take_mut(numbers, counts.equations),
             stiffness: take_mut(numbers, counts.equations),
+            free_step: &mut [],
         }
     }
 

@@ -2,8 +2,7 @@
 
 use super::Ipm;
 use super::barrier;
-use super::kkt::lengths::Lengths;
-use super::kkt::newton::{evaluate, kkt_view, resolve};
+use super::kkt::newton::{evaluate, kkt_view, refine, resolve};
 use super::kkt::work::Work;
 use super::predictor;
 use super::state::State;
@@ -28,7 +27,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn search_direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<Result<bool, QpError>, OcpError>
@@ -36,15 +34,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         P::Dynamics: SecondOrder<T>,
     {
         let before = (state.regularisation, state.progress, state.mu);
-        let direction = self.regularised_direction(ocp, capacity, state, row);
+        let direction = self.regularised_direction(ocp, state, row);
         let is_regularised =
             direction.is_err() || state.delta > MOST_REGULARISATION * state.lengths.sizes.force;
         if !is_regularised || state.violation <= CLOSE {
             return Ok(direction);
         }
         (state.regularisation, state.progress, state.mu) = before;
-        self.forget_curvature(ocp, capacity, state)?;
-        Ok(self.regularised_direction(ocp, capacity, state, row))
+        self.forget_curvature(ocp, state)?;
+        Ok(self.regularised_direction(ocp, state, row))
     }
 
     /// The QP at the iterate without multipliers of dynamics and constraints, on which no step
@@ -52,15 +50,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn forget_curvature<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Result<(), OcpError>
     where
         P::Dynamics: SecondOrder<T>,
     {
         ocp.iterate.view_mut().dynamics.fill(T::ZERO);
-        Work::new(ocp.ends(), capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
-        self.linearise(ocp, capacity, state)?;
+        Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
+        self.linearise(ocp, state)?;
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut view = solution.view_mut();
@@ -77,13 +74,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn regularised_direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<bool, QpError> {
         let force = state.lengths.sizes.force;
         let least = force * barrier::least(self.options.least_error(force));
-        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
+        let units = Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units;
         let mut iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = units;
         let probes = state.progress.is_free();
@@ -104,6 +100,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.filter.clear();
         }
         row.barrier = state.mu;
+        refine(&mut iterate, units)?;
         Ok(is_corrected)
     }
 }

@@ -1,9 +1,8 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
 use super::barrier;
-use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, resolve};
+use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, refine, resolve};
 use super::kkt::scaling::{Relative, relative};
 use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
 use super::predictor::{self, needs_equal_steps};
@@ -52,7 +51,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn linearise<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Result<(), OcpError>
     where
@@ -65,14 +63,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             if state.lengths.alone {
                 ocp.forget_gradients();
             }
-            self.begin(ocp, capacity, state)?;
+            self.begin(ocp, state)?;
         }
-        self.curve(ocp, capacity, state)?;
+        self.curve(ocp, state)?;
         ocp.linearise(EXACT)?;
         if state.lengths.alone {
             ocp.forget_gradients();
         }
-        let units = Work::new(ocp.ends(), capacity, self.work.as_mut()).units;
+        let units = Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units;
         kkt_view_of_new_qp(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
         Ok(())
     }
@@ -81,7 +79,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn assess<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<(), OcpError> {
@@ -100,7 +97,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             (residuals.inequalities, residuals.complementarity) =
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
-        let work = Work::new(ends, capacity, self.work.as_mut());
+        let work = Work::new(ends, &state.capacity, self.work.as_mut());
         let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
         let Relative { barrier, error, others } =
@@ -115,7 +112,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let worst = elastic::worst(ocp, state, (work.penalties, work.units));
         let size = larger(state.error, worst.map_or(0.0, |worst| worst.violation));
         let is_best = size < state.best_residual || state.best_residual.is_nan();
@@ -137,14 +134,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn here<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Result<Measure, QpError> {
         let lengths = state.lengths;
         let Self { trial, numbers, indices, work, .. } = self;
         let plain = if lengths.alone { 0.0 } else { ocp.objective.to_f64() };
         let iterate = kkt_view(ocp.qp.view(), &lengths, numbers, indices)?;
-        let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
+        let mut work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
         let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
         if P::Dynamics::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
@@ -167,12 +163,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn along<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &State<'_>,
         here: Measure,
         is_corrected: bool,
     ) -> Result<Direction, QpError> {
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let first = state.first_violation.max(1.0);
         let expected = FilterModel {
@@ -197,7 +192,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn search<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         direction: &mut Direction,
     ) -> Result<SearchOutcome, OcpError> {
@@ -208,7 +202,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         macro_rules! room {
             ($work:ident) => {{
                 let Self { trial, numbers, indices, work, .. } = &mut *self;
-                $work = Work::new(ocp.ends(), capacity, work.as_mut());
+                $work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
                 LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut $work }
             }};
         }
@@ -221,7 +215,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             let here = direction.expected.here;
             let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
-            *direction = self.along(ocp, capacity, state, here, false)?;
+            refine(&mut iterate, Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units)?;
+            *direction = self.along(ocp, state, here, false)?;
             self.expand(ocp, state)?;
         }
         let Direction { expected, primal, tau, .. } = direction;
@@ -232,12 +227,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn accept<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &State<'_>,
         direction: &Direction,
         accepted: Accepted,
     ) -> Result<(), OcpError> {
-        let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let mut work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.units = &*core::mem::take(&mut work.units);
@@ -284,17 +278,15 @@ where
         row: &mut Iteration,
     ) -> Result<(), OcpError> {
         row.perturbed = state.has_perturbed_start && row.iteration == 0;
-        let capacity = state.capacity;
-        self.linearise(ocp, &capacity, state)?;
-        self.assess(ocp, &capacity, state, row)
+        self.linearise(ocp, state)?;
+        self.assess(ocp, state, row)
     }
 
     fn test(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_>, row: &Iteration) -> Next {
         if (state.over)() {
             return Next::End(Status::OutOfTime);
         }
-        let capacity = state.capacity;
-        self.next(ocp, &capacity, state, row)
+        self.next(ocp, state, row)
     }
 
     fn step(
@@ -304,20 +296,19 @@ where
         row: &mut Iteration,
         watch: &mut Watch,
     ) -> Result<Option<Status>, OcpError> {
-        let capacity = &{ state.capacity };
         if state.is_complementarity_stalled() {
             self.reset_small_slacks(ocp, state)?;
         }
-        let direction = self.search_direction(ocp, capacity, state, row)?.and_then(|is_corrected| {
-            let here = self.here(ocp, capacity, state)?;
-            self.along(ocp, capacity, state, here, is_corrected)
+        let direction = self.search_direction(ocp, state, row)?.and_then(|is_corrected| {
+            let here = self.here(ocp, state)?;
+            self.along(ocp, state, here, is_corrected)
         });
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
                 // A derivative that is not finite is another error.
                 ocp.status_of_error(error)?;
-                return Ok(self.recover(ocp, capacity, state));
+                return Ok(self.recover(ocp, state));
             }
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
@@ -326,20 +317,20 @@ where
         if (state.over)() {
             return Ok(Some(Status::OutOfTime));
         }
-        if self.is_unbounded(ocp, capacity, state) {
+        if self.is_unbounded(ocp, state) {
             return Ok(Some(Status::Unbounded));
         }
-        let found = self.search(ocp, capacity, state, &mut direction)?;
+        let found = self.search(ocp, state, &mut direction)?;
         row.times.search = watch.lap();
         let accepted = match found {
             SearchOutcome::Step(accepted) => accepted,
-            SearchOutcome::Nothing => return Ok(self.recover(ocp, capacity, state)),
+            SearchOutcome::Nothing => return Ok(self.recover(ocp, state)),
             SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         state.count_stalled(row.step);
         state.regularisation.gone(row.step / direction.primal);
-        self.accept(ocp, capacity, state, &direction, accepted)?;
+        self.accept(ocp, state, &direction, accepted)?;
         let force = of_tolerance(state.lengths.sizes.force);
         let least = (self.options.tolerance * force).max(self.options.final_mu);
         let ends = direction.tiny && state.mu <= least;
@@ -353,8 +344,7 @@ where
         end: Option<Status>,
         row: &Iteration,
     ) -> bool {
-        let capacity = state.capacity;
-        let begins = self.try_restart(ocp, &capacity, state, end);
+        let begins = self.try_restart(ocp, state, end);
         if !begins && matches!(end, Some(Status::Infeasible { .. })) {
             // That is said of the last iterate.
             state.best_iteration = *row;

@@ -2,7 +2,7 @@
 
 use super::kkt::lengths::Lengths;
 use super::kkt::measure;
-use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp};
+use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp, refine};
 use super::kkt::work::Work;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
@@ -226,6 +226,7 @@ where
             assign(self.work.step, iterate.step);
             assign(self.work.slack_step, iterate.sides.slack_step);
             assign(self.work.multiplier_step, iterate.sides.multiplier_step);
+            assign(self.work.free_step, iterate.sides.free_step);
         }
         let mut violation = expected.here.violation;
         let mut accepted = None;
@@ -239,7 +240,8 @@ where
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
                 let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
-                let solved = super::kkt::newton::step(&mut iterate, mu, delta);
+                let solved = super::kkt::newton::step(&mut iterate, mu, delta)
+                    .and_then(|()| refine(&mut iterate, self.work.units));
                 (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
             };
             if solved.is_err() {
@@ -260,6 +262,7 @@ where
             assign(iterate.step, self.work.step);
             assign(iterate.sides.slack_step, self.work.slack_step);
             assign(iterate.sides.multiplier_step, self.work.multiplier_step);
+            assign(iterate.sides.free_step, self.work.free_step);
         }
         Ok(accepted)
     }

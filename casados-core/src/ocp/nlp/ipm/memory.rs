@@ -83,5 +83,5 @@ const fn lengths<P: Formulation<T>, T: Real>(
 ) -> [usize; 3] {
     let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
     let work = Work::<T>::length(dims, ends::<P, T>(dims), &counts);
-    [Iterate::<T>::memory(dims, &counts), work, counts.indices()]
+    [Iterate::<T>::memory(dims, &counts) + equations, work, counts.indices()]
 }

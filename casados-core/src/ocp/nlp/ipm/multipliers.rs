@@ -2,7 +2,6 @@
 
 use super::Ipm;
 use super::barrier;
-use super::kkt::lengths::Lengths;
 use super::kkt::newton::{evaluate, evaluate_values, kkt_view, kkt_view_of_new_qp, least_squares};
 use super::kkt::scaling;
 use super::kkt::start::begin_sides;
@@ -23,7 +22,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn begin<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Result<(), OcpError> {
         // Multipliers of hard bounds say nothing about penalties.
@@ -33,7 +31,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut work = Work::new(ends, capacity, self.work.as_mut());
+        let mut work = Work::new(ends, &state.capacity, self.work.as_mut());
         let rows = core::mem::take(&mut work.units);
         let rows = &*rows;
         let units = state.lengths.units(rows);
@@ -69,14 +67,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn curve<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &State<'_>,
     ) -> Result<(), OcpError> {
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let work = Work::new(ends, capacity, self.work.as_mut());
+        let work = Work::new(ends, &state.capacity, self.work.as_mut());
         assign(work.slacks, iterate.sides.multiplier);
         assign(iterate.sides.multiplier, work.hessian_multipliers);
         iterate.take_point(&view);

@@ -70,6 +70,13 @@ pub struct IpmOptions {
     /// The first of these penalties, linear, in units of forces over those of what is bounded; they
     /// grow by factors of ten up to ten thousand times that. At most 1e10. Default 1e2.
     pub elastic_penalty: f64,
+    /// Whether a run begins at a point beside a guess at which the gradient of a violated
+    /// constraint vanishes: its linearisation says nothing of where it holds. Default true.
+    pub perturb_start: bool,
+    /// Whether a run that fails, or leads nowhere for long, begins once more: at a simulation with
+    /// the controls of the guess, or beside it where violations are still those of the guess.
+    /// Default true.
+    pub restart: bool,
 }
 
 impl IpmOptions {
@@ -91,6 +98,8 @@ impl IpmOptions {
             warm_push: 1e-6,
             elastic: true,
             elastic_penalty: 1e2,
+            perturb_start: true,
+            restart: true,
         }
     }
 

@@ -100,7 +100,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         self.options.check()?;
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        let perturbed = ocp.linearise_guess(Slopes, &mut self.trial)?;
+        let perturbed = ocp.linearise_guess(Slopes, &mut self.trial, self.options.perturb_start)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State::new(over, (lengths, capacity), is_linearised, &self.options);
         state.has_perturbed_start = perturbed;

@@ -11,15 +11,19 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::solution::log::Iteration;
-use crate::qp::{QpError, QpSolver, QpStart, StageDims};
+use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;
 
 /// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
 const MOST_AT_FIRST: f64 = 1e-2;
-/// Penalties grow by this to see whether the objective is what holds violations back.
+/// Penalties grow by this where the objective is what holds violations back.
 const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
+/// QPs with hard bounds have this part of the iterations of QPs, and those with penalties so much
+/// of what is left.
+const HARD_SHARE: f64 = 0.35;
+const ELASTIC_SHARE: f64 = 0.6;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
 const QP_ROUNDING: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
@@ -126,7 +130,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let permitted = if begins || state.exact { 0.0 } else { part };
         let rounding = if state.sizes.is_some() { ocp.rounding_of_gaps() } else { 0.0 };
         self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()).max(rounding));
+        // After a step with penalties hard bounds, whose QP had no solution, are not tried again as
+        // long as violations stay: a solution with penalties that violates nothing is one of
+        // theirs.
+        if state.elastic_steps > 0 && self.options.elastic {
+            return self.elastic_direction(ocp, state, row, None);
+        }
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
+        self.begin_phase(state, row, HARD_SHARE);
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
         let may_help = matches!(
             error,
@@ -135,85 +146,97 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if !(may_help && self.options.elastic) {
             return Err(error);
         }
-        self.elastic_direction(ocp, state, row, error)
+        self.elastic_direction(ocp, state, row, Some(error))
     }
 
     /// The step where bounds have penalties, since the QP had no solution; or that violations stay.
     ///
     /// # Errors
-    /// The error of the QP with hard bounds, where that with penalties has no solution either.
+    /// `known`, the error of the QP with hard bounds, where that with penalties has no solution
+    /// either; that of the latter if there is none.
     fn elastic_direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
         row: &mut Iteration,
-        error: QpError,
+        known: Option<QpError>,
     ) -> Result<Direction, QpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
         // What is violated and what is possible are compared: by exact solutions.
-        let mut penalty = self.options.elastic_penalty.max(state.penalty);
+        let penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
         row.elastic = true;
         let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
         let gaps = ocp.gaps();
         let before = bounds + gaps;
-        if before == 0.0 {
+        if let (Some(error), 0.0) = (known, before) {
             // Nothing is violated that penalties could stand for.
             return Err(error);
         }
-        if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
-            // Without objective and curvature it is nearly a linear program.
-            if self.feasibility_step(ocp, state, row, before).is_err() {
+        self.begin_phase(state, row, ELASTIC_SHARE);
+        if let Err(error) = self.regularised(ocp, state, QpStart::Cold, row) {
+            if before == 0.0 {
                 return Err(error);
             }
+            // Without objective and curvature it is nearly a linear program.
+            self.feasibility_step(ocp, state, row, before).map_err(|_| known.unwrap_or(error))?;
             return Ok(Self::take_feasibility_step(state, row));
         }
-        let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
-            return Ok(Direction::Step);
-        };
-        if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+        let left = self.violation_of_solution(ocp);
+        if left <= self.options.tolerance {
+            // It is the solution with hard bounds, too.
+            ocp.set_penalties(self.penalties(ocp), None, &[]);
+            (state.elastic, row.elastic) = (false, false);
             return Ok(Direction::Step);
         }
-        // The objective may be what holds it back: with larger penalties it counts less.
+        match worst.filter(|worst| worst.violation > self.options.tolerance) {
+            Some(worst) if left >= STATIONARY_VIOLATION * before => {
+                Ok(self.steer(ocp, state, row, (worst, [bounds, gaps])))
+            }
+            _ => Ok(Direction::Step),
+        }
+    }
+
+    /// What follows where penalties reduce violations of bounds and gaps by nothing: the QP that
+    /// minimises these alone tells whether larger penalties would (R. H. Byrd, J. Nocedal, R. A.
+    /// Waltz, "Steering exact penalty methods for nonlinear programming", Optim. Methods Softw. 23,
+    /// 2008).
+    fn steer<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+        (worst, [bounds, gaps]): (Worst, [f64; 2]),
+    ) -> Direction {
         self.trial.copy_from(&self.solution);
-        let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
-        let mut solved = true;
-        while solved && penalty < largest {
-            penalty *= PENALTY_FACTOR;
-            self.set_elastic(ocp, state, penalty);
-            // Forces are as large as penalties, and have as many digits.
-            self.qp_solver.permit(QP_ROUNDING * penalty);
-            solved = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
-            if solved && self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
-                // It is, and from now on it does.
-                state.penalty = penalty;
-                return Ok(Direction::Step);
+        let before = bounds + gaps;
+        if self.feasibility_step(ocp, state, row, before).is_ok() {
+            if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+                let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
+                let penalty = self.options.elastic_penalty.max(state.penalty);
+                state.penalty = (PENALTY_FACTOR * penalty).min(largest);
+                return Self::take_feasibility_step(state, row);
+            }
+            let closes = gaps > CLOSED_GAPS * bounds && state.elastic_steps < STEPS_THAT_CLOSE_GAPS;
+            if !(closes || gaps > bounds) {
+                return Direction::Infeasible(worst);
             }
         }
-        // The Hessian may, too, or the QP is too hard: nearly a linear program is what tells where
-        // gaps are closed.
-        if gaps <= CLOSED_GAPS * bounds {
-            let is_near = self.feasibility_step(ocp, state, row, before).is_ok();
-            if is_near && self.violation_of_solution(ocp) >= STATIONARY_VIOLATION * before {
-                return Ok(Direction::Infeasible(worst));
-            }
-            if solved {
-                return if is_near { Ok(Self::take_feasibility_step(state, row)) } else { Err(error) };
-            }
-            // The QP has another objective now, and is to be written again.
-            state.rewritten = true;
-        }
-        // Gaps are to be closed first, whatever that leaves of bounds.
-        if solved && gaps <= bounds && state.elastic_steps >= STEPS_THAT_CLOSE_GAPS {
-            return Ok(Direction::Infeasible(worst));
-        }
-        state.penalty = 0.0;
+        // Gaps are to be closed first, whatever that leaves of bounds. The QP has another objective
+        // now, and is to be written again.
+        (state.rewritten, state.penalty) = (true, 0.0);
         self.set_elastic(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.solution, &mut self.trial);
-        Ok(Direction::Step)
+        Direction::Step
+    }
+
+    /// QPs to come have a share of the iterations that are left.
+    fn begin_phase(&self, state: &mut State<'_, T>, row: &Iteration, share: f64) {
+        let left = self.options.max_qp_iterations.saturating_sub(row.qp_iterations);
+        state.most_qp_iterations = row.qp_iterations + (share * left as f64) as usize;
     }
 
     /// The step to the nearest point; the QP has another objective than that of the iterate.
@@ -241,6 +264,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
         let penalty = if soft { alone } else { one };
         self.set_elastic(ocp, state, penalty);
+        self.begin_phase(state, row, 1.0);
         let mut result = Ok(());
         for (weight, digits) in PROXIMITY_WEIGHTS {
             self.qp_solver.permit(digits * penalty);
@@ -287,8 +311,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result
     }
 
-    /// The QP from the iterate; from a cold start if a warm one may be to blame: that no point
-    /// satisfies all constraints is proved by multipliers, whatever the start was.
+    /// The QP from the iterate, with the iterations that are left of its share.
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
@@ -296,27 +319,31 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError> {
-        let mut start = start;
-        loop {
-            self.solution.copy_from(&ocp.iterate);
-            let mut asked = 0;
-            let over = &mut || {
-                asked += 1;
-                state.is_over()
-            };
-            let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
-            // A solver that fails asks in every iteration, and says no number.
-            row.qp_iterations += result.as_ref().map_or(asked, |statistics| statistics.iterations);
-            let Err(error) = result else { return Ok(()) };
-            if start == QpStart::Cold
-                || matches!(
-                    error,
-                    QpError::NotConvex { .. } | QpError::OutOfTime { .. } | QpError::Infeasible { .. }
-                )
-            {
-                return Err(error);
-            }
-            start = QpStart::Cold;
+        self.solution.copy_from(&ocp.iterate);
+        let left = state.most_qp_iterations.saturating_sub(row.qp_iterations);
+        if self.options.elastic && left == 0 {
+            return Err(QpError::MaxIterations { iterations: 0, residuals: row.residuals });
         }
+        // Without penalties there is no other way out: the solver is to say what it can.
+        self.qp_solver.limit(self.options.elastic.then_some(left));
+        let mut asked = 0;
+        let over = &mut || {
+            asked += 1;
+            state.is_over()
+        };
+        let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+        self.qp_solver.limit(None);
+        let took = match result {
+            Ok(QpStatistics { iterations, .. })
+            | Err(
+                QpError::MaxIterations { iterations, .. }
+                | QpError::Stalled { iterations, .. }
+                | QpError::OutOfTime { iterations, .. },
+            ) => iterations,
+            // A solver asks in every iteration, and says no number where it finds such a QP.
+            Err(_) => asked,
+        };
+        row.qp_iterations += took;
+        result.map(drop)
     }
 }

@@ -73,8 +73,19 @@ pub struct SqpOptions {
     /// too, from 0.01 to 100, and all are powers of two. The log and residuals are in the units of
     /// the problem. Default true.
     pub scaling: bool,
+    /// QPs of an iteration have at most so many iterations, in sum: a third of them with hard
+    /// bounds, then with penalties, then for the least violations. Where they are not solved
+    /// by then the iterate stays, and the next iteration tries another QP. Default 100; at least 4.
+    pub max_qp_iterations: usize,
     /// The shortest step of a line search; above 0, at most 1. Default 1e-6.
     pub shortest_step: f64,
+    /// Whether a run begins at a point beside a guess at which the gradient of a violated
+    /// constraint vanishes: its linearisation says nothing of where it holds. Default true.
+    pub perturb_start: bool,
+    /// Whether a run that fails, or leads nowhere for long, begins once more: at a simulation with
+    /// the controls of the guess, or beside it where violations are still those of the guess.
+    /// Default true.
+    pub restart: bool,
 }
 
 impl SqpOptions {
@@ -91,6 +102,9 @@ impl SqpOptions {
             elastic_penalty: 1e3,
             scaling: true,
             shortest_step: 1e-6,
+            max_qp_iterations: 100,
+            perturb_start: true,
+            restart: true,
         }
     }
 
@@ -108,6 +122,10 @@ impl SqpOptions {
             if !is_valid {
                 return Err(OcpError::InvalidOption { name, value, allowed });
             }
+        }
+        if self.max_qp_iterations < 4 {
+            let (name, value) = ("max_qp_iterations", self.max_qp_iterations as f64);
+            return Err(OcpError::InvalidOption { name, value, allowed: "at least 4" });
         }
         Ok(())
     }

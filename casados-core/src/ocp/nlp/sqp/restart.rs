@@ -37,6 +37,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_)));
         let stalls = end.is_none() && state.elastic_steps == RESTART_AFTER;
         let can = C::EXACT
+            && self.options.restart
             && !state.second_attempt
             && state.contradiction.is_none()
             && row.iteration < self.options.max_iterations;

@@ -33,7 +33,7 @@ const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
 /// What a step tries, where no step along the direction before is short enough.
 #[derive(Clone, Copy, PartialEq)]
-enum Attempt {
+pub(in crate::ocp::nlp) enum Attempt {
     /// The QP to as many digits as the iterate deserves.
     First,
     /// To all of them: it may have been wrong by more than a step gains.
@@ -206,73 +206,81 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Some(Taken { length: 1.0, corrected: false }))
     }
 
-    /// A step in the direction of the QP, or of one with more regularisation where none is short
-    /// enough or the QP has no solution.
-    fn attempt_steps<P: Formulation<T>>(
+    /// A step in the direction of the QP; nothing where none is short enough, or the QP has no
+    /// solution.
+    fn attempt_step<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
         row: &mut Iteration,
         watch: &mut Watch,
-    ) -> Result<ControlFlow<Status, Taken>, OcpError>
+    ) -> Result<ControlFlow<Status, Option<Taken>>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let mut failure = None;
-        // Levenberg's and Marquardt's method damps steps that Gauss's and Newton's cannot go.
-        let damps = state.second_attempt || !C::EXACT;
-        for attempt in ATTEMPTS {
-            let (damping, skips) = match attempt {
-                Attempt::First => (0.0, false),
-                Attempt::Exact => (0.0, failure.is_some() || row.elastic || state.may_reject_short_steps),
-                Attempt::Damped(damping) => (damping, damps && damping <= state.damping),
-            };
-            if skips {
-                continue;
-            }
-            state.exact = state.second_attempt || attempt != Attempt::First;
-            state.may_reject_short_steps = damps && damping.max(state.damping) < MOST_DAMPING;
-            if attempt != Attempt::First {
-                if failure.is_some() {
-                    // The curvature that multipliers have is no help.
-                    ocp.iterate.multipliers_mut().fill(T::ZERO);
-                }
-                ocp.linearise(self.curvature)?;
-                self.leave_elastic(ocp, state);
-                row.regularisation = 0.0;
-                if damping > 0.0 {
-                    state.damping = damping;
-                }
-            }
-            let direction = self.direction(ocp, state, row)?;
-            row.times.qp += watch.lap();
-            failure = direction.as_ref().err().copied();
-            if state.late {
-                return Ok(ControlFlow::Break(Status::OutOfTime));
-            }
-            match direction {
-                Ok(Direction::Step) => {
-                    let taken = self.take_step(ocp, state, row)?;
-                    row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
-                    if let Some(taken) = taken {
-                        return Ok(ControlFlow::Continue(taken));
-                    }
-                }
-                Ok(Direction::Infeasible(worst)) => {
-                    return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
-                }
-                Err(QpError::Infeasible { .. }) if self.options.elastic => {}
-                Err(QpError::NotConvex { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. })
-                    if self.curvature.convexification() == Convexification::Reduced => {}
-                Err(error) => return ocp.status_of_error(error).map(ControlFlow::Break),
-            }
+        let attempt = state.attempt;
+        let damping = if let Attempt::Damped(damping) = attempt { damping } else { 0.0 };
+        state.exact = state.second_attempt || attempt != Attempt::First;
+        state.may_reject_short_steps = state.damps(C::EXACT) && damping.max(state.damping) < MOST_DAMPING;
+        if damping > 0.0 {
+            state.damping = damping;
         }
-        let status = match failure {
-            // That the QP at one iterate has no solution says nothing of the problem.
-            None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
-            Some(error) => ocp.status_of_error(error)?,
+        let direction = self.direction(ocp, state, row)?;
+        row.times.qp += watch.lap();
+        state.failure = direction.as_ref().err().copied();
+        if state.late {
+            return Ok(ControlFlow::Break(Status::OutOfTime));
+        }
+        match direction {
+            Ok(Direction::Step) => {
+                let taken = self.take_step(ocp, state, row)?;
+                row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
+                return Ok(ControlFlow::Continue(taken));
+            }
+            Ok(Direction::Infeasible(worst)) => {
+                return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
+            }
+            Err(QpError::Infeasible { .. }) if self.options.elastic => {}
+            Err(QpError::NotConvex { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. })
+                if self.curvature.convexification() == Convexification::Reduced => {}
+            Err(error) => return ocp.status_of_error(error).map(ControlFlow::Break),
+        }
+        Ok(ControlFlow::Continue(None))
+    }
+
+    /// The iterate stays, and the next iteration tries another QP there; how the run ends if there
+    /// is none.
+    fn stay<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<'_, T>,
+        row: &mut Iteration,
+    ) -> Result<Option<Status>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        row.step = 0.0;
+        let failure = state.failure;
+        let next = ATTEMPTS.iter().skip_while(|attempt| **attempt != state.attempt).skip(1);
+        let next = next.copied().find(|attempt| match attempt {
+            Attempt::First => false,
+            Attempt::Exact => !(failure.is_some() || row.elastic || state.may_reject_short_steps),
+            Attempt::Damped(damping) => !(state.damps(C::EXACT) && *damping <= state.damping),
+        });
+        let Some(next) = next else {
+            return Ok(Some(match failure {
+                // That the QP at one iterate has no solution says nothing of the problem.
+                None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
+                Some(error) => ocp.status_of_error(error)?,
+            }));
         };
-        Ok(ControlFlow::Break(status))
+        state.attempt = next;
+        state.search.linearised = None;
+        if failure.is_some() {
+            // The curvature that multipliers have is no help.
+            ocp.iterate.multipliers_mut().fill(T::ZERO);
+        }
+        Ok(None)
     }
 }
 
@@ -297,7 +305,8 @@ where
             // The line search has linearised here already.
             Some(seconds) => row.times.linearise = seconds,
             None if row.iteration == 0 => {
-                row.perturbed = ocp.linearise_guess(self.curvature, &mut self.trial)?;
+                row.perturbed =
+                    ocp.linearise_guess(self.curvature, &mut self.trial, self.options.perturb_start)?;
                 if row.perturbed {
                     self.weights.copy_from(&ocp.iterate);
                 }
@@ -352,12 +361,12 @@ where
         row: &mut Iteration,
         watch: &mut Watch,
     ) -> Result<Option<Status>, OcpError> {
-        let taken = match self.attempt_steps(ocp, state, row, watch)? {
-            ControlFlow::Continue(taken) => taken,
-            ControlFlow::Break(status) => {
-                return Ok(Some(status));
-            }
+        let taken = match self.attempt_step(ocp, state, row, watch)? {
+            ControlFlow::Continue(Some(taken)) => taken,
+            ControlFlow::Continue(None) => return self.stay(ocp, state, row),
+            ControlFlow::Break(status) => return Ok(Some(status)),
         };
+        state.attempt = Attempt::First;
         (row.step, row.corrected) = (taken.length, taken.corrected);
         let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
         state.damp(row, curvature);

@@ -211,17 +211,23 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         line: &Line,
         row: &mut Iteration,
     ) -> bool {
+        let left = self.options.max_qp_iterations.saturating_sub(row.qp_iterations);
+        if left == 0 {
+            return false;
+        }
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         ocp.correct(&self.trial, ends);
         self.trial.copy_from(&self.solution);
         // It is the trial that is solved for, and scaled back.
         core::mem::swap(&mut self.solution, &mut self.trial);
         self.scale(ocp, state, Way::Into);
+        self.qp_solver.limit(Some(left));
         let solved =
             self.qp_solver
                 .solve_until(ocp.qp(), QpStart::Warm, self.solution.view_mut(), &mut || state.is_over());
         self.scale(ocp, state, Way::Back);
         core::mem::swap(&mut self.solution, &mut self.trial);
+        self.qp_solver.limit(None);
         let Ok(statistics) = solved else { return false };
         let by = state.globalisation(&self.options);
         row.qp_iterations += statistics.iterations;

@@ -2,10 +2,12 @@
 
 use super::acceptance::Search;
 use super::options::{Globalisation, SqpOptions};
+use super::run::Attempt;
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
+use crate::qp::QpError;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
 
@@ -37,6 +39,12 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub elastic_steps: usize,
     /// The penalty that violations were found to need; zero at first.
     pub penalty: f64,
+    /// The iterations of QPs of an iteration after which those at work end.
+    pub most_qp_iterations: usize,
+    /// What this iteration tries.
+    pub attempt: Attempt,
+    /// Why the QP of the last iteration has no solution.
+    pub failure: Option<QpError>,
     /// Whether a short step may be refused, because more damping can be tried.
     pub may_reject_short_steps: bool,
     /// The largest violation of the guess.
@@ -93,6 +101,9 @@ impl<T> State<'_, T> {
             feasibility_step: false,
             elastic_steps: 0,
             penalty: 0.0,
+            most_qp_iterations: usize::MAX,
+            attempt: Attempt::First,
+            failure: None,
             exact: false,
             rewritten: false,
             violation_of_guess: f64::INFINITY,
@@ -112,6 +123,12 @@ impl<T> State<'_, T> {
     pub fn is_over(&mut self) -> bool {
         self.late = self.late || self.over.as_mut().is_some_and(|over| over());
         self.late
+    }
+
+    /// Whether Levenberg's and Marquardt's method damps steps: those of Gauss's and Newton's
+    /// cannot go all the way.
+    pub fn damps(&self, exact: bool) -> bool {
+        self.second_attempt || !exact
     }
 
     /// The unit of forces.

@@ -23,7 +23,7 @@ impl Lengths {
     pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
         let reading = reading(qp);
         let counts = count(qp, &reading);
-        let (numbers, extent) = (Iterate::<T>::memory_of(qp, &counts), Extent::of::<T>(qp.dims));
+        let (numbers, extent) = (numbers::<T>(qp, &counts), Extent::of::<T>(qp.dims));
         Self {
             counts,
             fixed: reading.fixed,
@@ -42,8 +42,13 @@ impl Lengths {
     /// Of the same problem with every bound soft, equations too.
     pub fn all_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
         let counts = all_soft(&self.counts);
-        Self { counts, numbers: Iterate::<T>::memory_of(qp, &counts), ..*self }
+        Self { counts, numbers: numbers::<T>(qp, &counts), ..*self }
     }
+}
+
+/// How many numbers Newton's equations take, with changes of multipliers of equations.
+fn numbers<T: Real>(qp: QpView<'_, T>, counts: &Counts) -> usize {
+    Iterate::<T>::memory_of(qp, counts) + counts.equations
 }
 
 /// Every bound soft, equations too.

@@ -7,7 +7,7 @@ use super::lengths::{Lengths, reading};
 use super::work::Work;
 use crate::ocp::assembly::units::Sizes;
 use crate::qp::interior::{First, Iterate, Sides, at};
-use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign};
+use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign, take_mut};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
 /// The iterate of Newton's method in its memory, whose contents stay as they were.
@@ -26,7 +26,9 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
     let Sizes { force, least } = lengths.sizes;
     sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
-    Ok(Iterate::new(qp, &lengths.extent, first, sides, &mut numbers))
+    let mut iterate = Iterate::new(qp, &lengths.extent, first, sides, &mut numbers);
+    iterate.sides.free_step = take_mut(&mut numbers, lengths.counts.equations);
+    Ok(iterate)
 }
 
 /// As [`kkt_view`], where the QP is new: sides are listed, with its bounds and penalties. What
@@ -160,7 +162,68 @@ impl<T: Real> Registers<T> for Step<'_, '_, T> {
         } else {
             iterate.sides.aim(mu);
         }
+        iterate.sides.free_step.fill(T::ZERO);
         *result = iterate.newton::<E>(factor);
+    }
+}
+
+/// Solves with the same factors, at most.
+const MAX_REFINEMENTS: usize = 3;
+/// Another one follows where it leaves this part of what equations lack.
+const REFINEMENT_GAIN: f64 = 0.5;
+
+/// What equations give way to their multipliers is taken back: the step is that of the system
+/// without dual regularisation, as far as rounding permits, where the same factors are enough for
+/// that. Each solve begins at the multipliers of the one before (the proximal method of
+/// multipliers).
+///
+/// # Errors
+/// Those of the recursion.
+pub(in crate::ocp::nlp::ipm) fn refine<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    units: &[T],
+) -> Result<(), QpError> {
+    let mut last = f64::INFINITY;
+    for _ in 0..MAX_REFINEMENTS {
+        let left = lack_of_equations(iterate, units);
+        if !(left > 0.0 && left <= REFINEMENT_GAIN * last) {
+            break;
+        }
+        last = left;
+        let mut result = Ok(());
+        T::compiled::<RefineCompiled>(Refine { iterate, result: &mut result });
+        result?;
+    }
+    Ok(())
+}
+
+/// The largest residual of an equation after the full step, in units; zero if none is more than
+/// rounding.
+fn lack_of_equations<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
+    let sides = &iterate.sides;
+    let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
+    let residuals = sides.equations.iter().zip(&*sides.equation_residual);
+    let lacks = residuals.map(|(&row, &residual)| {
+        let unit = at(units, row).to_f64();
+        let lacks = (residual + at(iterate.step, row)).abs().to_f64();
+        if lacks <= rounding * (unit + at(iterate.v, row).abs().to_f64()) { 0.0 } else { lacks / unit }
+    });
+    lacks.fold(0.0, f64::max)
+}
+
+struct Refine<'r, 'a, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    result: &'r mut Result<(), QpError>,
+}
+
+compiled!(/// See [`Refine`].
+RefineCompiled: Refine<'r, 'a, T>);
+
+impl<T: Real> Registers<T> for Refine<'_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, result } = self;
+        *result = iterate.newton::<E>(false);
     }
 }
 
@@ -281,6 +344,7 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
         let sides = &mut iterate.sides;
         sides.residual.fill(T::ZERO);
         sides.equation_residual.fill(T::ZERO);
+        sides.free_step.fill(T::ZERO);
         sides.target.fill(T::ZERO);
         sides.inverse.fill(T::ZERO);
         let general = is_general::<T>(iterate.qp, sides.rows);

@@ -18,6 +18,7 @@ pub(in crate::ocp::nlp::ipm) struct Work<'a, T> {
     pub step: &'a mut [T],
     pub slack_step: &'a mut [T],
     pub multiplier_step: &'a mut [T],
+    pub free_step: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub pi: &'a mut [T],
     /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
@@ -35,7 +36,7 @@ impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
         let (pairs, Extent { ld, end, .. }) = (counts.pairs(), Extent::of::<T>(dims));
-        ends + 3 * end.row + 4 * pairs + end.dynamics + ld + elastic::memory(dims)
+        ends + 3 * end.row + 4 * pairs + counts.equations + end.dynamics + ld + elastic::memory(dims)
     }
 
     /// In memory of that length, whose contents stay.
@@ -49,6 +50,7 @@ impl<'a, T: Real> Work<'a, T> {
             step: take_mut(rest, end.row),
             slack_step: take_mut(rest, pairs),
             multiplier_step: take_mut(rest, pairs),
+            free_step: take_mut(rest, capacity.counts.equations),
             pi: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
             units: take_mut(rest, end.row),

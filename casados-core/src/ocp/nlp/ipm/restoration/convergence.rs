@@ -5,7 +5,6 @@ use super::phase;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
-use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::solver::Next;
@@ -19,11 +18,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(in crate::ocp::nlp::ipm) fn next<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         row: &Iteration,
     ) -> Next {
-        let mut work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let mut work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         if let Some(status) = state.contradiction {
             return Next::End(status);
         }

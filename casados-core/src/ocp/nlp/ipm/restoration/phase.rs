@@ -38,10 +38,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(in crate::ocp::nlp::ipm) fn recover<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> Option<Status> {
-        let given = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let given = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let (penalties, units) = (&*given.penalties, &*given.units);
         if state.phase.force.is_some() {
             if state.progress.adapts() {

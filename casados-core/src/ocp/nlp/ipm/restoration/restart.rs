@@ -6,7 +6,6 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
-use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::Phase;
@@ -26,7 +25,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(in crate::ocp::nlp::ipm) fn try_restart<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
         end: Option<Status>,
     ) -> bool
@@ -35,10 +33,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     {
         let stalls = end.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || stalls) || state.second_attempt || P::Dynamics::LIFTED {
+        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::Dynamics::LIFTED {
             return false;
         }
-        let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let here = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
         let left = match end {
             Some(Status::NoProgress) => state.best_violation,
@@ -55,7 +53,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 SecondStart::Perturbed => break,
             };
             self.trial.copy_from(&self.guess);
-            let work = Work::new(ocp.ends(), capacity, self.work.as_mut());
+            let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
             if !ocp.simulate_guess(&mut self.trial, work.ends, start) {
                 continue;
             }

@@ -14,7 +14,6 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
-use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::newton::kkt_view;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::line_search::LineSearch;
@@ -35,7 +34,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(in crate::ocp::nlp::ipm) fn is_unbounded<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        capacity: &Lengths,
         state: &mut State<'_>,
     ) -> bool {
         let (v, _) = ocp.iterate.vectors();
@@ -47,7 +45,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let lengths = state.lengths;
         let tolerance = self.options.tolerance.max(T::EPSILON);
         let Self { trial, numbers, indices, work, .. } = self;
-        let mut work = Work::new(ocp.ends(), capacity, work.as_mut());
+        let mut work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
         let mut ray = LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut work };
         let unbounded = ray.has_no_end(ocp, tolerance);
         ocp.step_length = Some(T::ZERO);
