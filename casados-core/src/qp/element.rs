@@ -11,12 +11,6 @@ pub fn get<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or(T::ZERO)
 }
 
-/// `values[index]`, or zero where there is none: of vectors that may be left out.
-#[inline(always)]
-pub fn get_or_zero<T: Real>(values: &[T], index: usize) -> T {
-    values.get(index).copied().unwrap_or(T::ZERO)
-}
-
 /// `values[index] = value`
 #[inline(always)]
 #[cfg_attr(debug_assertions, track_caller)]

@@ -266,6 +266,12 @@ pub(crate) fn part<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
     slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()
 }
 
+/// A part of a slice, or an empty one where there is none: of arrays that may be left out.
+#[inline(always)]
+pub(crate) fn part_or_empty<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
+    slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()
+}
+
 /// As [`part`].
 #[inline(always)]
 #[cfg_attr(debug_assertions, track_caller)]
@@ -284,7 +290,11 @@ pub(crate) fn assign<T: Copy>(target: &mut [T], source: &[T]) {
 
 /// Copies a part of a slice to an earlier place.
 pub(crate) fn move_forward<T: Copy>(slice: &mut [T], from: usize, to: usize, length: usize) {
-    debug_assert!(to <= from && from + length <= slice.len(), "{length} elements from {from} of {}", slice.len());
+    debug_assert!(
+        to <= from && from + length <= slice.len(),
+        "{length} elements from {from} of {}",
+        slice.len()
+    );
     for i in 0..length {
         let value = slice.get(from + i).copied();
         if let (Some(target), Some(value)) = (slice.get_mut(to + i), value) {
