@@ -7,7 +7,8 @@
 //! ```
 //!
 //! `m` is the diagonal of the Hessian, or of `[A B]ᵀ M₊ [A B]` where that is zero, and `d` the
-//! distance of the bounds from zero. Where no size is far from one all units are one.
+//! distance of the bounds from zero. A state without either is as large as what leads to it. Where
+//! no size is far from one all units are one.
 //!
 //! No number of the QP is scaled: units are what the algorithm compares with. Slacks begin at `u`
 //! and multipliers at `f / u`, a row gives way `√ε u² / f` to a unit of force, and residuals are
@@ -117,8 +118,9 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
     let mut far = Sizes { least: objective, most: objective }.are_far_from_one();
     let root = objective.sqrt();
     for place in Places::<T>::new(qp.dims) {
+        let (here, next) = rows.split_at_mut_checked(place.row + place.rows).unwrap_or_default();
         let (variables, general) =
-            part_mut(rows, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
+            part_mut(here, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
         for (row, limits) in variables.iter_mut().zip(limits(qp, &place, reading)) {
             let size = root / *row;
             let mut sizes = Sizes::new();
@@ -138,6 +140,15 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
             let size = terms.fold(T::ZERO, |most, (c, &unit)| (c.abs() * unit).max(most));
             far |= Sizes { least: size, most: size }.are_far_from_one();
             *row = unit(size);
+        }
+        // A state that costs nothing anywhere is as large as what leads to it.
+        let dynamics = part(qp.data, place.data, place.next * place.ld);
+        for (root_of_state, column) in next.iter_mut().zip(dynamics.chunks_exact(place.ld.max(1))) {
+            let terms = column.iter().zip(&*variables);
+            let reach = terms.fold(T::ZERO, |most, (a, &unit)| (a.abs() * unit).max(most));
+            if *root_of_state == T::ZERO && reach > T::ZERO {
+                *root_of_state = root / reach;
+            }
         }
     }
     far.then_some(objective)
