@@ -222,11 +222,10 @@ fn a_ceiling_holds_between_nodes() -> Test {
         Ok::<_, Box<dyn std::error::Error>>((outcome.objective, highest - 1.0 / 9.0))
     };
     let ((at_nodes, over), (at_points, above)) = (solved(&[])?, solved(&[0.25, 0.5, 0.75])?);
-    println!("{at_nodes} {over:e} {at_points} {above:e}");
-    // The solution satisfies less and less of what is asked of this one.
-    assert!(at_nodes <= at_points + 1e-8 && at_points <= 4.0 + 1e-8);
-    assert!(4.0 - at_points < 0.1 * (4.0 - at_nodes) && above < 0.1 * over);
-    assert!((at_points - 4.0).abs() < 1e-3, "{at_points}");
+    // The tolerance of sequential quadratic programming.
+    assert!((at_nodes - 4.0).abs() < 1e-6 && (at_points - 4.0).abs() < 1e-6, "{at_nodes} {at_points}");
+    // Between nodes there is a way through the ceiling, between points hardly one.
+    assert!(over > 1e-5 && above < 0.1 * over, "{over:e} {above:e}");
     Ok(())
 }
 

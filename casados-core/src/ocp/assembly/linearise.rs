@@ -321,7 +321,8 @@ pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims])
         [first, .., _] => first.ng,
         _ => 0,
     };
-    dims.len().saturating_sub(1) * (P::Shape::NX + path) + P::Terminal::ROWS
+    let of_stage = P::Shape::NX.saturating_add(path);
+    dims.len().saturating_sub(1).saturating_mul(of_stage).saturating_add(P::Terminal::ROWS)
 }
 
 /// The distance of stages in vectors `v`.

@@ -11,6 +11,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::qp::StageDims;
 use crate::qp::element::set;
 use crate::scalar::Real;
+#[cfg(feature = "alloc")]
 use crate::shape::Shape;
 use crate::structure::means;
 use core::ops::{Range, RangeBounds};

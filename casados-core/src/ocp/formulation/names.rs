@@ -56,6 +56,7 @@ impl Names {
     }
 
     /// The state that a linear control is.
+    #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn linear_state(&self, control: usize) -> Option<usize> {
         let place = self.linear.iter().position(|&linear| linear as usize == control)?;
         Some(self.own_states() + place)
