@@ -77,8 +77,9 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
     }
     let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
     for place in Places::<T>::new(qp.dims) {
-        let vector =
-            |row| part(qp.data, place.data + place.row_data(row), if place.next > 0 { place.n } else { place.nx });
+        let vector = |row| {
+            part(qp.data, place.data + place.row_data(row), if place.next > 0 { place.n } else { place.nx })
+        };
         let mut good = true;
         for (i, (&lower, &upper)) in vector(Row::Lower).iter().zip(vector(Row::Upper)).enumerate() {
             let free = (lower <= -none) & (upper >= none);
