@@ -6,8 +6,8 @@
 //! ```
 
 use casados::ocp::{
-    ClosedLoop, HeapRealTime, Horizon, LeastSquaresCost, OcpError, Problem, Sample, closed_loop, closed_loops,
-    plant,
+    ClosedLoop, HeapRealTime, Horizon, LeastSquaresCost, OcpError, Problem, Sample, closed_loop,
+    closed_loops, plant,
 };
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
@@ -76,7 +76,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         run.trajectory.state("x[0]").is_ok_and(|angle| angle.iter().any(|angle| angle.abs() > 1.5))
     };
     println!("{count} loops of {SAMPLES} samples in {seconds:.1} s");
-    println!("{} have a rate of 1.6 rad/s or more, {} fall", runs.iter().filter(far).count(), runs.iter().filter(fallen).count());
+    println!(
+        "{} have a rate of 1.6 rad/s or more, {} fall",
+        runs.iter().filter(far).count(),
+        runs.iter().filter(fallen).count()
+    );
     let mut some = Panel::new("The first fifty").x("time, s").y("angle, rad");
     for run in runs.iter().take(50) {
         let angle = run.trajectory.state("x[0]")?;

@@ -6,8 +6,8 @@
 //! ```
 
 use casados::ocp::{
-    BatchOcp, Exact, ExactFormulation, GeneralCost, HeapOcp, HeapRealTime, HeapSqp, Horizon, OcpError, Problem,
-    closed_loop, plant,
+    BatchOcp, Exact, ExactFormulation, GeneralCost, HeapOcp, HeapRealTime, HeapSqp, Horizon, OcpError,
+    Problem, closed_loop, plant,
 };
 use casados::plot::{Figure, Panel};
 use casados::prelude::*;
@@ -118,7 +118,12 @@ fn angle(weights: [f64; 2]) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let (path, losses) = learn(40)?;
     let learned = *path.last().ok_or("there is a first one")?;
-    println!("weights {:.3?} after {} gradients; loss {:.1e}", learned, losses.len(), losses[losses.len() - 1]);
+    println!(
+        "weights {:.3?} after {} gradients; loss {:.1e}",
+        learned,
+        losses.len(),
+        losses[losses.len() - 1]
+    );
     let curve = losses.iter().enumerate().map(|(i, &loss)| (i as f64, loss.max(1e-16)));
     let loops = Panel::new("Closed loops")
         .x("time, s")

@@ -1,8 +1,8 @@
 //! Batches of problems allocate in the first call of a kind only.
 
 use crate::COUNT;
-use casados_core::ocp::{BatchOcp, Exact, GeneralCost, HeapIpm, HeapSqp, Horizon, Map, OcpError, Problem};
 use casados::function;
+use casados_core::ocp::{BatchOcp, Exact, GeneralCost, HeapIpm, HeapSqp, Horizon, Map, OcpError, Problem};
 
 #[function]
 fn push(x: [f64; 1], u: [f64; 1], p: [f64; 1]) -> f64 {

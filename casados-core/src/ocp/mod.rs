@@ -27,6 +27,8 @@
 //! constraint if there is one to blame. [`RealTime`] takes one step in each sample, in two phases.
 //! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
 //! gains; `SolutionFactors` has adjoint ones, and gradient and Hessian of the optimal value.
+//! `BatchOcp` solves and differentiates many problems at once; `closed_loop` runs a controller and
+//! a plant.
 //!
 //! ```
 //! use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};

@@ -18,10 +18,11 @@ where
     S: OcpSolver<P, T>,
     T: Real,
 {
-    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀`, `λᵀ dw/dp` and `λᵀ dw/dr` of each instance,
-    /// by initial state, parameters and references, as [`SolutionFactors::adjoint`] and
-    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) have them. `seed` writes the `λ` of an instance over states and
-    /// controls, all zero before, from its number and its solution: the gradient of a loss.
+    /// Adjoint derivatives of all solutions: `λᵀ dw/dx₀`, `λᵀ dw/dp` and `λᵀ dw/dr` of each
+    /// instance, by initial state, parameters and references, as [`SolutionFactors::adjoint`] and
+    /// [`Ocp::adjoint_by_references`](crate::ocp::Ocp::adjoint_by_references) have them. `seed`
+    /// writes the `λ` of an instance over states and controls, all zero before, from its number and
+    /// its solution: the gradient of a loss.
     ///
     /// A linearisation and a factorisation for each instance, however many parameters there are.
     /// An instance whose last run did not end at a solution has no derivatives, and says so; before

@@ -168,7 +168,10 @@ impl<T: Real> Recorder<T> {
         };
         // The first state is given: its bounds are those of the next one.
         let bounds = [qp.stage(1).map(|stage| stage.x_bounds()), qp.stage(0).map(|stage| stage.u_bounds())];
-        let all = [(Kind::State, known.x, known.units.x, &self.x), (Kind::Control, known.u, known.units.u, &self.u)];
+        let all = [
+            (Kind::State, known.x, known.units.x, &self.x),
+            (Kind::Control, known.u, known.units.u, &self.u),
+        ];
         for ((kind, names, units, rows), bounds) in all.into_iter().zip(bounds) {
             for (i, &name) in names.iter().enumerate() {
                 let unit = units.get(i).copied().unwrap_or_default();

@@ -34,8 +34,11 @@ impl Size {
         let (last, before) = dims.split_last()?;
         let StageDims { nx, nu, .. } = *before.first()?;
         let alike = before.iter().all(|stage| *stage == StageDims::new(nx, nu, 0));
-        (alike && *last == StageDims::new(nx, 0, 0) && nx > 0 && nu > 0)
-            .then_some(Self { nx, nu, intervals: before.len() })
+        (alike && *last == StageDims::new(nx, 0, 0) && nx > 0 && nu > 0).then_some(Self {
+            nx,
+            nu,
+            intervals: before.len(),
+        })
     }
     /// `nx + nu`
     pub const fn n(&self) -> usize {
@@ -169,8 +172,7 @@ impl<'m, C: Copy> Group<'m, C> {
             let of_controls = part(self.m, (nx + c) * n, n);
             for (i, to) in column.iter_mut().enumerate() {
                 // Above the diagonal there is nothing.
-                let from =
-                    if i >= nx + c { of_controls.get(i) } else { self.m.get(i * n + nx + c) };
+                let from = if i >= nx + c { of_controls.get(i) } else { self.m.get(i * n + nx + c) };
                 if let Some(&from) = from {
                     *to = from;
                 }

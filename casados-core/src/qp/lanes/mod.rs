@@ -77,22 +77,32 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
     }
     let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
     for place in Places::<T>::new(qp.dims) {
-        let vector =
-            |row| part(qp.data, place.data + place.row_data(row), if place.next > 0 { place.n } else { place.nx });
+        let variables = if place.next > 0 { place.n } else { place.nx };
+        let vector = |row| part(qp.data, place.data + place.row_data(row), variables);
+        let (lower, upper) = (vector(Row::Lower), vector(Row::Upper));
+        // No branch for each number.
         let mut good = true;
-        for (i, (&lower, &upper)) in vector(Row::Lower).iter().zip(vector(Row::Upper)).enumerate() {
-            let free = (lower <= -none) & (upper >= none);
-            let range = (lower <= upper) & (lower < infinity) & (upper > -infinity);
-            let given = (place.stage == 0) & (i < place.nx);
-            good &= range & (free | given | (i >= place.nx));
+        for (&lower, &upper) in lower.iter().zip(upper) {
+            good &= (lower <= upper) & (lower < infinity) & (upper > -infinity);
+        }
+        if place.stage > 0 {
+            for (&lower, &upper) in lower.iter().zip(upper).take(place.nx) {
+                good &= (lower <= -none) & (upper >= none);
+            }
         }
         for row in [Row::LowerLinear, Row::UpperLinear] {
-            for (i, &penalty) in vector(row).iter().enumerate() {
-                good &= (penalty >= T::ZERO) & ((penalty == infinity) | (i < place.nx));
+            let penalties = vector(row);
+            for &penalty in penalties {
+                good &= penalty >= T::ZERO;
+            }
+            for &penalty in penalties.get(place.nx..).unwrap_or_default() {
+                good &= penalty == infinity;
             }
         }
         for row in [Row::LowerQuadratic, Row::UpperQuadratic] {
-            good &= vector(row).iter().all(|&penalty| (penalty >= T::ZERO) & (penalty < infinity));
+            for &penalty in vector(row) {
+                good &= (penalty >= T::ZERO) & (penalty < infinity);
+            }
         }
         if !good {
             return None;

@@ -28,7 +28,8 @@ impl<C: Copy> Group<'_, C> {
         let bounds = self.lower.chunks_exact(nu.max(1)).zip(self.upper.chunks_exact(nu.max(1)));
         for (((active, slope), (lower, upper)), v) in stages.zip(bounds).zip(self.v.chunks_exact(n.max(1))) {
             let points = part(v, nx, nu).iter().zip(slope);
-            for ((active, (u, slope)), (lower, upper)) in active.iter_mut().zip(points).zip(lower.iter().zip(upper))
+            for ((active, (u, slope)), (lower, upper)) in
+                active.iter_mut().zip(points).zip(lower.iter().zip(upper))
             {
                 let (before, u, slope) = (E::load(active), E::load(u), E::load(slope));
                 let (lower, upper) = (E::load(lower), E::load(upper));

@@ -27,8 +27,8 @@ enum Of<'a, T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// `λᵀ dw/dr` of the last [`SolutionFactors::adjoint`], by the references `r` of all stages, one
-    /// after the other, and then of the terminal cost: those of
+    /// `λᵀ dw/dr` of the last [`SolutionFactors::adjoint`], by the references `r` of all stages,
+    /// one after the other, and then of the terminal cost: those of
     /// [`LeastSquaresCost`](crate::ocp::LeastSquaresCost) and
     /// [`ConvexCost`](crate::ocp::ConvexCost).
     ///
