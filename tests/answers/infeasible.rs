@@ -36,8 +36,14 @@ fn out_of_reach() -> Test {
         sqp.options.elastic = elastic;
         let outcome = sqp.solve(&mut ocp)?;
         println!("{}{outcome}", sqp.log());
-        let expected =
-            ConstraintName { part: Part::StateBounds, stage: 3, name: "x[0]", output: 0, point: 0, side: Side::Lower };
+        let expected = ConstraintName {
+            part: Part::StateBounds,
+            stage: 3,
+            name: "x[0]",
+            output: 0,
+            point: 0,
+            side: Side::Lower,
+        };
         match outcome.status {
             Status::Infeasible { constraint, violation } if elastic => {
                 assert_eq!(constraint, expected);

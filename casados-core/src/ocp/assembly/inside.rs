@@ -301,11 +301,14 @@ fn column<S: Shape>(variable: usize, free: Free<'_>) -> Option<usize> {
     }
 }
 
+/// Costs at a point, and the factor that they have there.
+type PointCosts<'a, 'c, C, T> = Option<(&'a mut Costs<'c, C, T>, T)>;
+
 impl<T: Real> Rows<'_, '_, '_, T> {
     /// The path constraints at a point, from a row on, and costs there.
     fn write_point<P: Formulation<T>>(
         &mut self,
-        (path, costs): (&mut P::Path, Option<(&mut Costs<'_, P::StageCost, T>, T)>),
+        (path, costs): (&mut P::Path, PointCosts<'_, '_, P::StageCost, T>),
         point: &<P::Shape as Shape>::ArrayV<T>,
         (here, free): (&Place<'_, T>, Free<'_>),
         begin: usize,

@@ -101,6 +101,9 @@ pub struct Memory<T> {
     statuses: Vec<Result<(), OcpError>>,
 }
 
+/// The status and the three gradients of an instance.
+type Place<'a, T> = (&'a mut Result<(), OcpError>, [&'a mut [T]; 3]);
+
 impl<T: Real> Memory<T> {
     /// Of no instance.
     pub fn new<P: Formulation<T>>(intervals: usize) -> Self {
@@ -112,10 +115,7 @@ impl<T: Real> Memory<T> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn places(
-        &mut self,
-        count: usize,
-    ) -> Result<impl Iterator<Item = (&mut Result<(), OcpError>, [&mut [T]; 3])> + Send, OcpError> {
+    pub fn places(&mut self, count: usize) -> Result<impl Iterator<Item = Place<'_, T>> + Send, OcpError> {
         let [nx, np, nr] = self.dims;
         super::refill(&mut self.statuses, count, || Ok(()))?;
         reserve(&mut self.x0, count * nx)?;

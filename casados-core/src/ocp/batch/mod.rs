@@ -172,7 +172,6 @@ where
     }
 
     /// The outcomes of the last [`BatchOcp::solve`]; empty before the first one.
-    #[must_use]
     pub fn outcomes(&self) -> &[Result<Outcome, OcpError>] {
         &self.outcomes
     }

@@ -111,7 +111,6 @@ where
     }
 
     /// What became of each plant in the last call.
-    #[must_use]
     pub fn statuses(&self) -> &[Result<(), OcpError>] {
         &self.statuses
     }

@@ -124,6 +124,8 @@ impl<P: Formulation<T>, S: OcpSolver<P, T>, T: Real> Controller<P, T> for (HeapO
 /// assert!(run.trajectory.state("x[0]")?[60].abs() < 0.02);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+// A closure has no name, and an alias cannot say what it implements.
+#[allow(clippy::type_complexity)]
 pub fn plant<I: Integrator>(
     integrator: &mut I,
     p: &VectorP<I::Model, I::Number>,

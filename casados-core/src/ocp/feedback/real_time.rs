@@ -315,7 +315,11 @@ where
     }
 
     /// Solves the QP with this state at its start: its solution is the plan.
-    pub(in crate::ocp) fn iterate(&mut self, x0: &[T], over: &mut dyn FnMut() -> bool) -> Result<Step, OcpError> {
+    pub(in crate::ocp) fn iterate(
+        &mut self,
+        x0: &[T],
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Step, OcpError> {
         let Self { curvature, qp_solver, contraction_test, inertia, monitor, ocp, solution, warm } = self;
         ocp.fix_initial_state(x0)?;
         let start = if *warm { QpStart::Warm } else { QpStart::Cold };
