@@ -303,6 +303,7 @@ fn column<S: Shape>(variable: usize, free: Free<'_>) -> Option<usize> {
 
 impl<T: Real> Rows<'_, '_, '_, T> {
     /// The path constraints at a point, from a row on, and costs there.
+    #[allow(clippy::type_complexity)]
     fn write_point<P: Formulation<T>>(
         &mut self,
         (path, costs): (&mut P::Path, Option<(&mut Costs<'_, P::StageCost, T>, T)>),

@@ -157,12 +157,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let [start, end] = [before, before + 1].map(|k| held(&series.values, k));
                 start + along * (end - start)
             };
-            x.extend(states.iter().map(|series| linear(*series)));
+            x.extend(states.iter().map(|series| linear(series)));
             if k < self.intervals() || !known.linear.is_empty() {
                 // One that is linear has a value at the last time too.
                 let is_linear = |series: &Series<T>| series.values.len() == trajectory.times.len();
-                let at = |series: &&Series<T>| match is_linear(*series) {
-                    true => linear(*series),
+                let at = |series: &&Series<T>| match is_linear(series) {
+                    true => linear(series),
                     false => held(&series.values, before),
                 };
                 u.extend(controls.iter().map(at));
