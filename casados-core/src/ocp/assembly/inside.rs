@@ -306,6 +306,7 @@ type PointCosts<'a, 'c, C, T> = Option<(&'a mut Costs<'c, C, T>, T)>;
 
 impl<T: Real> Rows<'_, '_, '_, T> {
     /// The path constraints at a point, from a row on, and costs there.
+    #[allow(clippy::type_complexity)]
     fn write_point<P: Formulation<T>>(
         &mut self,
         (path, costs): (&mut P::Path, PointCosts<'_, '_, P::StageCost, T>),
