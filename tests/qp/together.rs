@@ -198,8 +198,8 @@ fn neighbours_change_nothing() -> Test {
 #[test]
 fn linear_quadratic_regulators() -> Test {
     let record = Record::load("ocp/lqr.json")?;
-    let [a, b, offset, x0] = ["A", "B", "b", "x0"].map(|key| record.list(key));
-    let (a, b, offset, x0) = (a?, b?, offset?, x0?);
+    let [a, b, x0] = ["A", "B", "x0"].map(|key| record.vectors(key).map(|rows| rows.concat()));
+    let (a, b, offset, x0) = (a?, b?, record.list("b")?, x0?);
     let (n, nx, nu) = (20, offset.len(), b.len() / offset.len());
     let mut dims = vec![StageDims::new(nx, nu, 0); n + 1];
     dims[n].nu = 0;

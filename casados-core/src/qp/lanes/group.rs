@@ -130,8 +130,9 @@ impl<'m, C: Copy> Group<'m, C> {
         self.multiply::<E>();
     }
 
+    /// The recursion, and which pivots are weak.
     #[inline(always)]
-    fn backward<E: Lanes<Cell = C>>(&mut self) {
+    pub fn backward<E: Lanes<Cell = C>>(&mut self) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         let last = part(self.hessian, intervals * n * n, n * n);
         for (p, h) in self.p.chunks_exact_mut(nx.max(1)).zip(last.chunks_exact(n.max(1))) {

@@ -66,7 +66,7 @@ impl<T> Default for Together<T> {
 }
 
 /// The dimensions of a problem that can be solved side by side with others: the state at the start
-/// is given, others have no bounds, those of controls are hard.
+/// is given, others have no bounds, those of controls are hard and not equal.
 pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -> Option<Size> {
     let QpInstance { qp, solution } = instance;
     let qp = qp.view();
@@ -84,6 +84,9 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
         let mut good = true;
         for (&lower, &upper) in lower.iter().zip(upper) {
             good &= (lower <= upper) & (lower < infinity) & (upper > -infinity);
+        }
+        for (&lower, &upper) in lower.iter().zip(upper).skip(place.nx) {
+            good &= lower < upper;
         }
         if place.stage > 0 {
             for (&lower, &upper) in lower.iter().zip(upper).take(place.nx) {
@@ -192,8 +195,13 @@ impl<T: Real> Solve<'_, T> {
                 *to = index as usize;
             }
             let indices = indices.get(..members).unwrap_or_default();
-            self.place::<E>(group, indices, first);
-            let left = self.iterate::<E>(group, indices, count > E::LANES);
+            self.place::<E>(group, indices);
+            let mut convex = (1u32 << members) - 1;
+            if first && self.start == QpStart::Warm {
+                convex = self.convex::<E>(group, indices);
+            }
+            self.place_sets::<E>(group, indices, first);
+            let left = self.iterate::<E>(group, indices, convex, count > E::LANES);
             for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| left >> lane & 1 == 1) {
                 let sets = self.size.intervals * self.size.nu;
                 let set = self.together.sets.get_mut(index * sets..).and_then(|rest| rest.get_mut(..sets));
@@ -209,7 +217,7 @@ impl<T: Real> Solve<'_, T> {
 
     /// Writes problems into the lanes; lanes that are left hold the last one once more.
     #[inline(always)]
-    fn place<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
+    fn place<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize]) {
         let mut data: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
         let (mut last, mut dims): (&[T], _) = (&[], &[][..]);
         for (lane, data) in data.iter_mut().enumerate() {
@@ -219,6 +227,28 @@ impl<T: Real> Solve<'_, T> {
             *data = last;
         }
         group.write::<T, E>(dims, &data, self.options.no_bound);
+    }
+
+    /// The lanes whose problems are convex, a bit for each: their pivots without active bounds say
+    /// so. A cold start begins with these. Others are left to be solved alone.
+    #[inline(always)]
+    fn convex<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
+        group.backward::<E>();
+        let weak = group.weak.first().map_or([0.0; MOST_LANES], |weak| lanes::<T, E>(E::load(weak)));
+        let mut convex = 0;
+        for (lane, (&index, &weak)) in indices.iter().zip(&weak).enumerate() {
+            if weak == 0.0 {
+                convex |= 1 << lane;
+            } else {
+                self.together.alone.push(index as u32);
+            }
+        }
+        convex
+    }
+
+    /// Writes the sets that the problems begin with: those of a group before, or of a warm start.
+    #[inline(always)]
+    fn place_sets<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
         let Size { nx, nu, intervals } = self.size;
         for (lane, &index) in indices.iter().enumerate() {
             if !first {
@@ -227,7 +257,7 @@ impl<T: Real> Solve<'_, T> {
             } else if let (QpStart::Warm, Some(instance)) = (self.start, self.problems.0.get(index)) {
                 let least = T::from_f64(self.options.tolerance);
                 let [lower, upper] = instance.solution.sides();
-                let places = Places::<T>::new(dims).take(intervals);
+                let places = Places::<T>::new(instance.qp.dims()).take(intervals);
                 let rows = places.flat_map(|place| place.row + nx..place.row + nx + nu);
                 let is_at = |side: &[T], row: usize| side.get(row).is_some_and(|&force| force > least);
                 let set = rows.map(|row| i8::from(is_at(upper, row)) - i8::from(is_at(lower, row)));
@@ -236,17 +266,17 @@ impl<T: Real> Solve<'_, T> {
         }
     }
 
-    /// Iterates until all problems of the group are solved or given up, or, where others are
-    /// waiting, until half of them are. The lanes that are left, a bit for each.
+    /// Iterates on some lanes until all their problems are solved or given up, or, where others
+    /// are waiting, until half of the group is. The lanes that are left, a bit for each.
     #[inline(always)]
     fn iterate<E: Packed<T>>(
         &mut self,
         group: &mut Group<'_, E::Cell>,
         indices: &[usize],
+        mut left: u32,
         others: bool,
     ) -> u32 {
         let tolerance = E::from_f64(0.5 * SHARE * self.options.tolerance);
-        let mut left = (1u32 << indices.len()) - 1;
         loop {
             group.solve::<E>();
             let changes = lanes::<T, E>(group.change::<E>(tolerance));

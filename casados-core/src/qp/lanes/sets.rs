@@ -37,7 +37,7 @@ impl<C: Copy> Group<'_, C> {
                 let of_free = E::select(E::lt(u, lower - tolerance), -one, at_upper);
                 // A multiplier is the slope at a lower bound, its negative at an upper one.
                 let pulls = E::lt(tolerance, before * slope);
-                let of_active = E::select(E::and(pulls, E::lt(lower, upper)), zero, before);
+                let of_active = E::select(pulls, zero, before);
                 let after = E::select(Scalar::eq(before, zero), of_free, of_active);
                 changes = changes + E::select(Scalar::eq(before, after), zero, one);
                 sum = sum + (u.abs() + slope.abs());
@@ -87,7 +87,7 @@ impl<C: Copy> Group<'_, C> {
                 let active = part(self.active, k * nu, nu);
                 for (((u, slope), (lower, upper)), active) in controls.zip(bounds).zip(active) {
                     let slope = E::load(slope);
-                    let [below, above] = forces::<E>(active, lower, upper, slope);
+                    let [below, above] = forces::<E>(active, slope);
                     stationarity = (slope - below + above).abs().max(stationarity);
                     let (u, lower, upper) = (E::load(u), E::load(lower), E::load(upper));
                     inequalities = (lower - u).max(inequalities);
@@ -102,30 +102,22 @@ impl<C: Copy> Group<'_, C> {
         Judged { stationarity, dynamics, inequalities, objective }
     }
 
-    /// Bounds that are none become infinite; controls whose bounds are equal are at both.
+    /// Bounds that are none become infinite.
     #[inline(always)]
     pub fn clean_bounds<E: Lanes<Cell = C>>(&mut self, no_bound: E) {
         let infinity = E::from_f64(f64::INFINITY);
-        let bounds = self.lower.iter_mut().zip(&mut *self.upper).zip(&mut *self.active);
-        for ((to_lower, to_upper), to_active) in bounds {
+        for (to_lower, to_upper) in self.lower.iter_mut().zip(&mut *self.upper) {
             let (lower, upper) = (E::load(to_lower), E::load(to_upper));
-            let lower = E::select(E::le(lower, -no_bound), -infinity, lower);
-            let upper = E::select(E::le(no_bound, upper), infinity, upper);
-            let active = E::select(Scalar::eq(lower, upper), E::from_f64(1.0), E::load(to_active));
-            lower.store(to_lower);
-            upper.store(to_upper);
-            active.store(to_active);
+            E::select(E::le(lower, -no_bound), -infinity, lower).store(to_lower);
+            E::select(E::le(no_bound, upper), infinity, upper).store(to_upper);
         }
     }
 }
 
 /// The multipliers of both bounds of a control, which are not negative.
 #[inline(always)]
-pub fn forces<E: Lanes>(active: &Cell<E>, lower: &Cell<E>, upper: &Cell<E>, slope: E) -> [E; 2] {
+pub fn forces<E: Lanes>(active: &Cell<E>, slope: E) -> [E; 2] {
     let (zero, active) = (E::from_f64(0.0), E::load(active));
-    let equal = Scalar::eq(E::load(lower), E::load(upper));
     let (below, above) = (slope.max(zero), (-slope).max(zero));
-    let at_lower = E::or(E::lt(active, zero), equal);
-    let at_upper = E::or(E::lt(zero, active), equal);
-    [E::select(at_lower, below, zero), E::select(at_upper, above, zero)]
+    [E::select(E::lt(active, zero), below, zero), E::select(E::lt(zero, active), above, zero)]
 }

@@ -47,8 +47,7 @@ fn zero<T: Real, E: Packed<T>>() -> E::Cell {
 }
 
 impl<C: Copy> Group<'_, C> {
-    /// Writes problems of these dimensions, given by their data, into lanes; no bound is active but
-    /// equal ones.
+    /// Writes problems of these dimensions, given by their data, into lanes; no bound is active.
     #[inline(always)]
     pub fn write<T: Real, E: Packed<T, Cell = C>>(
         &mut self,
@@ -93,14 +92,13 @@ impl<C: Copy> Group<'_, C> {
         self.clean_bounds::<E>(E::from_f64(no_bound));
     }
 
-    /// Writes a set of active bounds into a lane; equal bounds stay so.
+    /// Writes a set of active bounds into a lane, of those that there are.
     #[inline(always)]
     pub fn write_set<T: Real, E: Packed<T, Cell = C>>(&mut self, lane: usize, of: impl Iterator<Item = i8>) {
         let bounds = self.lower.iter().zip(&*self.upper);
         for ((active, (lower, upper)), of) in self.active.iter_mut().zip(bounds).zip(of) {
-            if E::lane(lower, lane) < E::lane(upper, lane) {
-                E::set_lane(active, lane, of.into());
-            }
+            let bound = if of < 0 { lower } else { upper };
+            E::set_lane(active, lane, if E::lane(bound, lane).is_finite() { of.into() } else { 0.0 });
         }
     }
 
@@ -140,10 +138,8 @@ impl<C: Copy> Group<'_, C> {
             }
             copy(part_mut(solution.dynamics, dynamics, nx), part(self.multipliers, (k + 1) * nx, nx));
             for i in k * nu..(k + 1) * nu {
-                let all = [&*self.active, &*self.lower, &*self.upper, &*self.slope].map(|list| list.get(i));
-                let [Some(active), Some(lower), Some(upper), Some(slope)] = all else { return };
-                let slope = E::load(slope);
-                let both = forces::<E>(active, lower, upper, slope);
+                let (Some(active), Some(slope)) = (self.active.get(i), self.slope.get(i)) else { return };
+                let both = forces::<E>(active, E::load(slope));
                 for (to, force) in [&mut *solution.lower, &mut *solution.upper].into_iter().zip(both) {
                     let mut cell = zero::<T, E>();
                     force.store(&mut cell);
