@@ -322,7 +322,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.solution.copy_from(&ocp.iterate);
         let left = state.most_qp_iterations.saturating_sub(row.qp_iterations);
         if self.options.elastic && left == 0 {
-            return Err(QpError::MaxIterations { iterations: 0, residuals: row.residuals });
+            let iterations = row.qp_iterations;
+            return Err(QpError::MaxIterations { iterations, residuals: row.residuals });
         }
         // Without penalties there is no other way out: the solver is to say what it can.
         self.qp_solver.limit(self.options.elastic.then_some(left));
