@@ -141,8 +141,8 @@ fn satellite_by_interior_point() -> Test {
 }
 
 /// A cart whose jerk is the control, in millimetres: it comes back in a second, with a wall after
-/// 40 mm. Without bounds of the control and with zero as the guess nothing says that the control is
-/// 1e5, and forces 1e6.
+/// 40 mm. With zero as the guess bounds alone, which are not active, say that the acceleration is
+/// 1e4, the control 1e5, and forces 1e6.
 #[ode]
 fn jerked(x: [f64; 3], u: [f64; 1]) -> [f64; 3] {
     [x[1], x[2], u[0]]
@@ -161,7 +161,8 @@ fn cart_in_millimetres() -> Test {
         .running_cost(GeneralCost::<Square>::new())
         .on(Horizon::uniform(n, 1.0 / n as f64))?;
     ocp.free_initial_state();
-    ocp.bound("x[0]", .., f64::NEG_INFINITY, 40.0)?;
+    ocp.bound("x[0]", .., f64::NEG_INFINITY, 40.0)?.bound("u", .., -2e6, 2e6)?;
+    ocp.bound("x[2]", .., -1e5, 1e5)?;
     let ends = [[0.0, 1000.0, 0.0], [0.0, -1000.0, 0.0]];
     for (stage, state) in [0, n].into_iter().zip(ends) {
         fix(&mut ocp, stage, &[(0, state[0]), (1, state[1]), (2, state[2])])?;

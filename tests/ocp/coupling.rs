@@ -254,8 +254,8 @@ fn a_free_end_time_is_a_shared_control() -> Test {
         }
         let outcome = solve(by, &mut ocp)?;
         assert!((outcome.objective - FASTEST).abs() < 1e-6, "{by:?} {outcome}");
-        // IPOPT takes 21, with the duration as a state.
-        assert!(outcome.iterations <= 30, "{by:?} {outcome}");
+        // Twice as many as IPOPT takes, with the duration as a state, at most.
+        assert!(outcome.iterations <= 2 * 21, "{by:?} {outcome}");
         let of_first = ocp.stage(0)?.u[2];
         assert!((0..40).all(|k| ocp.stage(k).is_ok_and(|stage| stage.u[2] == of_first)));
     }

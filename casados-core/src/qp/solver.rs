@@ -135,6 +135,31 @@ pub trait QpSolver<T> {
     /// out of its own: a call ends with [`QpError::Infeasible`] where multipliers are nearly a
     /// proof, and nobody looks for what cannot be satisfied. With nothing calls are as options say
     /// again. A solver that cannot make use of it does nothing.
+    ///
+    /// # Example
+    /// ```
+    /// use casados::qp::*;
+    ///
+    /// // x₊ = x + u with |u| ≤ 1 does not get from 0 to 5.
+    /// let dims = [StageDims::new(1, 1, 0), StageDims::new(1, 0, 0)];
+    /// let mut qp = HeapQp::<f64>::new(&dims)?;
+    /// for (k, mut stage) in qp.stages_mut().enumerate() {
+    ///     if k == 1 {
+    ///         stage.x_bounds_mut().set(0, 5.0, 6.0);
+    ///         continue;
+    ///     }
+    ///     stage.a_mut().set(0, 0, 1.0);
+    ///     stage.b_mut().set(0, 0, 1.0);
+    ///     stage.r_mut().set(0, 0, 1.0);
+    ///     stage.u_bounds_mut().set(0, -1.0, 1.0);
+    /// }
+    /// qp.fix_initial_state(&[0.0])?;
+    /// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
+    /// solver.limit(Some(30));
+    /// let result = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
+    /// assert!(matches!(result, Err(QpError::Infeasible { .. })));
+    /// # Ok::<(), casados::qp::QpError>(())
+    /// ```
     fn limit(&mut self, iterations: Option<usize>) {
         let _ = iterations;
     }

@@ -71,7 +71,8 @@ pub struct Iteration {
     pub objective: f64,
     /// The conditions of optimality at the iterate.
     pub residuals: Residuals,
-    /// The part of the step that was taken; zero in the last iteration.
+    /// The part of the step that was taken; zero in the last iteration, and where the iterate stays
+    /// since no step was short enough or the QP was not solved.
     pub step: f64,
     /// Iterations of QPs; of an interior point, which has none, zero, and `-` in the table.
     pub qp_iterations: usize,

@@ -133,7 +133,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // After a step with penalties hard bounds, whose QP had no solution, are not tried again as
         // long as violations stay: a solution with penalties that violates nothing is one of
         // theirs.
-        if state.elastic_steps > 0 && self.options.elastic {
+        if core::mem::take(&mut state.stays_elastic) {
             return self.elastic_direction(ocp, state, row, None);
         }
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
@@ -192,6 +192,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             (state.elastic, row.elastic) = (false, false);
             return Ok(Direction::Step);
         }
+        state.stays_elastic = true;
         match worst.filter(|worst| worst.violation > self.options.tolerance) {
             Some(worst) if left >= STATIONARY_VIOLATION * before => {
                 Ok(self.steer(ocp, state, row, (worst, [bounds, gaps])))
@@ -322,7 +323,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.solution.copy_from(&ocp.iterate);
         let left = state.most_qp_iterations.saturating_sub(row.qp_iterations);
         if self.options.elastic && left == 0 {
-            return Err(QpError::MaxIterations { iterations: 0, residuals: row.residuals });
+            let iterations = row.qp_iterations;
+            return Err(QpError::MaxIterations { iterations, residuals: row.residuals });
         }
         // Without penalties there is no other way out: the solver is to say what it can.
         self.qp_solver.limit(self.options.elastic.then_some(left));

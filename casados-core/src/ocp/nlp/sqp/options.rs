@@ -20,7 +20,7 @@ pub enum Globalisation {
     /// nonlinearly constrained optimization calculations", 1978, and a bound from below). Where the
     /// step is no direction of descent all of them grow until it is. A step along which the merit
     /// function shrinks by less than half of what its slope promises is halved as long as that is
-    /// better: the least of a parabola is before its end; but for learned Hessians. Near a solution
+    /// better: the least of a parabola is before its end. Near a solution
     /// full steps are what it accepts: the linearisation there is that of the next iteration. With
     /// the Hessian of Gauss and Newton, and after a first attempt that failed, steps of a quarter
     /// or less give way to damped ones while weighted gaps are more than what the objective changes

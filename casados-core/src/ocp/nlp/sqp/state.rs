@@ -35,6 +35,8 @@ pub(in crate::ocp::nlp) struct State<'c, T> {
     pub exact: bool,
     /// Whether the QP that the last direction comes from was overwritten.
     pub rewritten: bool,
+    /// Whether a QP with penalties was solved, and violations are left.
+    pub stays_elastic: bool,
     /// Steps with penalties in a row.
     pub elastic_steps: usize,
     /// The penalty that violations were found to need; zero at first.
@@ -99,6 +101,7 @@ impl<T> State<'_, T> {
             failed: 0.0,
             may_reject_short_steps: false,
             feasibility_step: false,
+            stays_elastic: false,
             elastic_steps: 0,
             penalty: 0.0,
             most_qp_iterations: usize::MAX,

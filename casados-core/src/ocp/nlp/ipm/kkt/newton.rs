@@ -236,12 +236,12 @@ pub(in crate::ocp::nlp::ipm) fn dynamics_after<T: Real>(
 ) {
     assign(work.rows, iterate.v);
     assign(work.slacks, iterate.sides.multiplier);
-    assign(work.ends, iterate.sides.free);
+    assign(work.free_step, iterate.sides.free);
     iterate.proximal = delta;
     T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
-    assign(iterate.sides.free, work.ends);
+    assign(iterate.sides.free, work.free_step);
 }
 
 struct After<'r, 'a, 's, T> {
