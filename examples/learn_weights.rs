@@ -83,7 +83,7 @@ fn learn(iterations: usize) -> Result<(Vec<[f64; 2]>, Vec<f64>), OcpError> {
     let shown = controls(&mut batch, TRUTH)?;
     let mut weights = Vector2::from(FIRST);
     let (mut path, mut losses) = (Vec::new(), Vec::new());
-    let (mut rate, mut before): (f64, Option<(Vector2<f64>, Vector2<f64>)>) = (0.1, None);
+    let (mut rate, mut before) = (0.1_f64, None::<[Vector2<f64>; 2]>);
     for _ in 0..iterations {
         let (loss, gradient) = loss(&mut batch, &shown, weights.into())?;
         path.push(weights.into());
@@ -93,13 +93,13 @@ fn learn(iterations: usize) -> Result<(Vec<[f64; 2]>, Vec<f64>), OcpError> {
             break;
         }
         // Step lengths of Barzilai and Borwein, IMA J. Numer. Anal. 8 (1988).
-        if let Some((weights_before, gradient_before)) = before {
+        if let Some([weights_before, gradient_before]) = before {
             let (step, change) = (weights - weights_before, gradient - gradient_before);
             if step.dot(&change) > 0.0 {
                 rate = step.norm_squared() / step.dot(&change);
             }
         }
-        before = Some((weights, gradient));
+        before = Some([weights, gradient]);
         let step = rate * gradient;
         // No step is longer than the logarithm of a weight may change at once.
         weights -= step * (1.0 / step.norm()).min(1.0);

@@ -43,7 +43,6 @@ fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
     assert_eq!(count(QpStart::Cold)?, 0);
     assert_eq!(count(QpStart::Warm)?, 0);
     // Side by side in registers: nothing but controls has bounds.
-    let mut dims = dims;
     dims.iter_mut().for_each(|dims| dims.ng = 0);
     let mut plain = HeapQp::<f64>::new(&dims)?;
     for mut stage in plain.stages_mut() {

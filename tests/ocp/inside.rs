@@ -134,14 +134,13 @@ fn quadratic_programs_are_those_of_dual_numbers() -> Test {
         };
         let mut expected = Vec::new();
         let mut hessian = [[0.0; 4]; 4];
-        for j in 0..4 {
-            for i in j..4 {
-                let (cost, end, rows) = by(i, j);
-                let of_rows: f64 = rows.iter().zip(&mu[k]).map(|(row, mu)| mu * row.eps1eps2).sum();
-                let value = cost.eps1eps2 + pi[k][0] * end[0].eps1eps2 + pi[k][1] * end[1].eps1eps2 + of_rows;
-                (hessian[i][j], hessian[j][i]) = (value, value);
-                expected.push(value);
-            }
+        let lower = (0..4).flat_map(|j| (j..4).map(move |i| (i, j)));
+        for (i, j) in lower {
+            let (cost, end, rows) = by(i, j);
+            let of_rows: f64 = rows.iter().zip(&mu[k]).map(|(row, mu)| mu * row.eps1eps2).sum();
+            let value = cost.eps1eps2 + pi[k][0] * end[0].eps1eps2 + pi[k][1] * end[1].eps1eps2 + of_rows;
+            (hessian[i][j], hessian[j][i]) = (value, value);
+            expected.push(value);
         }
         // The gradient at zero of the QP.
         expected.extend((0..4).map(|i| by(i, i).0.eps1 - (0..4).map(|j| hessian[i][j] * at[j]).sum::<f64>()));
