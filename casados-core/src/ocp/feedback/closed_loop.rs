@@ -160,7 +160,7 @@ pub fn plant<I: Integrator>(
 /// ```
 /// use casados::ocp::{HeapRealTime, Horizon, LeastSquaresCost, Problem, closed_loop, plant};
 /// use casados::prelude::*;
-/// use nalgebra::Vector0;
+/// use nalgebra::SVector;
 ///
 /// /// A pendulum that stands at zero: angle, rate.
 /// #[ode]
@@ -179,7 +179,7 @@ pub fn plant<I: Integrator>(
 ///         x[1] += 0.5;
 ///     }
 /// };
-/// let run = closed_loop(&mut controller, plant(&mut erk, &Vector0::new()), push, &[0.3, 0.0], 80)?;
+/// let run = closed_loop(&mut controller, plant(&mut erk, &SVector::zeros()), push, &[0.3, 0.0], 80)?;
 /// assert!(run.failures.is_empty() && run.trajectory.state("x[0]")?[80].abs() < 1e-3);
 /// assert!(run.trajectory.violations(1e-6).is_empty());
 /// println!("{} in all\n{}", run.cost(), run.trajectory.csv());
@@ -245,7 +245,8 @@ pub fn closed_loop<P: Formulation<T>, T: Real>(
 ///     closed_loop(controller, plant, |_, _| {}, &[1.0], 40)
 /// })?;
 /// let worst = runs.iter().flatten().map(|run| run.cost()).fold(0.0, f64::max);
-/// assert!(runs.len() == 100 && runs.iter().all(Result::is_ok) && worst < 1.3);
+/// // With half of the push x₊ = 0.691 x, at a cost of ½ · 1.382 x² in each sample: 1.32 in all.
+/// assert!(runs.len() == 100 && runs.iter().all(Result::is_ok) && (worst - 1.32).abs() < 0.01);
 /// # Ok::<(), casados::ocp::OcpError>(())
 /// ```
 pub fn closed_loops<W: Send, R: Send>(
