@@ -154,6 +154,11 @@ where
         if self.layout().free > 0 {
             return Err(OcpError::FreeParameters.to_string());
         }
+        if self.layout().inner > 0 {
+            let what = "CasADi's functions of problems with constraints at points inside of intervals, \
+                or bounds of algebraic states: state them as path constraints at nodes";
+            return Err(OcpError::Unsupported { what }.to_string());
+        }
         HeapOcp::check(self).map_err(|error| error.to_string())
     }
 
