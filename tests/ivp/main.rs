@@ -13,5 +13,6 @@ mod jumps;
 mod kinks;
 mod rough;
 mod sensitivities;
+mod test_set;
 mod tolerances;
 mod vibrations;

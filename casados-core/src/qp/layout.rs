@@ -257,26 +257,16 @@ const fn behind<T>(mut place: StageOffsets, mut stage: usize, dims: &[StageDims]
     place.end()
 }
 
-/// A part of a slice. One that is outside is an error of this crate, since lengths are checked on
-/// entry: a debug build panics there, a release build takes an empty one.
+/// A part of a slice; an empty one where it ends too early, which the lengths checked on entry
+/// exclude.
 #[inline(always)]
-#[cfg_attr(debug_assertions, track_caller)]
 pub(crate) fn part<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
-    debug_assert!(begin + length <= slice.len(), "{length} elements from {begin} of {}", slice.len());
-    slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()
-}
-
-/// A part of a slice, or an empty one where there is none: of arrays that may be left out.
-#[inline(always)]
-pub(crate) fn part_or_empty<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
     slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()
 }
 
 /// As [`part`].
 #[inline(always)]
-#[cfg_attr(debug_assertions, track_caller)]
 pub(crate) fn part_mut<T>(slice: &mut [T], begin: usize, length: usize) -> &mut [T] {
-    debug_assert!(begin + length <= slice.len(), "{length} elements from {begin} of {}", slice.len());
     slice.get_mut(begin..).and_then(|rest| rest.get_mut(..length)).unwrap_or_default()
 }
 
@@ -290,11 +280,6 @@ pub(crate) fn assign<T: Copy>(target: &mut [T], source: &[T]) {
 
 /// Copies a part of a slice to an earlier place.
 pub(crate) fn move_forward<T: Copy>(slice: &mut [T], from: usize, to: usize, length: usize) {
-    debug_assert!(
-        to <= from && from + length <= slice.len(),
-        "{length} elements from {from} of {}",
-        slice.len()
-    );
     for i in 0..length {
         let value = slice.get(from + i).copied();
         if let (Some(target), Some(value)) = (slice.get_mut(to + i), value) {
@@ -305,9 +290,7 @@ pub(crate) fn move_forward<T: Copy>(slice: &mut [T], from: usize, to: usize, len
 
 /// The first numbers of a slice, which loses them.
 #[inline(always)]
-#[cfg_attr(debug_assertions, track_caller)]
 pub(crate) fn take_mut<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
-    debug_assert!(length <= rest.len(), "{length} of {} elements", rest.len());
     let (first, second) = core::mem::take(rest).split_at_mut_checked(length).unwrap_or_default();
     *rest = second;
     first

@@ -115,7 +115,7 @@ pub(crate) use coupling::{is_marked, marked};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{Places, assign, pad, part, part_mut, part_or_empty, take_mut};
+pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
 pub(crate) use memory::{reserve, room, zeros};
 #[cfg(feature = "alloc")]

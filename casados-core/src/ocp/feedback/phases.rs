@@ -107,6 +107,22 @@ impl<T> Feedback<'_, T> {
     }
 }
 
+impl<P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
+    RealTime<P, S, C, T, D, M>
+where
+    C: Curvature<P::Dynamics, T>,
+{
+    /// The preparation phase: linearises at the plan, everything that can be done before the state
+    /// is known.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, C, T, D, M>, OcpError> {
+        self.linearise()?;
+        Ok(Prepared { controller: self })
+    }
+}
+
 impl<'a, P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
     Prepared<'a, P, S, C, T, D, M>
 where

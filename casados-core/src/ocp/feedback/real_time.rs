@@ -13,7 +13,6 @@ use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Exact;
 use crate::ocp::assembly::curvature::{Curvature, GaussNewton};
 use crate::ocp::feedback::contraction::{self, ContractionTest, Convergence, Monitor};
-use crate::ocp::feedback::phases::Prepared;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::error::Part;
 #[cfg(feature = "alloc")]
@@ -292,16 +291,6 @@ impl<P: Formulation<T>, S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: As
 where
     C: Curvature<P::Dynamics, T>,
 {
-    /// The preparation phase: linearises at the plan, everything that can be done before the state
-    /// is known.
-    ///
-    /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, C, T, D, M>, OcpError> {
-        self.linearise()?;
-        Ok(Prepared { controller: self })
-    }
-
     pub(in crate::ocp) fn linearise(&mut self) -> Result<(), OcpError> {
         self.judge();
         let Self { curvature, monitor, ocp, .. } = self;

@@ -93,8 +93,7 @@ impl<'a, T: Real> Nodes<'a, T> {
             ld: [ld, ld_next],
             ..
         } = *self;
-        // Parameters, multipliers and weights are left out where nobody needs them.
-        let (part, optional) = (crate::qp::part::<T>, crate::qp::part_or_empty::<T>);
+        let part = crate::qp::part::<T>;
         times.windows(2).enumerate().map(move |(k, times)| {
             let [start, end] = [0, 1].map(|i| times.get(i).copied().unwrap_or(T::ZERO));
             let length = end - start;
@@ -105,11 +104,11 @@ impl<'a, T: Real> Nodes<'a, T> {
             Interval {
                 x: part(v, k * ld, nx),
                 u: part(v, k * ld + nx + free.count(), nu),
-                p: optional(p, k * np, np),
+                p: part(p, k * np, np),
                 w: part(v, k * ld + nx, free.count()),
                 free,
-                multipliers: optional(multipliers, k * ld_next, nx),
-                nu: optional(weights, k * nz, nz),
+                multipliers: part(multipliers, k * ld_next, nx),
+                nu: part(weights, k * nz, nz),
                 t,
                 h,
             }

@@ -11,7 +11,7 @@ use crate::ocp::formulation::functions::point::Cross;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{Node, inputs, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, part_or_empty, zeros};
+use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -95,8 +95,7 @@ impl<T: Real> Parameters<T> {
     {
         let [nx, _, np] = self.dims;
         for (k, at) in stages.enumerate() {
-            // The last stage has no end.
-            let columns = part_or_empty(&self.ends, k * nx * np, nx * np).chunks_exact(nx.max(1));
+            let columns = part(&self.ends, k * nx * np, nx * np).chunks_exact(nx.max(1));
             for (column, of_value) in columns.zip(&mut self.slopes_of_value) {
                 *of_value = *of_value + dot(column, at.dynamics);
             }

@@ -6,9 +6,7 @@ use super::factors::SolutionFactors;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
-use crate::qp::{
-    QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut, part_or_empty,
-};
+use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut};
 use crate::scalar::Real;
 
 /// `∂V/∂x₀`: the derivative of the Lagrangian by the first state, without the multipliers that it
@@ -95,7 +93,7 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let gain = if k < n { part(&factors.gains, k * nu * nx, nu * nx) } else { &[] };
         let p = part_mut(&mut factors.costs_to_go, k * nx * nx, nx * nx);
         for j in 0..nx {
-            let column = part_or_empty(gain, j * nu, nu);
+            let column = part(gain, j * nu, nu);
             for i in j..nx {
                 let value = get(m, j * size + i) + dot(part(m, i * size + nx, column.len()), column);
                 set(p, j * nx + i, value);
