@@ -5,7 +5,7 @@ use super::direction::Direction;
 use super::options::Globalisation;
 use super::restart::violation_of;
 use super::scaled::Way;
-use super::state::{State, Taken};
+use super::state::{Attempt, State, Taken};
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
@@ -30,17 +30,6 @@ const ROOM: usize = 64;
 /// After so many steps with penalties in a row it is the sum of violations that is made small, and
 /// its curvature counts.
 const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
-
-/// What a step tries, where no step along the direction before is short enough.
-#[derive(Clone, Copy, PartialEq)]
-pub(in crate::ocp::nlp) enum Attempt {
-    /// The QP to as many digits as the iterate deserves.
-    First,
-    /// To all of them: it may have been wrong by more than a step gains.
-    Exact,
-    /// With at least so much regularisation.
-    Damped(f64),
-}
 
 const ATTEMPTS: [Attempt; 5] = [
     Attempt::First,

@@ -2,7 +2,6 @@
 
 use super::acceptance::Search;
 use super::options::{Globalisation, SqpOptions};
-use super::run::Attempt;
 use crate::ocp::assembly::units::Sizes;
 use crate::ocp::nlp::inertia::InertiaCorrection;
 use crate::ocp::solution::log::Iteration;
@@ -10,6 +9,17 @@ use crate::ocp::solution::outcome::Status;
 use crate::qp::QpError;
 use crate::scalar::Scalar;
 use core::marker::PhantomData;
+
+/// What a step tries, where no step along the direction before is short enough.
+#[derive(Clone, Copy, PartialEq)]
+pub(in crate::ocp::nlp) enum Attempt {
+    /// The QP to as many digits as the iterate deserves.
+    First,
+    /// To all of them: it may have been wrong by more than a step gains.
+    Exact,
+    /// With at least so much regularisation.
+    Damped(f64),
+}
 
 /// What a run remembers from one iteration to the next.
 pub(in crate::ocp::nlp) struct State<'c, T> {
