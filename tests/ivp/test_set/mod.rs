@@ -6,6 +6,8 @@
 
 mod fekete;
 mod nand;
+// The equations of nodes are a loop, as the others are.
+#[allow(clippy::manual_memcpy)]
 mod water_tubes;
 
 use super::tolerances::tell;

@@ -156,12 +156,12 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Blocks of different lengths are intervals of different lengths
     /// ([`Horizon::nodes`](crate::ocp::Horizon::nodes)).
     ///
-    /// Pieces are of equal length, and points between them as those of [`Ocp::inside`], by which
+    /// Pieces are of equal length, and points between them as those of [`inside`](Self::inside), by which
     /// they are chosen too; running costs count each piece as long as it is, and a reference is
     /// that of the interval. The QP has as many stages as there are moves.
     ///
     /// # Errors
-    /// As [`Ocp::inside`]; [`OcpError::InvalidOption`] of no pieces at all.
+    /// As [`inside`](Self::inside); [`OcpError::InvalidOption`] of no pieces at all.
     ///
     /// # Example
     /// Forty pieces, ten moves.
