@@ -156,8 +156,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Blocks of different lengths are intervals of different lengths
     /// ([`Horizon::nodes`](crate::ocp::Horizon::nodes)).
     ///
-    /// Pieces are of equal length, and points between them as those of [`inside`](Self::inside), by which
-    /// they are chosen too; running costs count each piece as long as it is, and a reference is
+    /// Pieces are of equal length, and points between them as those of [`inside`](Self::inside), by
+    /// which they are chosen too; running costs count each piece as long as it is, and a reference is
     /// that of the interval. The QP has as many stages as there are moves.
     ///
     /// # Errors
