@@ -157,8 +157,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// ([`Horizon::nodes`](crate::ocp::Horizon::nodes)).
     ///
     /// Pieces are of equal length, and points between them as those of [`inside`](Self::inside), by
-    /// which they are chosen too; running costs count each piece as long as it is, and a reference is
-    /// that of the interval. The QP has as many stages as there are moves.
+    /// which they are chosen too; running costs count each piece as long as it is, and a reference
+    /// is that of the interval. The QP has as many stages as there are moves.
     ///
     /// # Errors
     /// As [`inside`](Self::inside); [`OcpError::InvalidOption`] of no pieces at all.

@@ -84,7 +84,8 @@ pub struct Series<T = f64> {
     /// the part of these: `Distance@0.5`.
     pub name: String,
     /// Its unit as the doc comments of the model say it
-    /// ([`Units`](crate::structure::Units)), or [`set_unit`](super::Trajectory::set_unit) did; empty if nobody did.
+    /// ([`Units`](crate::structure::Units)), or
+    /// [`set_unit`](super::Trajectory::set_unit) did; empty if nobody did.
     #[cfg_attr(feature = "serde", serde(default))]
     pub unit: String,
     /// Which time is that of the first value.
