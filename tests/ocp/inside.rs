@@ -311,7 +311,7 @@ fn mistakes_are_named() -> Test {
 /// Moves held over three pieces are those of a horizon three times as fine whose controls are one:
 /// costs, derivatives and the solution, with an end time that is free.
 #[test]
-fn moves_are_held() -> Test {
+fn move_blocking() -> Test {
     let irk = || Irk::<Sledges, Gauss<2>>::new(Options::default());
     let cost = || (GeneralCost::<Way>::new(), LeastSquaresCost::<Push>::diagonal(&[0.3]));
     let mut fine = Problem::new(irk()?)

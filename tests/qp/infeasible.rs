@@ -50,7 +50,7 @@ fn spread(mut iterations: Vec<usize>) -> String {
 /// multipliers are nearly a proof only.
 #[test]
 fn limited() -> Test {
-    const MOST: usize = 30;
+    const MAX_ITERATIONS: usize = 30;
     let (mut suspected, mut told, mut count) = ([0, 0], [0, 0], [0, 0]);
     for seed in 1..=400 {
         let mut random = Numbers::new(seed);
@@ -65,18 +65,18 @@ fn limited() -> Test {
             Err(_) => continue,
         };
         let mut solver = HeapInteriorPoint::new();
-        solver.limit(Some(MOST));
+        solver.limit(Some(MAX_ITERATIONS));
         let mut asked = 0;
         let mut over = || {
             asked += 1;
             false
         };
         let found = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over);
-        assert!(asked <= MOST + 1, "{seed}: {asked}");
+        assert!(asked <= MAX_ITERATIONS + 1, "{seed}: {asked}");
         count[feasible] += 1;
         match found {
             Ok(statistics) => {
-                assert!(feasible == 1 && statistics.iterations <= MOST, "{seed}");
+                assert!(feasible == 1 && statistics.iterations <= MAX_ITERATIONS, "{seed}");
                 let (r, _) = residuals(qp.view(), &solution);
                 assert!(r.largest() < 1e2 * TOLERANCE, "{seed}: {r}");
                 told[1] += 1;

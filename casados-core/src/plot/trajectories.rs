@@ -93,7 +93,7 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
             }
         })
         .collect();
-    if is_held(solution, series)
+    if is_piecewise_constant(solution, series)
         && let (Some(&last), Some(end)) = (points.last(), times.last())
     {
         // The last control is held until the end.
@@ -103,7 +103,7 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
 }
 
 /// Whether values are held over intervals: of controls that are not linear, and of rates.
-fn is_held<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> bool {
+fn is_piecewise_constant<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> bool {
     matches!(series.kind, Kind::Control | Kind::Rate) && series.values.len() < solution.times().len()
 }
 
@@ -118,7 +118,7 @@ fn drawn<T: Real>(
     let over = |name: String, value: &dyn Fn(&Point) -> f64| {
         let line = points.iter().map(|point| (point.time, value(point)));
         let drawn = match series.kind {
-            _ if is_held(solution, series) => Curve::steps(name, line),
+            _ if is_piecewise_constant(solution, series) => Curve::steps(name, line),
             Kind::Terminal => Curve::dots(name, line),
             _ => Curve::line(name, line),
         };
@@ -137,7 +137,7 @@ fn drawn<T: Real>(
         .collect();
     if points.iter().any(|point| point.is_active(span)) {
         let wide = over(String::new(), &active).width(6.0);
-        drawn.push(if is_held(solution, series) { wide } else { wide.marked() });
+        drawn.push(if is_piecewise_constant(solution, series) { wide } else { wide.marked() });
     }
     drawn.push(over(name, &|point| point.value));
     drawn

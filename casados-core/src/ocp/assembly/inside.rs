@@ -126,7 +126,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let Extended { mut terms, columns } = Extended::new::<P::Shape>(&mut extended, free);
                 let mut linearised =
                     path.linearise(&point, &mut [], columns, terms.ld, Spot::new(k, free, &[]));
-                if inner.is_held() {
+                if inner.has_costs_at_points() {
                     let own = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
                     let factor = own.factor * if *running { inner.length(j) } else { T::ONE };
                     let factor = factor * if *running { free.duration(stage.u) } else { T::ONE };
@@ -247,7 +247,7 @@ impl<T: Real> InnerPoints<T> {
             node.read::<P::Shape>(&mut point, &SolutionStage { x: here.x, ..rows.stage }, here.z, free);
             let interval = get(given.0, rows.k + 1) - get(given.0, rows.k);
             let factor = if costs.running { interval * self.length(j) } else { T::ONE };
-            let costs = self.is_held().then_some((&mut costs, factor));
+            let costs = self.has_costs_at_points().then_some((&mut costs, factor));
             let memory = [&mut extended[..], &mut product[..]];
             let written = rows.write_point::<P>((&mut *path, costs), &point, (&here, free), begin, memory);
             (self.pieces.extended, self.pieces.product) = (extended, product);

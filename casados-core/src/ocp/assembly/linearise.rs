@@ -41,7 +41,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
         let is_free_cost = self.free.view().end().is_some() && self.problem.parts().running;
-        let plain = !C::EXACT && !is_free_cost && !self.inner.is_held();
+        let plain = !C::EXACT && !is_free_cost && !self.inner.has_costs_at_points();
         let mut left = Left { plain, adding: false };
         let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
             left.transfer::<P, T>(step, free, stage, at);
@@ -195,7 +195,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, at_node * ld), ld);
             }
             #[cfg(feature = "alloc")]
-            if k < intervals && (layout.inner > 0 || inner.is_held()) {
+            if k < intervals && (layout.inner > 0 || inner.has_costs_at_points()) {
                 let mu = part(rest, ld, if C::EXACT { count } else { 0 });
                 let (values, columns) = (&mut *values, &mut *columns);
                 let rows = &mut Rows { values, columns, ld, terms: Some(&mut direct), mu, stage: at, k };

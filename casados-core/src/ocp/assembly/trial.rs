@@ -72,7 +72,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 path.value(&point, values, spot)?;
                 link_start::<P, T>(&at, k, (values, &mut [], 0));
                 #[cfg(feature = "alloc")]
-                if layout.inner > 0 || inner.is_held() {
+                if layout.inner > 0 || inner.has_costs_at_points() {
                     let costs = Costs {
                         cost: &mut *stage_cost,
                         reference: node.reference,

@@ -176,7 +176,7 @@ where
         &self.outcomes
     }
 
-    /// A worker for each thread: how many.
+    /// The number of workers: one for each thread.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]

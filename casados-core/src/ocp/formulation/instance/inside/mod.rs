@@ -106,7 +106,7 @@ impl<T: Real> InnerPoints<T> {
 
     /// Whether costs are at points too.
     #[inline(always)]
-    pub fn is_held(&self) -> bool {
+    pub fn has_costs_at_points(&self) -> bool {
         #[cfg(feature = "alloc")]
         return self.held;
         #[cfg(not(feature = "alloc"))]
@@ -116,7 +116,7 @@ impl<T: Real> InnerPoints<T> {
     /// Which part of an interval its node stands for in a running cost.
     #[inline(always)]
     pub fn first_part(&self) -> T {
-        if self.is_held() { self.part(1) } else { T::ONE }
+        if self.has_costs_at_points() { self.part(1) } else { T::ONE }
     }
 
     /// Bounded variables, each with its point.
