@@ -1,6 +1,9 @@
 //! Every way in which a run can end without a result.
 
 mod display;
+mod place;
+
+pub use place::{Argument, Place, Quantity};
 
 use crate::tableau::TableauError;
 
@@ -369,105 +372,4 @@ pub struct Unsettled {
     pub value: f64,
     /// Whether it is an algebraic state.
     pub algebraic: bool,
-}
-
-/// Where in a run: all counted from zero.
-///
-/// ```
-/// # use casados::error::{Place, Quantity};
-/// # use casados::prelude::*;
-/// # use nalgebra::vector;
-/// # /// It has no value below zero, where it arrives soon.
-/// # #[ode]
-/// # fn tank(x: f64) -> f64 { -x.sqrt() - 1.0 }
-/// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
-/// // Of two steps of 0.5 s, with four stages each, the first one goes below zero.
-/// let error = erk.solve(&vector![0.4], &vector![], 1.0).unwrap_err();
-/// let Error::NonFiniteModel { at, .. } = error else { panic!() };
-/// let Place { step, stage, iteration } = at;
-/// assert_eq!((step, iteration), (0, 0));
-/// assert!((1..4).contains(&stage));
-/// # Ok::<(), casados::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The step of the interval.
-    pub step: usize,
-    /// The stage of the step.
-    pub stage: usize,
-    /// The iteration of Newton's method; of an explicit method zero.
-    pub iteration: usize,
-}
-
-/// An argument of a call.
-///
-/// ```
-/// # use casados::prelude::*;
-/// # use nalgebra::vector;
-/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
-/// # #[ode]
-/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
-/// # use casados::error::Argument;
-/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
-/// let error = irk.solve(&vector![0.0, 0.0], &vector![f64::INFINITY], 0.5).unwrap_err();
-/// assert!(matches!(error, Error::NonFiniteInput { argument: Argument::U, index: 0, .. }));
-/// let error = irk.solve(&vector![0.0, 0.0], &vector![1.0], f64::NAN).unwrap_err();
-/// assert!(matches!(error, Error::NonFiniteInput { argument: Argument::H, .. }));
-/// # Ok::<(), casados::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Argument {
-    /// The state at the start, `x0`.
-    X0,
-    /// The control `u`.
-    U,
-    /// The length of the interval, `h`.
-    H,
-    /// The parameters `p`.
-    P,
-    /// The time at the start, `t0`, or of dense output, `t`.
-    T,
-    /// The adjoint seed `λ`.
-    Lambda,
-    /// The weights `ν` of the algebraic states at the start.
-    Nu,
-    /// The forward seed of `x0`.
-    SeedX,
-    /// The forward seed of `u`.
-    SeedU,
-    /// The forward seed of `p`.
-    SeedP,
-    /// The start value of `ẋ` for Newton's method.
-    StartXdot,
-    /// The start value of `z` for Newton's method.
-    StartZ,
-}
-
-/// What a model was asked for.
-///
-/// ```
-/// # use casados::error::{Place, Quantity};
-/// # use casados::prelude::*;
-/// # use nalgebra::vector;
-/// # /// It has no value below zero, where it arrives soon.
-/// # #[ode]
-/// # fn tank(x: f64) -> f64 { -x.sqrt() - 1.0 }
-/// # let mut erk = Erk::<Tank, Rk4>::new(Options { steps: 2, ..Default::default() })?;
-/// let error = erk.solve(&vector![-0.4], &vector![], 1.0).unwrap_err();
-/// let Error::NonFiniteModel { quantity, equation, .. } = error else { panic!() };
-/// assert_eq!((quantity, equation), (Quantity::Residual, 0));
-/// # Ok::<(), casados::Error>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Quantity {
-    /// `f`
-    Residual,
-    /// An entry of `∂f/∂(ẋ, x, z, u, p)`.
-    Jacobian,
-    /// An entry of `∇(μᵀ f)`; its place is a variable, not an equation.
-    Adjoint,
-    /// An entry of `∇²(μᵀ f)`; its place is a variable, not an equation.
-    Hessian,
 }

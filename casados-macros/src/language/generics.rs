@@ -4,6 +4,7 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluator, Flow, error};
 use super::items::Symbol;
+use super::label::Label;
 use super::types::Type;
 use super::value::{Definition, Generic, Integer, IntegerType, Struct, Value, Variant};
 use crate::graph::Node;
@@ -325,30 +326,6 @@ impl Evaluator {
             )),
             _ => Err(error(at, format!("`{}` must consist of `f64` values", label.name))),
         }
-    }
-}
-
-/// What a number of an argument is called, and its unit.
-#[derive(Clone, Debug)]
-pub struct Label {
-    /// Its name: `x.cart.place[1]`.
-    pub name: String,
-    /// Its unit, if the documentation of a field says it.
-    pub unit: String,
-}
-
-impl Label {
-    /// Of an argument.
-    pub fn new(name: &str) -> Self {
-        Self { name: name.to_owned(), unit: String::new() }
-    }
-    /// Of a part, which has the unit of the whole.
-    fn part(&self, part: &str) -> Self {
-        Self { name: format!("{}{part}", self.name), unit: self.unit.clone() }
-    }
-    /// With the unit of a field, if that has one.
-    fn with_unit(self, unit: &str) -> Self {
-        if unit.is_empty() { self } else { Self { unit: unit.to_owned(), ..self } }
     }
 }
 

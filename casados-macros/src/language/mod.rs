@@ -22,6 +22,7 @@ mod generics;
 mod hygiene;
 mod implementation;
 mod items;
+mod label;
 mod literal;
 mod methods;
 pub mod mistakes;

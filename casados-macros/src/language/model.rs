@@ -5,7 +5,7 @@ use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
 use super::extension::{Extension, Extra};
 use super::flatten;
-use super::generics::Label;
+use super::label::Label;
 use super::mistakes::Mistakes;
 use super::modules::Module;
 use super::place::Place;
