@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Links of Markdown pages lead to files and headings, and every decision record is listed.
+"""Links of Markdown pages lead to files and headings; every decision record is listed and has at most
+40 lines.
 
 Links to other sites are left out.
 """
@@ -10,6 +11,7 @@ import sys
 from pathlib import Path
 
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)", re.MULTILINE)
+RECORD_LINES = 40
 FENCE = re.compile(r"^ *```.*?^ *```", re.MULTILINE | re.DOTALL)
 
 
@@ -37,7 +39,11 @@ def main():
     listed = subprocess.run(["git", "ls-files", "*.md"], check=True, capture_output=True, text=True)
     bad = [f"{name}: {link}" for name in listed.stdout.split() for link in broken(Path(name))]
     index = Path("docs/decisions/README.md").read_text()
-    bad += [f"{record} is not listed" for record in Path("docs/decisions").glob("0*.md") if record.name not in index]
+    for record in Path("docs/decisions").glob("0*.md"):
+        if record.name not in index:
+            bad.append(f"{record} is not listed")
+        if len(record.read_text().splitlines()) > RECORD_LINES:
+            bad.append(f"{record} has more than {RECORD_LINES} lines")
     print("\n".join(bad), end="\n" if bad else "")
     return 1 if bad else 0
 
