@@ -14,7 +14,7 @@ import re
 import subprocess
 import sys
 
-# Not definitions: the lifetime `'static`, the pointer `*const`, `const` before `fn`, and `$trait` of a macro.
+# Not definitions: the lifetime `'static`, the pointer `*const`, `const fn`, a macro's `$trait`.
 DEFINITION = re.compile(
     r"(?<!['*$\w])(?:fn|struct|enum|trait|type|const|static(?:\s+mut)?|mod)\s+"
     r"(?!(?:fn|unsafe|extern|async|mut)\b)([A-Za-z_]\w+)"
