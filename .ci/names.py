@@ -14,7 +14,16 @@ import re
 import subprocess
 import sys
 
-DEFINITION = re.compile(r"\b(?:fn|struct|enum|trait|type|const|static|mod)\s+([A-Za-z_]\w+)")
+# Not definitions: the lifetime `'static`, the pointer `*const`, `const fn`, a macro's `$trait`.
+DEFINITION = re.compile(
+    r"(?<!['*$\w])(?:fn|struct|enum|trait|type|const|static(?:\s+mut)?|mod)\s+"
+    r"(?!(?:fn|unsafe|extern|async|mut)\b)([A-Za-z_]\w+)"
+)
+# Comments, strings and characters, in which nothing is defined.
+TEXT = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|r(\#+)".*?"\1|"(?:[^"\\]|\\.)*"|'(?:[^'\\\n]|\\[^\n]+?)'""",
+    re.DOTALL,
+)
 FOLDERS = ["casados-core/src", "casados-macros/src", "src", "tests", "benches/src", "examples"]
 # Metaphors and bare participles for which the field has a term (docs/glossary.md).
 WORDS = re.compile(
@@ -32,10 +41,10 @@ def definitions():
         if not path.endswith(".rs"):
             continue
         with open(path, encoding="utf-8") as file:
-            for number, line in enumerate(file, 1):
-                code = line.split("//")[0]
-                for name in DEFINITION.findall(code):
-                    yield name, f"{path}:{number}"
+            code = TEXT.sub(lambda text: re.sub(r"[^\n]", " ", text[0]), file.read())
+        for number, line in enumerate(code.split("\n"), 1):
+            for name in DEFINITION.findall(line):
+                yield name, f"{path}:{number}"
 
 
 def main():
