@@ -13,6 +13,7 @@ mod algebraic;
 mod arrival;
 mod batch;
 mod boundary;
+mod boundary_layers;
 mod bounds;
 mod chain;
 mod closed_form;

@@ -170,6 +170,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let first = state.first_violation.max(1.0);
+        let noise = T::from_f64(10.0 * T::EPSILON);
+        let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
+        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
+        let here = here.without_rounding(rounding);
         let expected = FilterModel {
             here,
             slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
@@ -177,10 +181,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             most: (GROWTH * here.violation.min(first)).max(first),
             mu: state.mu,
             delta: state.delta,
+            rounding,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
         let (primal, dual) = predictor::lengths(&iterate.sides, tau);
-        let noise = T::from_f64(10.0 * T::EPSILON);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);

@@ -36,6 +36,8 @@ pub(super) struct FilterModel {
     pub mu: f64,
     /// `δ_w`
     pub delta: f64,
+    /// Violations up to this one are rounding errors, and none.
+    pub rounding: f64,
 }
 
 impl FilterModel {
@@ -64,6 +66,7 @@ impl FilterModel {
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
         // What rounding leaves of a difference of barrier functions.
         let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
+        let there = &there.without_rounding(self.rounding);
         if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {
             return false;
         }

@@ -1,0 +1,121 @@
+//! Two-point boundary value problems: no control, no cost, and layers. Solutions grow by up to e¹⁰⁰
+//! along the horizon, so that the QP of all stages is solved by a sparse factorisation with pivots.
+//!
+//! Errors are those of the method: `Gauss<4>` has order eight at the nodes of the horizon, with steps
+//! of less than half the width of the layers. Half a step of width `w` leaves an error of
+//! `(w/2)⁸ / (8!)² · 1/70` in each, below 1e-10 here; what the solver's tolerance of 1e-8 leaves in
+//! the gaps is multiplied by the condition of the boundary value problem, about one.
+
+use crate::Test;
+use casados::ocp::{HeapSqp, Horizon, Problem};
+use casados::prelude::*;
+use casados::qp::Clarabel;
+
+/// `ε y″ = y`: a layer at each end. The parameter is ε.
+#[ode]
+fn two_layers(x: [f64; 2], p: f64) -> [f64; 2] {
+    [x[1], x[0] / p]
+}
+
+/// `ε y″ = −2 t y′` on [−1, 1]: a shock at the turning point (Ascher, Mattheij, Russell, *Numerical
+/// Solution of Boundary Value Problems*, SIAM 1995, example 9.2). Its solution is an error function.
+#[ode]
+fn shock(x: [f64; 2], p: f64, t: f64) -> [f64; 2] {
+    [x[1], -2.0 * t * x[1] / p]
+}
+
+/// `y″ = λ sinh(λ y)`: Troesch's problem, with a layer at the end.
+#[ode]
+fn troesch(x: [f64; 2], p: f64) -> [f64; 2] {
+    [x[1], p * (p * x[0]).sinh()]
+}
+
+/// Nodes that are closer where the solution changes: `[from, to]` in `n` intervals each.
+fn nodes(pieces: &[([f64; 2], usize)]) -> Vec<f64> {
+    let mut times = vec![pieces[0].0[0]];
+    for &([from, to], n) in pieces {
+        times.extend((1..=n).map(|k| from + (to - from) * k as f64 / n as f64));
+    }
+    times
+}
+
+/// The first state of `$model` at the nodes, which has `$ends` at the ends.
+macro_rules! solution {
+    ($model:ty, $times:expr, $parameter:expr, $ends:expr) => {{
+        let (times, ends): (&[f64], [f64; 2]) = (&$times, $ends);
+        let n = times.len() - 1;
+        let dynamics = Irk::<$model, Gauss<4>>::new(Options::default())?;
+        let mut ocp = Problem::new(dynamics).on(Horizon::nodes(times))?;
+        ocp.free_initial_state().set_parameters(.., &[$parameter])?;
+        ocp.bound("x[0]", ..1, ends[0], ends[0])?.bound("x[0]", n.., ends[1], ends[1])?;
+        let mut sqp = HeapSqp::with_solver(&ocp, Clarabel::new())?;
+        let outcome = sqp.solve(&mut ocp)?;
+        assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
+        ocp.solution()?.state("x[0]")?.to_vec()
+    }};
+}
+
+#[test]
+fn layers_at_both_ends() -> Test {
+    for epsilon in [1e-2, 1e-3, 1e-4_f64] {
+        let width = epsilon.sqrt();
+        let near = 20.0 * width;
+        let times = match near < 0.5 {
+            true => nodes(&[([0.0, near], 50), ([near, 1.0 - near], 20), ([1.0 - near, 1.0], 50)]),
+            false => nodes(&[([0.0, 1.0], 50)]),
+        };
+        let x = solution!(TwoLayers, times, epsilon, [1.0, 1.0]);
+        for (t, x) in times.iter().zip(&x) {
+            let exact = ((-t / width).exp() + ((t - 1.0) / width).exp()) / (1.0 + (-1.0 / width).exp());
+            assert!((x - exact).abs() < 1e-8, "ε {epsilon}, t {t}: {x}, but {exact}");
+        }
+    }
+    Ok(())
+}
+
+/// From −1 to 1 through `erf(t/√ε)/erf(1/√ε)`; references by Abramowitz and Stegun, table 7.1.
+#[test]
+fn a_shock_at_a_turning_point() -> Test {
+    let epsilon = 0.01_f64;
+    let times = nodes(&[([-1.0, -0.3], 20), ([-0.3, 0.3], 60), ([0.3, 1.0], 20)]);
+    let x = solution!(Shock, times, epsilon, [-1.0, 1.0]);
+    // t/√ε = 0.5, 1, 1.5, 2 at t = 0.05, 0.1, 0.15, 0.2; erf(10) is one to all digits.
+    for (t, erf) in [(0.05, 0.5204998778), (0.1, 0.8427007929), (0.15, 0.9661051465), (0.2, 0.9953222650)] {
+        for (t, exact) in [(t, erf), (-t, -erf)] {
+            let k = times.iter().position(|&node| (node - t).abs() < 1e-9).ok_or("no node")?;
+            assert!((x[k] - exact).abs() < 1e-8, "t {t}: {}, but {exact}", x[k]);
+        }
+    }
+    Ok(())
+}
+
+/// `λ = 10`: y(0.9) and the slopes at both ends are tabulated by S. M. Roberts and J. S. Shipman, "On
+/// the closed form solution of Troesch's problem", J. Comput. Phys. 21 (1976). Here the first
+/// integral `y′² − 2 cosh(λ y)` is constant, which holds for the exact solution alone.
+#[test]
+fn troeschs_problem_keeps_its_first_integral() -> Test {
+    let lambda = 10.0_f64;
+    let times = nodes(&[([0.0, 0.6], 20), ([0.6, 0.9], 30), ([0.9, 1.0], 60)]);
+    let n = times.len() - 1;
+    let dynamics = Irk::<Troesch, Gauss<4>>::new(Options::default())?;
+    let mut ocp = Problem::new(dynamics).on(Horizon::nodes(&times))?;
+    ocp.free_initial_state().set_parameters(.., &[lambda])?;
+    ocp.bound("x[0]", ..1, 0.0, 0.0)?.bound("x[0]", n.., 1.0, 1.0)?;
+    for (k, t) in times.iter().enumerate() {
+        ocp.guess_stage(k, &[*t, 1.0], &[])?;
+    }
+    let mut sqp = HeapSqp::with_solver(&ocp, Clarabel::new())?;
+    let outcome = sqp.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
+    let solution = ocp.solution()?;
+    let (y, slope) = (solution.state("x[0]")?, solution.state("x[1]")?);
+    let integral = |k: usize| slope[k] * slope[k] - 2.0 * (lambda * y[k]).cosh();
+    // At the end both terms are 2.2e4, of which the tolerance of 1e-8 is a part of 2e-4 after 2.2e5,
+    // the slope of the integral by y.
+    let first = integral(0);
+    for k in 0..=n {
+        let size = 1.0 + 2.0 * lambda * (lambda * y[k]).sinh() + slope[k].abs();
+        assert!((integral(k) - first).abs() < 1e-7 * size, "t {}: {} {first}", times[k], integral(k));
+    }
+    Ok(())
+}
