@@ -60,7 +60,7 @@ pub fn public() -> Vec<Entry> {
 /// Every problem.
 #[must_use]
 pub fn all() -> Vec<Entry> {
-    [public(), collection(), variations()].into_iter().flatten().collect()
+    [public(), families::unseen::all(), collection(), variations()].into_iter().flatten().collect()
 }
 
 /// A set by its name.
@@ -72,6 +72,7 @@ pub fn named(name: &str) -> Result<Vec<Entry>, Failure> {
         "public" => Ok(public().into_iter().filter(|entry| !entry.facts.is_held_out()).collect()),
         "held-out" => Ok(public().into_iter().filter(|entry| entry.facts.is_held_out()).collect()),
         "collection" => Ok(collection()),
+        "unseen" => Ok(families::unseen::all()),
         "variations" => Ok(variations()),
         _ => Err(format!("{name} is none of public, held-out, collection, variations").into()),
     }
