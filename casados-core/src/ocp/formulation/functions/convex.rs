@@ -285,7 +285,7 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
         for k in 0..F::Outputs::NY {
             let curvature = phi[(k, k)];
             if curvature < T::ZERO {
-                let (outputs, allowed) = ([k, k], "not negative: the outer function is to be convex");
+                let (outputs, allowed) = ([k, k], "at least 0: the outer function must be convex");
                 let (function, value) = (F::STRUCTURE.name, curvature.to_f64());
                 return Err(OcpError::InvalidWeight { function, outputs, value, allowed });
             }
