@@ -97,8 +97,8 @@ impl fmt::Display for Error {
             ),
             Error::NotPivoted { step } => write!(
                 f,
-                "step {step} needs the dense fallback, which `fallback::Refusing` has no memory for: take \
-                 `fallback::Pivoting`, or declare `nominal(..)` and `range(..)` of the variables"
+                "step {step} needs the dense fallback, which `memory::Refusing` has no memory for: take \
+                 `memory::Pivoting`, or declare `nominal(..)` and `range(..)` of the variables"
             ),
             Error::NotConverged { residual, equation, unknown, increment, at, started } => {
                 write!(
