@@ -331,8 +331,8 @@ fn functions_without_a_derivative() -> Test {
     let mut ocp = problem!();
     ocp.fix_initial_state(&[1.0; 2])?.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
     ocp.guess_stage(2, &[0.0; 2], &[0.0])?;
-    let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: another guess, or bounds that keep \
-                    away from there, may help";
+    let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: take another guess, or bounds \
+                    that keep the variables inside its domain";
     assert_eq!(text(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
     assert_eq!(text(HeapIpm::new(&ocp)?.solve(&mut ocp)), expected);
     let mut controller = HeapRealTime::new(ocp)?;

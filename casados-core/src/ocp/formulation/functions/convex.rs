@@ -144,7 +144,7 @@ fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
     for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
         let (weight, delta) = (weight.to_f64(), delta.to_f64());
         if !(weight >= 0.0 && weight.is_finite()) {
-            return invalid(i, weight, "finite and not negative");
+            return invalid(i, weight, "finite and at least 0");
         }
         if !(delta > 0.0 && delta.is_finite()) {
             return invalid(i, delta, "finite and positive: it is the `delta` of Huber's function");
