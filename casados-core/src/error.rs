@@ -228,6 +228,8 @@ pub enum Error {
     Grazing {
         /// Which event.
         event: usize,
+        /// Its function.
+        function: &'static str,
         /// Its time.
         t: f64,
     },

@@ -49,7 +49,7 @@ const STACK: usize = 1 << 29;
 ///
 /// On a `mod` it takes structs, constants and helper functions as well. The body may be any
 /// computation that can be unrolled while it compiles: loops, closures, iterators, generics, `if`
-/// and `match` on model quantities. In `f64` the residual has the bits of the function, but
+/// and `match` on model variables. In `f64` the residual has the bits of the function, but
 /// structural zeros are zeros: `0.0 * y`, `0.0 / y` and `y - y` are dropped, whatever `y` is when
 /// it runs, NaN too. Conditions of the compiler (`#[cfg]`) are refused inside of a model.
 ///

@@ -14,7 +14,7 @@ fn implementation(input: TokenStream) -> Result<TokenStream> {
     let Data::Struct(data) = data else {
         return Err(Error::new(
             ident.span(),
-            "only a struct has a fixed list of numbers: `Record` is for arguments of models",
+            "`Record` can be derived for structs only: they have a fixed list of numbers",
         ));
     };
     for parameter in generics.type_params_mut() {
@@ -79,7 +79,7 @@ mod tests {
                     B,
                 }
             ))
-            .contains("only a struct has a fixed list of numbers")
+            .contains("`Record` can be derived for structs only")
         );
     }
 }

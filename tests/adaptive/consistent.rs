@@ -60,9 +60,9 @@ fn what_has_no_solution_is_named() {
     assert!(residual >= 1.0 && (residual - (value * value + 1.0)).abs() <= 1e-12 * residual, "{error}");
     let text = error.to_string();
     assert!(
-        text.starts_with("there are no consistent derivatives and algebraic states at t = 0.25: ")
+        text.starts_with("no consistent `xdot` and `z` were found at t = 0.25: ")
             && text.contains("`z[1]`")
-            && text.contains("where equation 2 has the residual "),
+            && text.contains("; residual of equation 2: "),
         "{text}"
     );
     // A start from which there is one.

@@ -214,7 +214,7 @@ fn mistakes_are_errors() {
     assert_eq!(error, Error::Intervals { controls: 1, ends: 3 });
     assert_eq!(
         error.to_string(),
-        "1 controls for 3 intervals: there is one for each, and at least one interval"
+        "1 controls for 3 intervals: give one control for each interval, and at least one interval"
     );
     assert_eq!(horizon.solve(&x0, &[], &[]).unwrap_err(), Error::Intervals { controls: 0, ends: 0 });
     let error = horizon.solve(&x0, &[u, u], &[2.0, 1.0]).unwrap_err();

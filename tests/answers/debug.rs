@@ -94,7 +94,7 @@ fn of_integrators() -> Vec<Error> {
         Error::OutsideInterval { t, start, end },
         Error::Unordered { index: 1, t, before: 2.0, end: 3.0 },
         Error::TooManyEvents { t, events: 100 },
-        Error::Grazing { event: 0, t },
+        Error::Grazing { event: 0, function: "Guard", t },
         Error::DependsOnTime { function: "Guard" },
         Error::Intervals { controls: 2, ends: 3 },
         Error::NoInterpolation,
@@ -250,7 +250,7 @@ fn more(h: f64) -> Result<f64, TrajectoryError> {
 fn convert() -> Test {
     assert_eq!(more(0.1)?, 0.0);
     let error = everything(f64::NAN).expect_err("the length is no number");
-    assert_eq!(format!("{error:?}"), "the length `h` of the interval is NaN: it has to be finite");
+    assert_eq!(format!("{error:?}"), "the length `h` of the interval is NaN: it must be finite");
     let refused = Tableau::new([[0.5]], [1.0], [0.4]).map_err(Error::from).expect_err("sums of rows");
     assert_eq!(format!("{refused:?}"), "row 0 of A sums to 5e-1, but c[0] = 4e-1");
     // Of a batch the interval is known.

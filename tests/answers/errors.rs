@@ -39,7 +39,7 @@ fn names() -> Test {
     let Err(error) = ocp.bound("speed", .., 0.0, 1.0).map(|_| ()) else { return Err("no error".into()) };
     assert_eq!(
         error.to_string(),
-        "`Next` has no state or control `speed`: its states are `x[0]`, `x[1]`, its controls `u[0]`"
+        "`Next` has no variable `speed` of this kind. States: `x[0]`, `x[1]`; controls: `u[0]`"
     );
     // The beginning of a name is none.
     assert!(matches!(ocp.bound("x[", .., 0.0, 1.0), Err(OcpError::UnknownName { .. })));
@@ -89,8 +89,7 @@ fn ranges_without_stages() -> Test {
     let mut ocp = problem!();
     assert_eq!(
         text(ocp.bound("x", 2..2, 0.0, 1.0)),
-        "there is no stage in 2..2: the bounds of the states are at stages 0 to 3, and a range begins before it \
-         ends, as `2..4` and `2..=3` do"
+        "the range of stages 2..2 is empty: the bounds of the states are at stages 0 to 3"
     );
     let empty =
         |result: Result<(), OcpError>| matches!(result, Err(OcpError::EmptyRange { start: 2, end: 2, .. }));
@@ -110,7 +109,7 @@ fn softening_without_bounds() -> Test {
     let mut ocp = problem!();
     assert_eq!(
         text(ocp.soften("x[1]", 1.., 1e3, 0.0)),
-        "`x[1]` has no bound at stages 1 to 3 that could be soft: call `bound` before `soften`"
+        "`x[1]` has no finite bound at stages 1 to 3: call `bound` before `soften`"
     );
     ocp.bound("x[0]", 2..=2, 0.0, f64::INFINITY)?;
     assert!(matches!(ocp.soften("x", ..2, 1e3, 0.0), Err(OcpError::NoBound { start: 0, end: 2, .. })));
@@ -167,7 +166,7 @@ fn values() -> Test {
     );
     assert_eq!(
         text(ocp.bound("u", .., f64::NAN, 0.0)),
-        "stage 0: a bound of `u[0]` is NaN: it has to be a number, or -inf below and inf above where there is none"
+        "stage 0: a bound of `u[0]` is NaN: it must be a number, -inf for no lower bound, or inf for no upper bound"
     );
     assert!(matches!(
         ocp.bound("u", .., f64::INFINITY, f64::INFINITY),
@@ -176,7 +175,7 @@ fn values() -> Test {
     ocp.bound("u", .., -1.0, 1.0)?;
     assert_eq!(
         text(ocp.soften("u", .., -1.0, 0.0)),
-        "stage 0: a penalty of `u[0]` is -1: it has to be from 0 on, and finite if it is quadratic"
+        "stage 0: a penalty of `u[0]` is -1: it must be at least 0, and finite if quadratic"
     );
     for (linear, quadratic) in [(f64::NAN, 0.0), (1.0, -1.0), (1.0, f64::INFINITY), (1.0, f64::NAN)] {
         assert!(matches!(
@@ -190,20 +189,14 @@ fn values() -> Test {
     );
     assert_eq!(
         text(ocp.set_reference(1.., &[0.0, f64::NAN])),
-        "stage 1: the reference of output 1 of `Output` is NaN: it has to be finite"
+        "stage 1: the reference of output 1 of `Output` is NaN: it must be finite"
     );
-    assert_eq!(
-        text(ocp.set_parameters(1.., &[f64::INFINITY])),
-        "stage 1: `p[0]` is inf: it has to be finite"
-    );
+    assert_eq!(text(ocp.set_parameters(1.., &[f64::INFINITY])), "stage 1: `p[0]` is inf: it must be finite");
     assert_eq!(
         text(ocp.fix_initial_state(&[0.0, f64::NAN])),
-        "the initial value of `x[1]` is NaN: it has to be finite"
+        "the initial value of `x[1]` is NaN: it must be finite"
     );
-    assert_eq!(
-        text(ocp.guess_stage(2, &[0.0; 2], &[f64::NAN])),
-        "stage 2: `u[0]` is NaN: it has to be finite"
-    );
+    assert_eq!(text(ocp.guess_stage(2, &[0.0; 2], &[f64::NAN])), "stage 2: `u[0]` is NaN: it must be finite");
     Ok(())
 }
 
@@ -310,7 +303,10 @@ fn what_does_not_exist() {
         .on(Horizon::uniform(3, 0.1));
     assert_eq!(
         terminal.err().map(|error| error.to_string()).as_deref(),
-        Some("`Output` depends on `u[0]`, which does not exist at the end of the horizon")
+        Some(
+            "`Output` depends on `u[0]`, which does not exist at the end of the horizon: terminal costs and constraints \
+             may depend on states and parameters only; move this term to the running cost or the path constraints"
+        )
     );
 }
 
@@ -335,8 +331,8 @@ fn functions_without_a_derivative() -> Test {
     let mut ocp = problem!();
     ocp.fix_initial_state(&[1.0; 2])?.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
     ocp.guess_stage(2, &[0.0; 2], &[0.0])?;
-    let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: another guess, or bounds that keep \
-                    away from there, may help";
+    let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: take another guess, or bounds \
+                    that keep the variables inside its domain";
     assert_eq!(text(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
     assert_eq!(text(HeapIpm::new(&ocp)?.solve(&mut ocp)), expected);
     let mut controller = HeapRealTime::new(ocp)?;
@@ -352,9 +348,9 @@ fn iterates_that_are_not_finite() -> Test {
     let mut sqp = HeapSqp::new(&ocp)?;
     let place = ocp.iterate_mut().stage_mut(1).ok_or("no stage")?;
     (place.dynamics[1], place.g_upper[0]) = (f64::NAN, f64::NAN);
-    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `x[1]` is NaN: it has to be finite");
+    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `x[1]` is NaN: it must be finite");
     ocp.iterate_mut().stage_mut(1).ok_or("no stage")?.dynamics[1] = 0.0;
-    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `Root` is NaN: it has to be finite");
+    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `Root` is NaN: it must be finite");
     Ok(())
 }
 
@@ -394,7 +390,8 @@ fn general_costs_name_their_function() -> Test {
     assert_eq!(
         error.as_deref(),
         Some(
-            "stage 0: output 0 of `Root` is NaN: another guess, or bounds that keep away from there, may help"
+            "stage 0: output 0 of `Root` is NaN: take another guess, or bounds that keep the variables inside its \
+             domain"
         )
     );
     Ok(())

@@ -37,11 +37,11 @@ fn of_a_horizon_and_weights() {
         horizon(0, 0.1),
         "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times"
     );
-    assert_eq!(horizon(3, 0.0), "interval 0 goes from 0 to 0: times of nodes are finite and increase");
+    assert_eq!(horizon(3, 0.0), "interval 0 goes from 0 to 0: times of nodes must be finite and increasing");
     for (weight, shown) in [(-2.0, "-2"), (f64::NAN, "NaN")] {
         assert_eq!(
             text(problem([1.0, weight], Horizon::uniform(3, 0.1))),
-            format!("the weight of output 1 of `Deviation` is {shown}: it has to be finite and not negative")
+            format!("the weight of output 1 of `Deviation` is {shown}: it must be finite and at least 0")
         );
     }
 }
@@ -51,11 +51,11 @@ fn of_values_by_name() -> Test {
     let mut ocp = problem([1.0; 2], Horizon::uniform(3, 0.1))?;
     assert_eq!(
         text(ocp.bound("speed", .., 0.0, 1.0)),
-        "`Cart` has no state or control `speed`: its states are `x[0]`, `x[1]`, its controls `u`"
+        "`Cart` has no variable `speed` of this kind. States: `x[0]`, `x[1]`; controls: `u`"
     );
     assert_eq!(
         text(ocp.bound("u", .., f64::NAN, 1.0)),
-        "stage 0: a bound of `u` is NaN: it has to be a number, or -inf below and inf above where there is none"
+        "stage 0: a bound of `u` is NaN: it must be a number, -inf for no lower bound, or inf for no upper bound"
     );
     assert_eq!(
         text(ocp.bound("x[1]", 1.., 2.0, 1.0)),
@@ -67,12 +67,12 @@ fn of_values_by_name() -> Test {
     );
     assert_eq!(
         text(ocp.soften("u", .., 1.0, 1.0)),
-        "`u` has no bound at stages 0 to 2 that could be soft: call `bound` before `soften`"
+        "`u` has no finite bound at stages 0 to 2: call `bound` before `soften`"
     );
     assert_eq!(text(ocp.fix_initial_state(&[1.0])), "the initial state has 1 element instead of 2");
     assert_eq!(
         text(ocp.fix_initial_state(&[1.0, f64::NAN])),
-        "the initial value of `x[1]` is NaN: it has to be finite"
+        "the initial value of `x[1]` is NaN: it must be finite"
     );
     assert_eq!(
         text(ocp.set_terminal_reference(&[1.0])),
@@ -92,23 +92,23 @@ fn of_runs() -> Test {
     let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     assert_eq!(
         text(sqp.solve(&mut ocp)),
-        "nothing is said about the initial state: call `fix_initial_state` or `free_initial_state`"
+        "the initial state is undefined: call `fix_initial_state` or `free_initial_state`"
     );
     ocp.fix_initial_state(&[1.0, 0.0])?;
     let other = problem([1.0; 2], Horizon::uniform(4, 0.1))?;
     assert_eq!(
         text(HeapSqp::new(&other)?.gauss_newton().solve(&mut ocp)),
-        "these are the dimensions of another problem, 5 instead of 4 at stage 0: memory and solvers are made for one \
-         problem, as by `HeapSqp::new(&ocp)`"
+        "dimensions of another problem: 5 instead of 4 at stage 0. Make solvers and memory for each problem: \
+         `HeapSqp::new(&ocp)`"
     );
     // Degrees where radians were meant: too far for 0.3 s.
     ocp.bound("u", .., -1.0, 1.0)?.bound("x[0]", 3.., 90.0, 90.0)?.guess(&[1.0, 0.0], &[0.0])?;
     let outcome = sqp.solve(&mut ocp)?.to_string();
-    assert!(
-        outcome.starts_with("locally infeasible: the lower bound of `x[0]` at stage 3 is violated by 8.9")
-    );
+    assert!(outcome.starts_with(
+        "locally infeasible: the lower bound of `x[0]` at stage 3 cannot be satisfied (violation 8.9"
+    ));
     assert!(outcome.contains(" iterations: objective "));
-    assert!(outcome.ends_with("; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"));
+    assert!(outcome.ends_with(". Soften it (`Ocp::soften`), or take another guess"));
     Ok(())
 }
 
@@ -117,11 +117,11 @@ fn of_integrators() -> Test {
     let mut irk = Irk::<Outflow, Gauss<2>>::new(Options::default())?;
     assert_eq!(
         text(irk.solve(&Vector1::new(f64::NAN), &vector![], 0.1)),
-        "`x` of x0 is NaN: it has to be finite"
+        "`x` of x0 is NaN: it must be finite"
     );
     assert_eq!(
         text(irk.solve(&Vector1::new(1.0), &vector![], f64::INFINITY)),
-        "the length `h` of the interval is inf: it has to be finite"
+        "the length `h` of the interval is inf: it must be finite"
     );
     assert_eq!(
         text(irk.solve(&Vector1::new(-1.0), &vector![], 0.1)),

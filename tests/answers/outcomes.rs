@@ -116,7 +116,7 @@ fn assert_named<P: casados::ocp::Formulation<f64>>(ocp: &mut HeapOcp<P>, outcome
     );
     assert!((largest.amount - violation).abs() <= 1e-12 * violation, "{violation}, {largest}");
     let text = outcome.to_string();
-    assert!(text.contains(&format!("{constraint} is violated most, by {violation:.2e}")), "{text}");
+    assert!(text.contains(&format!("; largest violation: {violation:.2e} of {constraint}")), "{text}");
     Ok(())
 }
 

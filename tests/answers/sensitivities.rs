@@ -328,7 +328,7 @@ fn derivatives_that_are_not_finite() -> Test {
     assert!((result.dx(3)[0] / 1e300 - 1.0).abs() < 1e-12);
     assert_eq!(
         error.to_string(),
-        "stage 4: the derivative of the solution `x` by `x` is inf: other units of states, controls and costs may help"
+        "stage 4: the derivative of the solution `x` by `x` is inf: scale states, controls and costs to about one"
     );
     Ok(())
 }

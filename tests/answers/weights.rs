@@ -31,11 +31,11 @@ fn weights() -> Test {
     };
     assert_eq!(
         refused(Weighted::diagonal(&[1.0, -1.0])),
-        "the weight of output 1 of `Output` is -1: it has to be finite and not negative"
+        "the weight of output 1 of `Output` is -1: it must be finite and at least 0"
     );
     assert_eq!(
         refused(Weighted::diagonal(&[f64::NAN, 1.0])),
-        "the weight of output 0 of `Output` is NaN: it has to be finite and not negative"
+        "the weight of output 0 of `Output` is NaN: it must be finite and at least 0"
     );
     let matrix = |elements: [f64; 4]| Weighted::new(&SMatrix::<f64, 2, 2>::from_row_slice(&elements));
     for (elements, outputs) in [
@@ -86,7 +86,7 @@ fn weights_of_integrals() -> Test {
     let error = problem(indefinite).err().map(|error| error.to_string()).unwrap_or_default();
     assert_eq!(
         error,
-        "the weight of output 1 of `Output` is 1: it has to be larger: the weights are not positive semidefinite"
+        "the weight of output 1 of `Output` is 1: it must be larger: the weights are not positive semidefinite"
     );
     let mut ocp = problem(SMatrix::identity())?;
     ocp.fix_initial_state(&[1.0, 0.0])?.guess(&[1.0, 0.0], &[0.0])?;

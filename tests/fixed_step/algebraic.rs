@@ -337,7 +337,7 @@ fn mistakes() -> Test {
         return Err("no error".into());
     };
     assert!(matches!(error, Error::NonFiniteInput { argument: Argument::Nu, index: 1, .. }));
-    assert_eq!(error.to_string(), "`z[1]` of nu is NaN: it has to be finite");
+    assert_eq!(error.to_string(), "`z[1]` of nu is NaN: it must be finite");
 
     let mut batch = Batch::<Cart, Gauss<2>>::new(options(1))?;
     let (starts, p) = ([x0; 3], [vector![0.5]]);

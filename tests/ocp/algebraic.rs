@@ -271,7 +271,10 @@ fn where_there_are_none() -> Test {
         .path_constraints(Constraint::<Hidden>::new([0.0], [1.0]))
         .on(Horizon::uniform(3, 0.1));
     let Err(error) = problem.map(|_: HeapOcp<_, f64>| ()) else { return Err("no error".into()) };
-    assert_eq!(error.to_string(), "`Hidden` depends on `z[0]`, which does not exist at the nodes");
+    assert_eq!(
+        error.to_string(),
+        "`Hidden` depends on `z[0]`, which does not exist at the nodes: maps have no algebraic states"
+    );
     let problem = Problem::new(implicit_irk()?)
         .terminal_constraints(Constraint::<Last>::new([0.0], [1.0]))
         .on(Horizon::uniform(3, 0.1));

@@ -117,11 +117,11 @@ fn penalties_by_output_side_and_stage() -> Test {
     let text = |result: Result<(), OcpError>| result.err().map(|error| error.to_string()).unwrap_or_default();
     assert_eq!(
         text(solve(&|ocp| ocp.soften("Place", ..2, 1.0, 0.0).map(|_| ())).map(|_| ())),
-        "`Place` has no bound at stages 0 to 1 that could be soft: call `bound` before `soften`"
+        "`Place` has no finite bound at stages 0 to 1: call `bound` before `soften`"
     );
     assert_eq!(
         text(solve(&|ocp| ocp.soften("Place[1]", .., -1.0, 0.0).map(|_| ())).map(|_| ())),
-        "stage 0: a penalty of `Place` is -1: it has to be from 0 on, and finite if it is quadratic"
+        "stage 0: a penalty of `Place` is -1: it must be at least 0, and finite if quadratic"
     );
     Ok(())
 }

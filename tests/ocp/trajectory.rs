@@ -227,11 +227,13 @@ fn spoiled_and_read() -> Test {
     };
     for first in [1, u64::MAX] {
         let said = spoiled(&|value| value["series"][0]["first"] = first.into());
-        assert!(said.ends_with(&format!(
-            "{times} values from time {first} on, and the trajectory has {times} times"
-        )));
+        assert!(
+            said.ends_with(&format!(
+                "{times} values from index {first}, but the trajectory only {times} times"
+            ))
+        );
     }
-    let order = "the times of the trajectory have to be finite and must not decrease";
+    let order = "the times of the trajectory must be finite and must not decrease";
     assert_eq!(spoiled(&|value| value["times"][1] = (-1.0).into()), order);
     let cut = |list: &'static str| {
         move |value: &mut serde_json::Value| {
@@ -324,7 +326,7 @@ fn mistakes() -> Test {
     let mut ocp = solved()?;
     let solution = ocp.solution()?;
     assert_eq!(text(solution.state("speed")), "the solution of `Cart` has no `speed`: it has `x[0]`, `x[1]`");
-    assert_eq!(text(solution.state("x")), "`x` means several: say which of `x[0]`, `x[1]`");
+    assert_eq!(text(solution.state("x")), "`x` is ambiguous, it matches `x[0]`, `x[1]`");
     assert_eq!(
         text(solution.constraint("Corner")),
         "the solution of `Cart` has no `Corner`: it has `Limits[0]`, `Limits[1]`"
@@ -334,7 +336,7 @@ fn mistakes() -> Test {
         Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(2, 0.1))?;
     assert_eq!(
         text(short.restore(&solution).map(|_| ())),
-        "the trajectory has 11 values of `x[0]`, and the problem 3: `guess_from` interpolates where horizons differ"
+        "the trajectory has 11 values of `x[0]` instead of 3: for other horizons use `guess_from`, which interpolates"
     );
     let mut other = Problem::new(Map::<Step, f64>::new()).on(Horizon::uniform(N, 0.1))?;
     assert_eq!(

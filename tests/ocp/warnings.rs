@@ -30,7 +30,7 @@ fn warnings_are_named() -> Test {
     ocp.guess_stage(2, &[0.5, 3.0], &[0.5])?.bound("x[1]", 1.., -1.0, 1.0)?;
     ocp.guess_stage(3, &[0.5, 1.5], &[])?;
     let warnings = ocp.warnings()?;
-    let expected = "the guess 3e0 violates the upper bound of `x[1]` at stage 2, 1e0: solvers move it there";
+    let expected = "the guess 3e0 violates the upper bound of `x[1]` at stage 2, 1e0; solvers move it inside";
     assert_eq!(texts(&warnings), [expected]);
 
     // At the origin nothing says where the circle is.
@@ -92,7 +92,7 @@ fn ends_are_out_of_reach() -> Test {
     assert!((value - 0.25).abs() < 1e-12);
     assert_eq!((bound.name, bound.stage, limit), ("x[0]", 3, 1.0));
     assert_eq!((other.name, other.output), ("Twice", 0));
-    assert!(warnings[0].to_string().starts_with("the lower bound of `x[0]` at stage 3 is 1e0, the lin"));
+    assert!(warnings[0].to_string().starts_with("the lower bound of `x[0]` at stage 3, 1e0, is unreach"));
     ocp.guess_stage(3, &[0.25, 0.0], &[])?
         .bound("x[0]", 3.., 0.25, 0.25)?
         .set_terminal_bounds(&[0.0], &[0.5])?;

@@ -78,7 +78,7 @@ impl fmt::Display for Counts {
 
 /// What solvers of QPs say first, and the variant of the error.
 const VERDICTS: [(&str, &str); 5] = [
-    ("no point satisfies all constraints", "Infeasible"),
+    ("infeasible: ", "Infeasible"),
     ("not solved after", "MaxIterations"),
     ("no progress after", "Stalled"),
     ("the time limit was reached", "OutOfTime"),
@@ -89,7 +89,7 @@ const VERDICTS: [(&str, &str); 5] = [
 const CONTENTS: [(&str, &str, &str); 4] = [
     ("the option", "", "InvalidOption"),
     ("stage", " elements instead of ", "Length"),
-    ("stage", " is from ", "CrossedBounds"),
+    ("stage", " exceeds upper bound ", "CrossedBounds"),
     ("stage", " is ", "InvalidValue"),
 ];
 

@@ -94,7 +94,11 @@ impl fmt::Display for BatchError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Length { slice, length, intervals } => {
-                write!(f, "there are {intervals} intervals, and `{slice}` has {length} elements")
+                write!(f, "`{slice}` has {length} elements for {intervals} intervals: ")?;
+                f.write_str(match slice {
+                    Slice::Results => "give one element for each interval",
+                    Slice::Argument(_) => "give one element, or one for each interval",
+                })
             }
             Self::Intervals { failed, first, error } => {
                 write!(f, "{failed} intervals failed, the first of them interval {first}: {error}")

@@ -155,9 +155,10 @@ where
             return Err(OcpError::FreeParameters.to_string());
         }
         if self.layout().inner > 0 {
-            let what = "CasADi's functions of problems with constraints at points inside of intervals, \
-                or bounds of algebraic states: state them as path constraints at nodes";
-            return Err(OcpError::Unsupported { what }.to_string());
+            let what = "CasADi functions of problems with constraints at points inside intervals, or bounds of \
+                algebraic states";
+            let remedy = "Write these as path constraints at nodes";
+            return Err(OcpError::Unsupported { what, remedy }.to_string());
         }
         HeapOcp::check(self).map_err(|error| error.to_string())
     }

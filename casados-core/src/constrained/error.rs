@@ -101,18 +101,18 @@ impl fmt::Display for Inconsistent {
                 write!(f, "`{name}` of {argument} is {value}")
             }
             Self::NonFinite { equation, derivative, value } => {
-                write!(f, "{} is {value}: start elsewhere", Invariant(equation, derivative))
+                write!(f, "{} is {value}: take another guess", Invariant(equation, derivative))
             }
             Self::Dependent { equation, derivative, residual } => write!(
                 f,
-                "{} is violated by {residual:e}, and the states that are free cannot change it independently of the \
-                 constraints before it: hold fewer states, or start elsewhere",
+                "{} is violated by {residual:e}: the free states cannot change it independently of the other \
+                 constraints. Hold fewer states, or take another guess",
                 Invariant(equation, derivative)
             ),
             Self::NotConverged { equation, derivative, residual } => write!(
                 f,
-                "no states were found that satisfy the constraints: {} is violated by {residual:e}; start nearer to \
-                 them, or hold other states",
+                "no consistent state was found: {} is violated by {residual:e}. Take a guess closer to the constraints, \
+                 or hold other states",
                 Invariant(equation, derivative)
             ),
         }

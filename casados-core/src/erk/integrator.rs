@@ -134,7 +134,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             return Err(Error::InvalidOption {
                 option: "steps",
                 value: options.steps as f64,
-                reason: "the memory of the integrator has fewer",
+                reason: "`Inline<_, STEPS>` has memory for fewer steps: raise `STEPS`",
             });
         }
         Ok(Self {

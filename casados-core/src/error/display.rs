@@ -4,7 +4,7 @@ use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
 /// How other start values are given.
-const OTHER_START: &str = "give it a `nominal(z = ..)` in the attribute of the model, or call `set_start` with values near the solution";
+const OTHER_START: &str = "set a start value near the solution by `nominal(z = ..)` in the attribute of the model, or by `set_start`";
 
 impl fmt::Display for Argument {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -53,19 +53,19 @@ impl fmt::Display for Error {
             }
             Error::Tableau(error) => error.fmt(f),
             Error::NotExplicit { stage } => {
-                write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
+                write!(f, "the tableau is not explicit: stage {stage} depends on itself or on a later stage")
             }
             Error::NonFiniteInput { argument: Argument::H, value, .. } => {
-                write!(f, "the length `h` of the interval is {value}: it has to be finite")
+                write!(f, "the length `h` of the interval is {value}: it must be finite")
             }
             Error::NonFiniteInput { argument: Argument::T, value, .. } => {
-                write!(f, "the time `t` is {value}: it has to be finite")
+                write!(f, "the time `t` is {value}: it must be finite")
             }
             Error::NonFiniteInput { argument, index, name: "", value } => {
-                write!(f, "element {index} of {argument} is {value}: it has to be finite")
+                write!(f, "element {index} of {argument} is {value}: it must be finite")
             }
             Error::NonFiniteInput { argument, name, value, .. } => {
-                write!(f, "`{name}` of {argument} is {value}: it has to be finite")
+                write!(f, "`{name}` of {argument} is {value}: it must be finite")
             }
             Error::ParametersNotSet => {
                 f.write_str("the model has parameters: call `set_parameters` before the first step")
@@ -92,54 +92,56 @@ impl fmt::Display for Error {
             }
             Error::Singular { unknown, at } => write!(
                 f,
-                "the Newton matrix is singular in the column of `{unknown}` at {at}: with this step size the \
-                 equations do not determine it there; if they do elsewhere, start there: `nominal(..)` in the attribute \
-                 of the model, or `set_start`"
+                "the Newton matrix is singular at {at}: with this step size the equations do not determine `{unknown}`. \
+                 Take other start values (`nominal(..)` in the attribute of the model, or `set_start`), or shorter steps"
             ),
             Error::NotPivoted { step } => write!(
                 f,
-                "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
-                 whole matrix"
+                "step {step} needs the dense fallback, which `memory::Refusing` has no memory for: take \
+                 `memory::Pivoting`, or declare `nominal(..)` and `range(..)` of the variables"
             ),
             Error::NotConverged { residual, equation, unknown, increment, at, started } => {
                 write!(
                     f,
-                    "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
-                     relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
+                    "Newton's method did not converge at {at}: equation {equation} has a relative residual of \
+                     {residual:e}, and `{unknown}` a last relative increment of {increment:e}"
                 )?;
                 match started {
-                    Some(Started { unknown, value }) => write!(
-                        f,
-                        "; `{unknown}` started at {value}: if the equations have a solution, {OTHER_START}"
-                    ),
+                    Some(Started { unknown, value }) => {
+                        write!(f, ". `{unknown}` started at {value}: {OTHER_START}")
+                    }
                     None => Ok(()),
                 }
             }
             Error::SingularAlgebraic { unknown, at } => write!(
                 f,
-                "Newton's method did not converge: between the start values and where it ended, at {at}, ∂f/∂z becomes \
-                 singular along `{unknown}`: the algebraic equations may have lost their solution"
+                "Newton's method did not converge at {at}: ∂f/∂z becomes singular along `{unknown}` between the start \
+                 values and the last iterate. The algebraic equations may have no solution there (fold)"
             ),
             Error::InconsistentStart { t, equation, residual, unknown, value, singular } => {
-                write!(f, "there are no consistent derivatives and algebraic states at t = {t}: ")?;
+                write!(f, "no consistent `xdot` and `z` were found at t = {t}: ")?;
                 match singular {
-                    true => write!(f, "the equations do not determine `{unknown}`, which is at {value:e}")?,
-                    false => write!(f, "Newton's method does not settle, with `{unknown}` at {value:e}")?,
+                    true => write!(f, "the equations do not determine `{unknown}`")?,
+                    false => f.write_str("Newton's method did not converge")?,
                 }
                 write!(
                     f,
-                    " where equation {equation} has the residual {residual:e}; if there are some elsewhere, start there: \
-                     `nominal(..)` in the attribute of the model, or `set_start`"
+                    ". Last value of `{unknown}`: {value:e}; residual of equation {equation}: {residual:e}. Give start \
+                     values near a solution: `nominal(..)` in the attribute of the model, or `set_start`"
                 )
             }
             Error::Overflow { step, index } => {
                 write!(
                     f,
-                    "the numbers overflow in step {step}, at element {index} of the unknowns or of a result"
+                    "overflow in step {step}, at element {index} of the unknowns or of a result: take shorter steps, or \
+                     check the scaling of the model and its start values"
                 )
             }
             Error::NonFiniteFunction { function, output, value, at } => {
-                write!(f, "output {output} of the function {function} is {value} at {at}")
+                write!(
+                    f,
+                    "output {output} of the function {function} is {value} at {at}: keep its arguments inside its domain"
+                )
             }
             Error::StepSizeUnderflow { t, h, reason, unsettled } => {
                 write!(f, "the step size falls to {h:e} at t = {t}: ")?;
@@ -155,7 +157,9 @@ impl fmt::Display for Error {
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
                     Refusal::NotFinite => "the model is not finite",
-                    Refusal::Resolution => "the time does not resolve it",
+                    Refusal::Resolution => {
+                        "it is below the resolution of the time; scale the time, or start nearer to t = 0"
+                    }
                 };
                 f.write_str(reason_text)?;
                 let Some(Unsettled { equation, residual, unknown, value, algebraic }) = unsettled else {
@@ -163,27 +167,30 @@ impl fmt::Display for Error {
                 };
                 write!(
                     f,
-                    "; equation {equation} keeps a residual of {residual:e} relative to its terms, and `{unknown}`, which \
-                     is {value:e} at this time, does not settle"
+                    "; equation {equation} has a relative residual of {residual:e}, and `{unknown}`, {value:e} at this \
+                     time, does not converge"
                 )?;
                 f.write_str(match (reason, algebraic) {
                     (Refusal::SingularAlgebraic { .. }, _) => "",
                     (_, true) => {
-                        ": the algebraic equations lose their solution there (∂f/∂z becomes singular), or they jump: then \
-                         declare an event"
+                        ". Either the algebraic equations have no solution after this time (∂f/∂z becomes singular), or \
+                         they are discontinuous: declare an event"
                     }
                     (_, false) => {
-                        ": the solution may end there, or the model jump: then declare an event, or write the condition as \
-                         `if` or `max`"
+                        ". Either the solution ends here, or the model is discontinuous: declare an event, or write the \
+                         condition as `if` or `max`"
                     }
                 })
             }
             Error::TooManySteps { t, steps, stiff } => {
-                write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
-                if stiff {
-                    f.write_str("; the model is stiff, so that an implicit method takes fewer: Radau")?;
-                }
-                Ok(())
+                write!(f, "t = {t} was reached after {steps} steps, the maximum")?;
+                f.write_str(match stiff {
+                    true => {
+                        "; the model appears stiff: take an implicit method, `Adaptive<_, Radau>`; otherwise raise \
+                         `max_steps`"
+                    }
+                    false => ": raise `max_steps`",
+                })
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
@@ -195,43 +202,45 @@ impl fmt::Display for Error {
             ),
             Error::AccumulatingEvents { t, function, event, events } => write!(
                 f,
-                "events accumulate at t = {t}: event {event}, of the function {function}, happens sooner and sooner after \
-                 itself, {events} events so far; end the integration before, by a terminal event, or go on with a model \
-                 of what is at rest"
+                "events accumulate at t = {t} (Zeno): event {event}, of the function {function}, recurs at ever shorter \
+                 intervals, {events} events so far. End the integration before by a terminal event, or continue with a \
+                 model of the state at rest"
             ),
             Error::TooManyEvents { t, events } => {
-                write!(f, "t = {t} was reached after {events} events, and more are not allowed")
+                write!(f, "t = {t} was reached after {events} events, the maximum: raise it by `set_most_events`")
             }
-            Error::Grazing { event, t } => {
-                write!(
-                    f,
-                    "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
-                )
-            }
+            Error::Grazing { event, function, t } => write!(
+                f,
+                "event {event}, of the function {function}, has no slope at its zero at t = {t} (grazing): the event time \
+                 has no derivative there. Change the initial state or the parameters slightly"
+            ),
             Error::GuardOfAlgebraicStates { function } => write!(
                 f,
-                "the function {function} of an event looks at algebraic states: over it there are first derivatives, and no \
-                 second ones; write it in terms of x, u and p"
+                "the event function {function} depends on algebraic states: second derivatives across this event are not \
+                 available. Write it in terms of x, u and p"
             ),
             Error::DependsOnTime { function } => write!(
                 f,
-                "{function} depends on the time, by which derivatives over events are not known: add the time as a state"
+                "{function} depends on the time: second derivatives across events, and first ones across events of \
+                 algebraic states, need an autonomous model. Add the time as a state, `ẋ = 1`"
             ),
             Error::Intervals { controls, ends } => {
                 write!(
                     f,
-                    "{controls} controls for {ends} intervals: there is one for each, and at least one interval"
+                    "{controls} controls for {ends} intervals: give one control for each interval, and at least one \
+                     interval"
                 )
             }
             Error::NoInterpolation => f.write_str(
-                "the tableau is not that of a collocation method: there is no polynomial through its stages",
+                "the tableau is not a collocation method: it has no dense output, and no algebraic states at the ends of \
+                 the interval",
             ),
             Error::NoResult => f.write_str("there is no result yet: no call has succeeded"),
             Error::NotProjected { equation, derivative, residual } => write!(
                 f,
-                "the end of the interval cannot be projected: derivative {derivative} of the constraint of equation \
-                 {equation} is violated by {residual:e}, and no consistent state was found nearby, or the constraints \
-                 are redundant there; take shorter steps"
+                "projection failed: derivative {derivative} of the constraint in equation {equation} is violated by \
+                 {residual:e}. The state is too far from the constraints, or these are redundant there: take shorter \
+                 steps"
             ),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }

@@ -62,7 +62,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             return Err(Error::InvalidOption {
                 option: "steps",
                 value: options.steps as f64,
-                reason: "the memory of the integrator has fewer",
+                reason: "`Inline<_, STEPS>` has memory for fewer steps: raise `STEPS`",
             });
         }
         if !W::Fallback::HAS_MEMORY && !M::STRUCTURE.elimination.has_plan() {

@@ -268,29 +268,45 @@ impl fmt::Display for QpError {
                 write!(f, "stage {stage}: {field} has {found} elements instead of {expected}")
             }
             Self::CrossedBounds { field, stage, index, lower, upper } => {
-                write!(f, "stage {stage}: element {index} of {field} is from {lower} to {upper}")
+                write!(
+                    f,
+                    "stage {stage}: lower bound {lower} exceeds upper bound {upper} at element {index} of {field}"
+                )
             }
             Self::InvalidValue { field, stage, index, value } => {
-                write!(f, "stage {stage}: element {index} of {field} is {value}")
+                let allowed = match field {
+                    QpField::StateBounds | QpField::ControlBounds | QpField::GeneralBounds => {
+                        "a number, -inf for no lower bound, or inf for no upper bound"
+                    }
+                    QpField::Penalty => "at least 0, and finite if quadratic",
+                    _ => "finite",
+                };
+                write!(f, "stage {stage}: element {index} of {field} is {value}: it must be {allowed}")
             }
             Self::Infeasible { field, stage, index, side, violation } => {
                 let side = match side {
                     Side::Lower => "lower",
                     Side::Upper => "upper",
                 };
+                let variables = match field {
+                    QpField::StateBounds => "x",
+                    QpField::ControlBounds => "u",
+                    _ => "the general constraints",
+                };
                 write!(
                     f,
-                    "no point satisfies all constraints: at stage {stage}, element {index} of {field} misses its \
-                     {side} one by at least {violation:.2e}"
+                    "infeasible: the {side} bound of element {index} of {variables} at stage {stage} is violated by at \
+                     least {violation:.2e}"
                 )
             }
             Self::NotConvex { stage, index, pivot } => write!(
                 f,
-                "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:.2e}"
+                "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is \
+                 {pivot:.2e}; regularise it"
             ),
             Self::Coupled => f.write_str(
-                "states are periodic or controls shared: `InteriorPoint` with the feature `alloc` solves such QPs, this \
-                 solver does not",
+                "this solver does not support periodic states or shared controls: take `InteriorPoint` with the feature \
+                 `alloc`",
             ),
             Self::MaxIterations { iterations, residuals } => {
                 write!(f, "not solved after {iterations} iterations: {residuals}")
@@ -302,7 +318,7 @@ impl fmt::Display for QpError {
                 write!(f, "no progress after {iterations} iterations: {residuals}")
             }
             Self::InvalidOption { name, value, allowed } => {
-                write!(f, "the option {name} of the solver is {value:e}; it may be {allowed}")
+                write!(f, "the option `{name}` is {value:e}: it must be {allowed}")
             }
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }

@@ -155,7 +155,7 @@ impl fmt::Display for Convergence {
             }
             writeln!(f)?;
         }
-        writeln!(f, "rounding below {:.1e}", self.floor)?;
+        writeln!(f, "errors below {:.1e} are rounding", self.floor)?;
         if let Some(order) = self.order() {
             writeln!(f, "fitted order {order:.2}")?;
         }

@@ -223,13 +223,21 @@ impl fmt::Display for Report {
         writeln!(f, "{}", self.title)?;
         writeln!(
             f,
-            "{:<24} {:<18} {:>8} {:>7} {:>6} {:>9} {:>9} {:>9} {:>9}",
-            "quantity", "against", "entries", "silent", "wrong", "largest", "max |Δ|", "max tol", "|Δ|/tol"
+            "{:<24} {:<18} {:>8} {:>12} {:>6} {:>9} {:>9} {:>9} {:>9}",
+            "quantity",
+            "reference",
+            "entries",
+            "inconclusive",
+            "failed",
+            "largest",
+            "max |Δ|",
+            "max tol",
+            "|Δ|/tol"
         )?;
         for row in &self.rows {
             writeln!(
                 f,
-                "{:<24} {:<18} {:>8} {:>7} {:>6} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e}",
+                "{:<24} {:<18} {:>8} {:>12} {:>6} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e}",
                 row.quantity,
                 row.reference,
                 row.entries,
@@ -244,7 +252,7 @@ impl fmt::Display for Report {
         for wrong in &self.wrong {
             writeln!(
                 f,
-                "wrong: {} {} is {:.17e}, {} says {:.17e}: off by {:.1e}, allowed {:.1e} (point {})",
+                "failed: {} {} is {:.17e}, {} gives {:.17e}: difference {:.1e}, tolerance {:.1e} (point {})",
                 wrong.quantity,
                 wrong.entry,
                 wrong.value,

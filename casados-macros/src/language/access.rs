@@ -129,8 +129,7 @@ impl Evaluator {
             (_, Value::Real(_) | Value::Condition(_)) => {
                 return Err(error(
                     &index.index,
-                    "which element this is depends on model quantities: a graph model needs indices that are known \
-                     at compile time",
+                    "the index depends on model variables: a graph model needs indices known at compile time",
                 )
                 .into());
             }

@@ -120,7 +120,7 @@ impl Evaluator {
             Operator::Rem => {
                 return match (self.graph.value(a), self.graph.value(b)) {
                     (Some(a), Some(b)) => Ok(self.graph.constant(a % b)),
-                    _ => Err(unsupported(at, "the remainder of model quantities, which is not continuous,")),
+                    _ => Err(unsupported(at, "the remainder of model variables, which is not continuous,")),
                 };
             }
             _ => return Err(error(at, format!("`f64` has no operator `{}`", operator.symbol()))),

@@ -151,8 +151,7 @@ impl Arguments {
     /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges
     /// could say.
     pub fn without_settings(&self, what: &str) -> Result<()> {
-        let message =
-            format!("{what} has no elimination plan: nominal values and ranges would change nothing");
+        let message = format!("nominal values and ranges have no effect for {what}: remove them");
         self.settings.first().map_or(Ok(()), |setting| Err(Error::new(setting.span(), message)))
     }
 

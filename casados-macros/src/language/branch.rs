@@ -145,13 +145,13 @@ impl Evaluator {
         Err(Flow::Return(value))
     }
 
-    /// `return` must not depend on model quantities.
+    /// `return` must not depend on model variables.
     pub(super) fn check_return(&mut self, at: At) -> Result<()> {
         if self.branches() > self.function_branches {
             return Err(error(
                 at,
-                "whether the function returns here depends on model quantities: write the condition as \
-                 `if ... { a } else { b }` with the value as its result",
+                "this early `return` depends on model variables: write the condition as `if ... { a } else { b }` with \
+                 the value as its result",
             ));
         }
         Ok(())
@@ -167,7 +167,7 @@ impl Evaluator {
         Err(Flow::Break(inner.label.clone(), value))
     }
 
-    /// `break` and `continue` must not depend on model quantities.
+    /// `break` and `continue` must not depend on model variables.
     pub(super) fn check_target(&mut self, label: Option<String>, at: At) -> Result<()> {
         let target = self.targets.iter().rev().find(|(name, target, _)| match &label {
             Some(_) => *name == label,
@@ -177,7 +177,7 @@ impl Evaluator {
             None => Err(error(at, "there is no loop around this")),
             Some((.., branches)) if self.branches() > *branches => Err(error(
                 at,
-                "how often the loop runs depends on model quantities: let it run a fixed number of times and \
+                "how often the loop runs depends on model variables: let it run a fixed number of times and \
                  choose the results by `if ... { a } else { b }`",
             )),
             Some(_) => Ok(()),

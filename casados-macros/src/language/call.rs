@@ -332,13 +332,13 @@ fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Typ
 fn instead_of(ty: &str) -> Option<&'static str> {
     Some(match ty {
         "Quaternion" | "UnitQuaternion" | "UnitDualQuaternion" | "DualQuaternion" => {
-            "four numbers of the state and their products in a helper function are the same"
+            "use four numbers of the state, and a helper function for their product"
         }
         "Rotation2" | "Rotation3" | "Isometry2" | "Isometry3" | "Similarity2" | "Similarity3"
-        | "UnitComplex" => "a matrix of fixed size is the same",
-        "Complex" => "two numbers are the same",
+        | "UnitComplex" => "use a matrix of fixed size",
+        "Complex" => "use two numbers",
         "DVector" | "DMatrix" | "RowDVector" => {
-            "vectors and matrices have a fixed size: `SVector`, `SMatrix`"
+            "use vectors and matrices of fixed size: `SVector`, `SMatrix`"
         }
         _ => return None,
     })

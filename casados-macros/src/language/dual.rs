@@ -95,15 +95,15 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
     if let Some(reduction) = &arguments.reduction {
-        let message = "a dual model has no graph that could be differentiated in time: write it with `f64`";
+        let message = "`index_reduction` needs a graph model: write the model with `f64`";
         return Err(Error::new(reduction.span, message));
     }
     if let Some(duration) = &arguments.duration {
-        let message = "a dual model has no graph whose time could be scaled: write it with `f64`";
+        let message = "`duration` needs a graph model: write the model with `f64`";
         return Err(Error::new(duration.span, message));
     }
     if !arguments.extension.is_empty() {
-        let message = "a dual model has no graph that more states could be added to: write it with `f64`";
+        let message = "`linear` and `integrals` need a graph model: write the model with `f64`";
         return Err(Error::new_spanned(&function.sig.ident, message));
     }
     let mut consts = function.sig.generics.clone();

@@ -42,8 +42,7 @@ impl Duration {
             return Err(Error::new(self.span, message));
         };
         if model.reduction.is_some() {
-            let message =
-                "`duration` and `index_reduction` do not go together: differentiate constraints by hand";
+            let message = "`duration` does not support `index_reduction`: differentiate constraints by hand";
             return Err(Error::new(self.span, message));
         }
         let (nx, nz, nu) = (variables.x.len(), variables.z.len(), variables.u.len());

@@ -167,7 +167,7 @@ impl Evaluator {
         match result {
             Ok(value) => Ok(value),
             Err(Flow::Error(error)) => Err(error),
-            Err(_) => Err(error(at, "`break`, `continue` and `return` do not lead out of here")),
+            Err(_) => Err(error(at, "`break`, `continue` and `return` are not supported here")),
         }
     }
 
@@ -219,7 +219,7 @@ impl Evaluator {
                 Ok(value)
             }
             Err(Flow::Error(error)) => Err(error),
-            Err(_) => Err(error(at, "`break`, `continue` and `return` do not lead out of here")),
+            Err(_) => Err(error(at, "`break`, `continue` and `return` are not supported here")),
         }
     }
 

@@ -128,7 +128,7 @@ impl Evaluator {
                 None => {
                     return Err(unsupported(
                         cast,
-                        "an integer that is computed from model quantities, which has no derivative,",
+                        "an integer that is computed from model variables, which has no derivative,",
                     )
                     .into());
                 }

@@ -99,10 +99,8 @@ impl Extension {
     pub fn integrands(&self, model: &ItemFn) -> Result<Vec<ItemFn>> {
         let function = |integral: &Integral| {
             let Integral { name, rate: Some(rate) } = integral else {
-                let message = format!(
-                    "what `{0}` is the integral of is missing: `integrals({0} = u * u)`",
-                    integral.name
-                );
+                let message =
+                    format!("the integrand of `{0}` is missing: `integrals({0} = u * u)`", integral.name);
                 return Err(Error::new(integral.name.span(), message));
             };
             let inputs = arguments(model);
@@ -171,7 +169,7 @@ impl Extension {
         model.residual = graph.substitute(&model.residual, &by);
         let none = graph.variable(NO_RATE as u32);
         if graph.reachable(&model.residual).contains(&none) {
-            let message = "an element of `du` is used whose control is constant in an interval";
+            let message = "an element of `du` is the rate of a piecewise constant control: list this control in `linear = ..`";
             return Err(Error::new(model.name.span(), message));
         }
         if is_model {

@@ -132,9 +132,7 @@ impl Evaluator {
             if Rc::ptr_eq(&calls.function, item) {
                 return Err(error(
                     at,
-                    format!(
-                        "`{name}` calls itself, and a graph has no end then: write the recursion as a loop"
-                    ),
+                    format!("recursion is not supported: `{name}` calls itself; write a loop"),
                 )
                 .into());
             }

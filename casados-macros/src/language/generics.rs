@@ -67,7 +67,7 @@ impl Evaluator {
                 return Err(error(
                     at,
                     format!(
-                        "nothing before this tells `{parameter}`: write the type of the result, or `{name}::<...>(...)`"
+                        "`{parameter}` cannot be inferred: write the type of the result, or `{name}::<...>(...)`"
                     ),
                 ));
             }

@@ -65,7 +65,7 @@ impl Evaluator {
         let length = match (&*repeat.len, expected) {
             (Expr::Infer(_), Type::Array(_, Some(length))) => *length,
             (Expr::Infer(_), _) => {
-                return Err(error(&repeat.len, "write the length: nothing here tells it").into());
+                return Err(error(&repeat.len, "the length cannot be inferred: write it").into());
             }
             (length, _) => {
                 let value = self.expression(length, &Type::Integer(IntegerType::Usize))?;

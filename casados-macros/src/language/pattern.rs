@@ -58,8 +58,7 @@ impl Evaluator {
             Truth::Known(true) => Ok(bindings),
             Truth::Known(false) => Err(error(pattern, "this pattern does not match the value").into()),
             Truth::When(_) => {
-                Err(unsupported(pattern, "a pattern that matches or not depending on model quantities")
-                    .into())
+                Err(unsupported(pattern, "a pattern that matches or not depending on model variables").into())
             }
         }
     }
@@ -241,7 +240,7 @@ impl Evaluator {
                 _ if !inner.is_empty() => {
                     return Err(unsupported(
                         case,
-                        "a variable in one of several patterns that depend on model quantities",
+                        "a variable in one of several patterns that depend on model variables",
                     )
                     .into());
                 }

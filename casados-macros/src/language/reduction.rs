@@ -13,8 +13,9 @@ use syn::spanned::Spanned;
 use syn::{Error, Expr, Result, Token};
 
 /// What the brackets of `index_reduction` can say.
-const POSSIBLE: &str = "`index_reduction` stands alone or takes `(baumgarte = [2.0, 1.0])`, the rates at which what a \
-    constraint and its derivatives are off by decays, `(baumgarte = 2.0)` for one rate, or `(projection)`";
+const POSSIBLE: &str = "write `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])` with a decay rate for the \
+    constraint and each of its derivatives, `index_reduction(baumgarte = 2.0)` with one rate, or \
+    `index_reduction(projection)`";
 
 /// How the index of a model is reduced.
 #[derive(Clone, Debug)]
@@ -76,8 +77,6 @@ fn rate(value: &Expr) -> Result<f64> {
     if rate > 0.0 {
         return Ok(rate);
     }
-    let message = format!(
-        "the rate {rate:?} does not let errors decay: take one above zero, about the fastest that the motion has"
-    );
+    let message = format!("the rate {rate:?} must be positive: take about the fastest rate of the motion");
     Err(Error::new(value.span(), message))
 }

@@ -15,7 +15,7 @@ impl Evaluator {
             (Value::Reference(_), _) | (_, Value::Reference(_)) => {
                 return Err(error(
                     at,
-                    "which variable is referred to depends on model quantities here: choose between values instead",
+                    "this reference depends on model variables: choose between values instead",
                 ));
             }
             (Value::Real(x), Value::Real(y)) if x == y => a.clone(),
@@ -29,8 +29,8 @@ impl Evaluator {
             (Value::Integer(_), Value::Integer(_)) => {
                 return Err(error(
                     at,
-                    "an integer depends on model quantities here, but integers are known at compile time: \
-                     choose between `f64` values instead",
+                    "this integer depends on model variables, but integers must be known at compile time: choose \
+                     between `f64` values instead",
                 ));
             }
             (Value::Bool(x), Value::Bool(y)) if x == y => a.clone(),
@@ -78,8 +78,8 @@ impl Evaluator {
                 return Err(error(
                     at,
                     format!(
-                        "the branches of a condition on model quantities yield {} and {}, between which nothing \
-                         can choose at run time: let both yield numbers or arrays of equal lengths",
+                        "the branches of a condition on model variables have the types {} and {}: both must be \
+                         numbers or arrays of equal length",
                         a.kind(),
                         b.kind()
                     ),

@@ -165,8 +165,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
         )),
         (Some(Role::Xdot), Form::Function) => Err(Error::new_spanned(
             &identifier.ident,
-            "a function of a model's variables does not see `xdot`, which exists at the stages of an integrator only: \
-             where it is needed, make it an algebraic state",
+            "a `#[function]` has no argument `xdot`: make the derivative an algebraic state",
         )),
         (Some(Role::Z), Form::Ode) => Err(Error::new_spanned(
             &identifier.ident,

@@ -88,7 +88,7 @@ impl Evaluator {
                         return Err(error(otherwise, "the `else` of a `let` must not come to its end").into());
                     }
                     Truth::When(_) => {
-                        let what = "a pattern that matches or not depending on model quantities";
+                        let what = "a pattern that matches or not depending on model variables";
                         return Err(unsupported(pattern, what).into());
                     }
                 }
@@ -177,7 +177,7 @@ impl Evaluator {
                 Ok(Truth::Known(false)) => Ok(Some(Value::unit())),
                 Ok(Truth::When(_)) => Err(error(
                     &inner.cond,
-                    "how often this loop runs depends on model quantities: let it run a fixed number of times, \
+                    "how often this loop runs depends on model variables: let it run a fixed number of times, \
                      or make the model generic, `fn f<T: DualNum + Copy>(...)`",
                 )
                 .into()),
@@ -242,7 +242,7 @@ impl Evaluator {
             "panic" | "unreachable" | "todo" | "unimplemented" => {
                 let message = match list.parse2(tokens) {
                     Ok(arguments) => failed(&arguments, 0),
-                    Err(_) => "this is reached while the model is evaluated".to_owned(),
+                    Err(_) => REACHED.to_owned(),
                 };
                 Err(error(call, message).into())
             }
@@ -326,11 +326,14 @@ fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
     }
 }
 
+/// The error of a `panic!` without a message.
+const REACHED: &str = "this is reached when the macro evaluates the model";
+
 /// The user's message of an assertion that fails, or one of ours.
 fn failed(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
     match arguments.get(position) {
         Some(Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. })) => text.value(),
-        _ if position == 0 => "this is reached while the model is evaluated".to_owned(),
+        _ if position == 0 => REACHED.to_owned(),
         _ => {
             let text = arguments.first().map(|a| a.to_token_stream().to_string()).unwrap_or_default();
             format!("this assertion does not hold: `{text}`")
@@ -341,7 +344,7 @@ fn failed(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
 fn runtime_assertion(call: &syn::Macro) -> syn::Error {
     error(
         call,
-        "this assertion is about model quantities, which are not known at compile time: remove it, or make the \
+        "this assertion depends on model variables, which are not known at compile time: remove it, or make the \
          model generic, `fn f<T: DualNum + Copy>(...)`",
     )
 }

@@ -113,9 +113,8 @@ fn no_condition(attribute: &Group) -> syn::Result<()> {
     match attribute.stream().into_iter().next() {
         Some(TokenTree::Ident(ident)) if ident == "cfg" || ident == "cfg_attr" => Err(syn::Error::new(
             ident.span(),
-            "a condition of the compiler inside of a model, which does not know what it will decide: write the whole \
-             model once for each case, with the condition above its attribute, or give the choice as a constant or a \
-             parameter",
+            "`#[cfg]` inside a model is not supported: write one model for each case, with `#[cfg]` above its \
+             attribute, or use a constant or a parameter",
         )),
         _ => Ok(()),
     }
@@ -284,7 +283,7 @@ mod tests {
         ] {
             let tokens: TokenStream = source.parse().unwrap();
             let message = check(&tokens).map_err(|error| error.to_string());
-            assert!(message.is_err_and(|message| message.contains("condition of the compiler")), "{source}");
+            assert!(message.is_err_and(|message| message.contains("`#[cfg]` inside a model")), "{source}");
         }
         let tests = "mod m { fn m(x: f64) -> f64 { x } #[cfg(test)] mod tests { fn t() {} } }";
         let tokens: TokenStream = tests.parse().unwrap();

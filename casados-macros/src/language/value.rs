@@ -25,7 +25,7 @@ pub enum Value {
     Integer(Integer),
     /// A `bool` that is known.
     Bool(bool),
-    /// A `bool` that depends on model quantities.
+    /// A `bool` that depends on model variables.
     Condition(Node),
     /// A tuple; the empty one is `()`.
     Tuple(Rc<Vec<Value>>),
@@ -101,7 +101,7 @@ impl Value {
             Value::Real(_) => "an `f64`",
             Value::Integer(_) => "an integer",
             Value::Bool(_) => "a `bool`",
-            Value::Condition(_) => "a `bool` that depends on model quantities",
+            Value::Condition(_) => "a `bool` that depends on model variables",
             Value::Tuple(elements) if elements.is_empty() => "`()`",
             Value::Tuple(_) => "a tuple",
             Value::Array(_) => "an array",

@@ -30,12 +30,12 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
         None => format!("`{}`", model.variables.z[unknown - nx as usize]),
     };
     let way_out = match model.reduction {
-        None => ", or let the macro do so with `#[dae(index_reduction)]`",
+        None => ", or let `#[dae(index_reduction)]` do so",
         Some(_) => "",
     };
     let conclusion = format!(
-        "the model is not of index 1; differentiate these equations with respect to time until the derivatives or \
-         algebraic states appear in them{way_out}, or remove what is not determined"
+        "the model is not of index 1: differentiate these equations with respect to time{way_out}; otherwise remove the \
+         undetermined unknowns"
     );
     let nothing = "neither a derivative nor an algebraic state";
     matching(model, &rows, &Words { name: &name, nothing, conclusion: &conclusion })

@@ -338,7 +338,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (change, expected) = ((end - start).to_f64().abs(), (rate * entry.h).to_f64().abs());
         if rate == T::ZERO || expected < GRAZING * change {
             let t = (entry.t + entry.h).to_f64();
-            return Err(Error::Grazing { event: index, t });
+            return Err(Error::Grazing { event: index, function: event.guard.name, t });
         }
         Ok(())
     }

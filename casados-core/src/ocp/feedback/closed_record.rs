@@ -96,7 +96,8 @@ impl<T: Real> Recorder<T> {
         Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
         if is_algebraic::<P, T>() || ocp.free.count() > 0 {
             let what = "closed loops with algebraic states in costs or constraints, or with free parameters";
-            return Err(OcpError::Unsupported { what });
+            let remedy = "Write them in states, controls and parameters that are set";
+            return Err(OcpError::Unsupported { what, remedy });
         }
         let times = ocp.times();
         let length = times.get(1).copied().unwrap_or(T::ONE) - times.first().copied().unwrap_or(T::ZERO);

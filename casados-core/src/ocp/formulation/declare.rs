@@ -185,7 +185,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// ```
     pub fn hold(&mut self, pieces: usize) -> Result<&mut Self, OcpError> {
         if pieces == 0 {
-            return Err(OcpError::InvalidOption { name: "pieces", value: 0.0, allowed: "from 1 on" });
+            return Err(OcpError::InvalidOption { name: "pieces", value: 0.0, allowed: "at least 1" });
         }
         let parts: Vec<T> = (1..pieces).map(|j| T::from_whole(j) / T::from_whole(pieces)).collect();
         self.divide(InnerPoints::with_points(&parts)?.with_costs())
@@ -199,8 +199,9 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             first.is_some_and(|x| x.lower.iter().chain(x.upper).any(|bound| bound.is_finite()))
         };
         if (1..intervals).any(is_bounded) || self.layout().inner > 0 || self.inner.count() > 0 {
-            let what = "points inside of intervals behind bounds of states: call `inside` first, and once";
-            return Err(OcpError::Unsupported { what });
+            let what = "`inside` and `hold` after bounds, or a second time";
+            let remedy = "Call one of them once, before all bounds";
+            return Err(OcpError::Unsupported { what, remedy });
         }
         if inner.count() > 0 {
             check_pieces::<P::Dynamics, T>(&self.problem.parts().dynamics)?;

@@ -49,6 +49,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
         if is_bound && found.iter().all(Range::is_empty) {
             return Err(OcpError::Unsupported {
                 what: "bounds of algebraic states without the feature `alloc`",
+                remedy: "Write them as path constraints",
             });
         }
         self.each(name, found, |bounds, index| bounds.set(index, lower, upper));

@@ -179,15 +179,15 @@ impl fmt::Display for Log<'_> {
             writeln!(f, "{row}")?;
         }
         if self.0.iter().any(|i| i.elastic) {
-            writeln!(f, "e: hard bounds had penalties, since no step satisfies all of them")?;
+            writeln!(f, "e: elastic mode or restoration phase: hard bounds have penalties")?;
         }
         if self.0.iter().any(|i| i.corrected && !i.elastic) {
-            writeln!(f, "s: the step has a second-order correction of the constraints")?;
+            writeln!(f, "s: second-order correction")?;
         }
         if self.0.iter().any(|i| i.perturbed) {
             writeln!(
                 f,
-                "warning: the gradient of a violated constraint vanishes at the guess; the start is beside it"
+                "warning: the gradient of a violated constraint vanishes at the guess; the guess was perturbed"
             )?;
         }
         Ok(())
@@ -224,13 +224,13 @@ mod tests {
         assert!(marks(&[plain]).is_empty());
         assert_eq!(
             marks(&[plain, elastic]),
-            ["e: hard bounds had penalties, since no step satisfies all of them"]
+            ["e: elastic mode or restoration phase: hard bounds have penalties"]
         );
         assert_eq!(
             marks(&[corrected, elastic]),
             [
-                "e: hard bounds had penalties, since no step satisfies all of them",
-                "s: the step has a second-order correction of the constraints"
+                "e: elastic mode or restoration phase: hard bounds have penalties",
+                "s: second-order correction"
             ]
         );
     }

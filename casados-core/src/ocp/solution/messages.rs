@@ -4,8 +4,8 @@ use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
 use crate::qp::{QpField, Side};
 use core::fmt;
 
-/// What may help where a function has no value, or no derivative.
-const ELSEWHERE: &str = "another guess, or bounds that keep away from there, may help";
+/// The remedy where a function has no value, or no derivative.
+const OUTSIDE_DOMAIN: &str = "take another guess, or bounds that keep the variables inside its domain";
 
 impl Part {
     fn is_bound(self) -> bool {
@@ -73,30 +73,34 @@ impl fmt::Display for OcpError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownName { name, known } => {
-                write!(f, "`{}` has no state or control `{}`: its states are", known.model, name.as_str())?;
+                write!(f, "`{}` has no variable `{}` of this kind. States:", known.model, name.as_str())?;
                 list(f, known.x)?;
-                f.write_str(", its controls")?;
-                list(f, known.u)
+                for (kind, names) in [("; controls:", known.u), ("; algebraic states:", known.z)] {
+                    if !names.is_empty() {
+                        f.write_str(kind)?;
+                        list(f, names)?;
+                    }
+                }
+                Ok(())
             }
             Self::NoSuchStage { part, stage, stages } => {
                 write!(f, "there is no stage {stage}: {part} are at stages 0 to {}", stages.saturating_sub(1))
             }
             Self::EmptyRange { part, start, end, stages } => write!(
                 f,
-                "there is no stage in {start}..{end}: {part} are at stages 0 to {}, and a range begins before it \
-                 ends, as `2..4` and `2..=3` do",
+                "the range of stages {start}..{end} is empty: {part} are at stages 0 to {}",
                 stages.saturating_sub(1)
             ),
             Self::NoBound { name, start, end } => write!(
                 f,
-                "`{}` has no bound at stages {start} to {} that could be soft: call `bound` before `soften`",
+                "`{}` has no finite bound at stages {start} to {}: call `bound` before `soften`",
                 name.as_str(),
                 end.saturating_sub(1)
             ),
             Self::Length { part: Part::Dimensions, stage, expected, found } => write!(
                 f,
-                "these are the dimensions of another problem, {found} instead of {expected} at stage {stage}: memory \
-                 and solvers are made for one problem, as by `HeapSqp::new(&ocp)`"
+                "dimensions of another problem: {found} instead of {expected} at stage {stage}. Make solvers and memory \
+                 for each problem: `HeapSqp::new(&ocp)`"
             ),
             Self::Length { part, stage, expected, found } => {
                 let elements = if *found == 1 { "element" } else { "elements" };
@@ -107,9 +111,9 @@ impl fmt::Display for OcpError {
             Self::InvalidValue { part, stage, name, index, value } => {
                 stage_of(f, *part, *stage)?;
                 let (what, allowed) = match part {
-                    Part::Penalty => ("a penalty of ", "from 0 on, and finite if it is quadratic"),
+                    Part::Penalty => ("a penalty of ", "at least 0, and finite if quadratic"),
                     _ if part.is_bound() => {
-                        ("a bound of ", "a number, or -inf below and inf above where there is none")
+                        ("a bound of ", "a number, -inf for no lower bound, or inf for no upper bound")
                     }
                     Part::InitialState => ("the initial value of ", "finite"),
                     Part::Multipliers => ("a multiplier of ", "finite"),
@@ -118,26 +122,26 @@ impl fmt::Display for OcpError {
                 };
                 f.write_str(what)?;
                 named(f, *part, name, *index)?;
-                write!(f, " is {value}: it has to be {allowed}")
+                write!(f, " is {value}: it must be {allowed}")
             }
             Self::InvalidArrivalWeight { states: [i, j], value, allowed } => {
                 match i == j {
                     true => write!(f, "the weight of `{i}` in the arrival cost")?,
                     false => write!(f, "the weight of `{i}` and `{j}` in the arrival cost")?,
                 }
-                write!(f, " is {value}: it has to be {allowed}")
+                write!(f, " is {value}: it must be {allowed}")
             }
             Self::InvalidWeight { function, outputs: [i, j], value, allowed } => {
                 match i == j {
                     true => write!(f, "the weight of output {i} of `{function}`")?,
                     false => write!(f, "the weight of outputs {i} and {j} of `{function}`")?,
                 }
-                write!(f, " is {value}: it has to be {allowed}")
+                write!(f, " is {value}: it must be {allowed}")
             }
             Self::Times { interval, start, end } => {
                 write!(
                     f,
-                    "interval {interval} goes from {start} to {end}: times of nodes are finite and increase"
+                    "interval {interval} goes from {start} to {end}: times of nodes must be finite and increasing"
                 )
             }
             Self::CrossedBounds { part, stage, name, index, lower, upper } => {
@@ -149,7 +153,7 @@ impl fmt::Display for OcpError {
                 "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times",
             ),
             Self::Missing { part: Part::InitialState, .. } => f.write_str(
-                "nothing is said about the initial state: call `fix_initial_state` or `free_initial_state`",
+                "the initial state is undefined: call `fix_initial_state` or `free_initial_state`",
             ),
             Self::Missing { part: Part::Parameters, stage } => {
                 write!(f, "stage {stage}: the parameters were never set: call `set_parameters`")
@@ -157,10 +161,16 @@ impl fmt::Display for OcpError {
             Self::Missing { part, stage } => write!(f, "stage {stage}: {part} were never set"),
             Self::NotThere { function, variable, terminal } => {
                 write!(f, "`{function}` depends on `{variable}`, which does not exist ")?;
-                f.write_str(if *terminal { "at the end of the horizon" } else { "at the nodes" })
+                f.write_str(match terminal {
+                    true => {
+                        "at the end of the horizon: terminal costs and constraints may depend on states and parameters \
+                         only; move this term to the running cost or the path constraints"
+                    }
+                    false => "at the nodes: maps have no algebraic states",
+                })
             }
             Self::NonFiniteFunction { function, stage, output, value } => {
-                write!(f, "stage {stage}: output {output} of `{function}` is {value}: {ELSEWHERE}")
+                write!(f, "stage {stage}: output {output} of `{function}` is {value}: {OUTSIDE_DOMAIN}")
             }
             Self::NonFiniteDerivative { field, stage, of, output, by, value } => {
                 write!(f, "stage {stage}: ")?;
@@ -170,18 +180,18 @@ impl fmt::Display for OcpError {
                     QpField::GradientX | QpField::GradientU => write!(f, "the derivative of the cost by `{by}`")?,
                     _ => write!(f, "the second derivative of the Lagrangian by `{of}` and `{by}`")?,
                 }
-                write!(f, " is {value}: {ELSEWHERE}")
+                write!(f, " is {value}: {OUTSIDE_DOMAIN}")
             }
             Self::NonFiniteSensitivity { stage, of, by, value } => write!(
                 f,
-                "stage {stage}: the derivative of the solution `{of}` by `{by}` is {value}: other units of states, \
-                 controls and costs may help"
+                "stage {stage}: the derivative of the solution `{of}` by `{by}` is {value}: scale states, controls and \
+                 costs to about one"
             ),
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
             Self::Simulation { interval, state, value, error } => write!(
                 f,
-                "the simulation of the guess ends in interval {interval}, where `{state}` is {value:e}: {error}; \
-                 another first state or other controls may help, or an adaptive integrator \
+                "the simulation of the guess failed in interval {interval}, at `{state}` = {value:e}: {error}. Change \
+                 the initial state or the controls of the guess, or take an adaptive integrator \
                  (`Ocp::guess_by_simulation_with`)"
             ),
             Self::NoIntegrator => f.write_str(
@@ -190,9 +200,8 @@ impl fmt::Display for OcpError {
             ),
             Self::NotIdentifiable { name, stage } => write!(
                 f,
-                "`{name}` at stage {stage} is not identifiable and has no variance: see \
-                 `Covariance::unidentifiable` for what data cannot tell, and add an arrival cost, other \
-                 samples or a bound"
+                "`{name}` at stage {stage} is not identifiable from the data, so it has no variance: \
+                 `Covariance::unidentifiable` lists the directions. Add an arrival cost, samples or a bound"
             ),
             Self::Integrator(error) => error.fmt(f),
             #[cfg(feature = "alloc")]
@@ -203,28 +212,27 @@ impl fmt::Display for OcpError {
                  `Ocp::differentiate`",
             ),
             Self::FreeParameters => f.write_str(
-                "derivatives of solutions are not known where parameters are free: set these with \
-                 `set_parameters`, or make them states",
+                "derivatives of solutions do not support free parameters: fix them with `set_parameters`, or make \
+                 them states",
             ),
             Self::NoSolution => f.write_str(
-                "the last run of this problem did not end at a solution, of which there would be derivatives: \
-                 its outcome says why",
+                "the last run found no solution to differentiate (see its outcome)",
             ),
             Self::FixedEndTime { model } => write!(
                 f,
-                "the end time is free, and no parameter of `{model}` is a duration: say which one, as in \
+                "the end time is free, but `{model}` has no duration: name the parameter, \
                  `#[ode(duration = p.duration)]`"
             ),
-            Self::Unsupported { what } => write!(f, "there is no support for {what}"),
+            Self::Unsupported { what, remedy } => write!(f, "not supported: {what}. {remedy}"),
             Self::DependsOnTime { function } => write!(
                 f,
-                "the end time is free, and `{function}` depends on the time: say which parameter is the duration, \
-                 as in `#[function(duration = p.duration)]`"
+                "the end time is free, but `{function}` depends on the time and has no duration: name the parameter, \
+                 `#[function(duration = p.duration)]`"
             ),
             Self::InvalidPoint { index, value } => write!(
                 f,
-                "the point {index} inside of intervals is at {value}: points are parts of an interval that \
-                 increase, between 0 and 1"
+                "point {index} inside intervals is at {value}: points must be increasing fractions of an interval, \
+                 between 0 and 1"
             ),
             Self::UnknownParameter { name, known } => {
                 write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;
@@ -234,7 +242,7 @@ impl fmt::Display for OcpError {
                 write!(f, "the guess {value} of `{name}` is outside of its range, {lower} to {upper}")
             }
             Self::InvalidOption { name, value, allowed } => {
-                write!(f, "the option `{name}` is {value}: it has to be {allowed}")
+                write!(f, "the option `{name}` is {value}: it must be {allowed}")
             }
             Self::Qp(error) => error.fmt(f),
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),

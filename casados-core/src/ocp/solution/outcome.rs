@@ -220,15 +220,18 @@ impl Status {
             Self::MaxIterations => f.write_str("not converged: the maximum number of iterations was reached"),
             Self::Stopped => f.write_str("stopped by the observer"),
             Self::OutOfTime => f.write_str("not converged: the time limit was reached"),
-            Self::Unbounded => f.write_str("unbounded: variables grow without end"),
+            Self::Unbounded => f.write_str("unbounded"),
             Self::Infeasible { constraint, violation } => {
-                write!(f, "locally infeasible: {constraint} is violated by {violation:.2e}")
+                write!(f, "locally infeasible: {constraint} cannot be satisfied (violation {violation:.2e})")
             }
             Self::InfeasibleQp { constraint, violation } => {
-                write!(f, "the QP is infeasible: {constraint} is violated by {violation:.2e} at least")
+                write!(
+                    f,
+                    "the linearised problem is infeasible: {constraint} is violated by {violation:.2e} at least"
+                )
             }
             Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
-            Self::NoProgress => f.write_str("no step makes progress"),
+            Self::NoProgress => f.write_str("no progress"),
         }
     }
 
@@ -237,23 +240,21 @@ impl Status {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
             Self::MaxIterations => {
-                "; `Trajectory::violations` of `Ocp::solution` lists all violated bounds; a larger \
-                 `options.max_iterations` or another guess may help, for `Sqp` also another `options.globalisation`, as \
-                 `Globalisation::Filter`, and exact Hessians (`Sqp::exact`) where it has others"
+                ". Violated bounds: `ocp.solution()?.violations(1e-6)`. Raise `options.max_iterations`, or take another \
+                 guess; with `Sqp` also `Globalisation::Filter` or exact Hessians (`Sqp::exact`)"
             }
-            Self::Unbounded => "; bounds of states and controls, or a cost of them, are missing",
-            Self::Infeasible { .. } => {
-                "; another guess may help, or a penalty instead of the bound (`Ocp::soften`)"
+            Self::Unbounded => {
+                ". The objective decreases along a ray: add bounds or costs of states and controls"
             }
-            Self::InfeasibleQp { .. } => "; `options.elastic` goes on where only QPs are",
+            Self::Infeasible { .. } => ". Soften it (`Ocp::soften`), or take another guess",
+            Self::InfeasibleQp { .. } => ". Set `options.elastic` to continue with penalties",
             Self::QpFailed(QpError::NotConvex { .. }) => {
-                "; another guess may help, and `Convexification::Reduced` where another one was chosen"
+                ". Take another guess, or `Convexification::Reduced` if another one was set"
             }
-            Self::QpFailed(_) => "; another guess may help",
+            Self::QpFailed(_) => ". Take another guess",
             Self::NoProgress => {
-                "; `Trajectory::violations` of `Ocp::solution` lists all violated bounds; another \
-                 guess may help, for `Sqp` also another `options.globalisation`, as `Globalisation::Filter`, \
-                 a smaller `options.shortest_step`, and exact Hessians (`Sqp::exact`) where it has others"
+                ". Violated bounds: `ocp.solution()?.violations(1e-6)`. Take another guess; with `Sqp` also \
+                 `Globalisation::Filter`, exact Hessians (`Sqp::exact`) or a smaller `options.shortest_step`"
             }
         }
     }
@@ -275,7 +276,7 @@ impl fmt::Display for Outcome {
         }
         write!(f, " after {iterations} iterations: objective {objective:.8e}, {residuals}")?;
         if let Some((constraint, violation)) = &self.violated {
-            write!(f, "; {constraint} is violated most, by {violation:.2e}")?;
+            write!(f, "; largest violation: {violation:.2e} of {constraint}")?;
         }
         f.write_str(status.way_out())
     }

@@ -129,7 +129,7 @@ impl<T: Real> fmt::Display for Verification<T> {
         match self.largest_defect() {
             Some(Defect { state, interval, amount, relative }) => writeln!(
                 f,
-                "largest defect: {:.2e} of `{state}` in interval {interval} of {}, a part of {:.1e}",
+                "largest defect: {:.2e} of `{state}` in interval {interval} of {} (relative {:.1e})",
                 amount.to_f64(),
                 self.intervals,
                 relative.to_f64()
@@ -170,7 +170,11 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     {
         self.check()?;
         if !P::Dynamics::IS_FLOW {
-            return Err(OcpError::Unsupported { what: "the verification of maps, which have no flow" });
+            let what = "the verification of maps, which have no flow between nodes";
+            return Err(OcpError::Unsupported {
+                what,
+                remedy: "Take the integrator of an `#[ode]` or a `#[dae]`",
+            });
         }
         let (layout, free) = (self.layout(), self.free.view());
         let data = split::<P, T>(&mut self.data, layout);

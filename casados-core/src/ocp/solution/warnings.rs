@@ -87,22 +87,21 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::GuessOutsideBounds { bound, value, limit } => {
-                write!(f, "the guess {value:e} violates {bound}, {limit:e}: solvers move it there")
+                write!(f, "the guess {value:e} violates {bound}, {limit:e}; solvers move it inside")
             }
             Self::VanishingGradient { constraint, violation } => write!(
                 f,
-                "{constraint} is violated by {violation:.1e} at the guess, where its gradient is zero: take a guess \
-                 beside this one"
+                "{constraint} is violated by {violation:.1e} at the guess, where its gradient is zero: perturb the guess"
             ),
             Self::UnreachableEnd { bound, value, limit } => write!(
                 f,
-                "{bound} is {limit:e}, the linearisation at the guess ends at {value:e}, and no control, free start or \
-                 free parameter changes that: take another guess, or see what moves it"
+                "{bound}, {limit:e}, is unreachable in the linearisation at the guess, which ends at {value:e} whatever \
+                 the controls, initial state and parameters: take another guess, or check that a control acts on it"
             ),
             Self::FarUnits { small: (small, size), large: (large, other) } => write!(
                 f,
-                "`{small}` has the size {size:.0e} and `{large}` {other:.0e}, by guesses and bounds: other units may \
-                 help, of both near one"
+                "`{small}` is of size {size:.0e}, `{large}` of size {other:.0e} (by guesses and bounds): scale both to \
+                 about one"
             ),
         }
     }

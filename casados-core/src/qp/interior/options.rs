@@ -91,25 +91,30 @@ impl InteriorPointOptions {
         let tolerance = absolute >= T::ZERO && absolute < infinity;
         let none = !(absolute > T::ZERO || relative > T::ZERO);
         let all = [
-            ("tolerance", self.tolerance, tolerance && !none, "from 0, and above if relative_tolerance is 0"),
+            (
+                "tolerance",
+                self.tolerance,
+                tolerance && !none,
+                "at least 0 and finite, and above 0 if `relative_tolerance` is 0",
+            ),
             (
                 "relative_tolerance",
                 self.relative_tolerance,
                 relative >= T::ZERO && relative < T::ONE,
-                "from 0 to 1",
+                "at least 0 and below 1",
             ),
-            ("start_mu", self.start_mu, positive(T::from_f64(self.start_mu)), "above 0, finite"),
+            ("start_mu", self.start_mu, positive(T::from_f64(self.start_mu)), "above 0 and finite"),
             (
                 "warm_distance",
                 self.warm_distance,
                 positive(T::from_f64(self.warm_distance)),
-                "above 0, finite",
+                "above 0 and finite",
             ),
             (
                 "no_bound",
                 self.no_bound,
                 T::from_f64(self.no_bound) > T::ZERO,
-                "above 0, infinite if all bounds count",
+                "above 0, or inf if all bounds count",
             ),
         ];
         for (name, value, is_valid, allowed) in all {

@@ -149,7 +149,7 @@ fn extreme(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Val
                         return Err(error(
                             at,
                             format!(
-                                "`{}` of model quantities: use `fold` with `f64::max` or `f64::min`",
+                                "`{}` of model variables: use `fold` with `f64::max` or `f64::min`",
                                 call.name
                             ),
                         ));

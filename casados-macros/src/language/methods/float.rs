@@ -153,7 +153,7 @@ fn known(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value
     if !KNOWN.contains(&call.name) {
         return Ok(None);
     }
-    let refuse = || unsupported(call.at, format!("`{}` of a model quantity", call.name));
+    let refuse = || unsupported(call.at, format!("`{}` of a model variable", call.name));
     let a = evaluator.graph.value(a).ok_or_else(refuse)?;
     let value = match call.name {
         "floor" => a.floor(),

@@ -126,9 +126,7 @@ pub(super) fn holds(
 ) -> Result<bool> {
     match evaluator.call(closure, vec![value], at)? {
         Value::Bool(known) => Ok(known),
-        Value::Condition(_) => {
-            Err(unsupported(at, format!("`{method}` by a comparison of model quantities")))
-        }
+        Value::Condition(_) => Err(unsupported(at, format!("`{method}` by a comparison of model variables"))),
         other => Err(error(at, format!("expected a `bool`, found {}", other.kind()))),
     }
 }

@@ -60,7 +60,7 @@ fn numbers(evaluator: &mut Evaluator, value: &Value, at: At) -> Result<TokenStre
                 return Err(error(
                     at,
                     "the numbers of a table have to be known when the program is compiled: make it of literals and \
-                     constants, and multiply its value by what depends on model quantities",
+                     constants, and multiply its value by what depends on model variables",
                 ));
             }
         },

@@ -24,9 +24,9 @@ fn refusals() {
     refused("fn g(a: f64) -> f64 { h(a) } fn h(a: f64) -> f64 { g(a) } g(x[0])", "calls itself");
     refused("loop {} x[0]", "does this loop end");
     refused("let mut s = 0.0; while x[0] > 0.0 { s += 1.0; } s", "how often this loop runs depends");
-    refused("if x[0] > 0.0 { return x[1]; } x[2]", "whether the function returns here");
+    refused("if x[0] > 0.0 { return x[1]; } x[2]", "this early `return` depends on model variables");
     refused("for i in 0..3 { if x[i] > 0.0 { break; } } x[2]", "how often the loop runs");
-    refused("let i = if x[0] > 0.0 { 1 } else { 2 }; x[i]", "an integer depends on model quantities");
+    refused("let i = if x[0] > 0.0 { 1 } else { 2 }; x[i]", "this integer depends on model variables");
     refused("x[x[0] as usize]", "has no derivative");
     refused("unknown(x[0])", "does not see the function `unknown`");
     refused("crate::params::mass(x[0])", "does not see the function `crate::params::mass`");
@@ -67,7 +67,10 @@ fn refusals() {
         "let mut a = x[0]; let mut b = x[1]; let r = if x[2] > 0.0 { &mut a } else { &mut b }; *r",
         "choose between values",
     );
-    refused("let a = if x[0] > 0.0 { Some(x[0]) } else { None }; 1.0", "between which nothing can choose");
+    refused(
+        "let a = if x[0] > 0.0 { Some(x[0]) } else { None }; 1.0",
+        "must be numbers or arrays of equal length",
+    );
     refused("let n: u8 = 255; let k = n + 1; x[0]", "overflows `u8`");
     refused("1.0f32", "`f64`");
     refused("let mut f = 1; for k in 1..14 { f *= k; } x[0] * f as f64", "overflows `i32`: if another type");

@@ -1,4 +1,4 @@
-//! Branches on model quantities become selections.
+//! Branches on model variables become selections.
 
 use super::same;
 

@@ -90,9 +90,7 @@ fn check(model: &Model, level: Node, (equation, order): (usize, u32)) -> Result<
     } else {
         "solve the equations for what is differentiated, or differentiate the constraint by hand"
     };
-    let message = format!(
-        "{of} has to be differentiated and contains {name}, which would have to be differentiated too; {way_out} \
-         (equations are counted from 0)"
-    );
+    let message =
+        format!("{of} must be differentiated but contains {name}; {way_out} (equations are counted from 0)");
     Err(Error::new(model.spans.get(equation).copied().unwrap_or_else(|| model.name.span()), message))
 }

@@ -112,8 +112,8 @@ fn undetermined(model: &Model, rows: &[signature::Row]) -> syn::Error {
             None => format!("`{}`", model.variables.z[unknown - nx]),
         },
         nothing: "no state",
-        conclusion: "no derivatives of these equations determine all states; remove equations that repeat each other, \
-                     and add those that are missing",
+        conclusion: "the model is singular: no derivatives of these equations determine all states. Remove redundant \
+                     equations and add the missing ones",
     };
     let other = || syn::Error::new(model.name.span(), words.conclusion);
     index::matching(model, &pattern, &words).err().unwrap_or_else(other)

@@ -54,10 +54,9 @@ pub fn check(analysis: &Analysis, differentiated: bool) -> Result<[u32; 2]> {
         variable(&model.variables, if unknown < nx { unknown } else { unknown + nx })
     };
     let message = format!(
-        "the index cannot be reduced: {}equations {} are dependent at every sample point, and leave {} open; remove \
-         constraints that follow from the others, put a combination of these equations in which the unknowns cancel in \
-         the place of one of them, or say where the model lives with `nominal(..)` and `range(..)` (equations are \
-         counted from 0)",
+        "the index cannot be reduced: {}equations {} are dependent at every sample point and do not determine {}. \
+         Remove redundant constraints; replace one equation by a combination in which the unknowns cancel; or declare \
+         the region by `nominal(..)` and `range(..)` (equations are counted from 0)",
         if differentiated { "once differentiated, " } else { "" },
         equations.iter().map(number).collect::<Vec<_>>().join(", "),
         unknowns.iter().map(name).collect::<Vec<_>>().join(", "),

@@ -101,8 +101,8 @@ fn not_explicit(model: &Model, unknown: u32, row: usize, missing: u32) -> Error 
          differentiate the constraint by hand"
     };
     let message = format!(
-        "{} would have to be differentiated {}, since equation {row} and those that depend on it have to be, and no \
-         equation gives it explicitly: {way_out} (equations are counted from 0)",
+        "{} must be differentiated {}, because equation {row} is, but no equation gives it explicitly: {way_out} \
+         (equations are counted from 0)",
         variable(&model.variables, unknown),
         times(missing as usize)
     );

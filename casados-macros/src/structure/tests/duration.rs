@@ -53,7 +53,7 @@ fn mistakes() {
     assert_eq!(refused("duration = q"), "`q` is no parameter of the model: these are `p[0]`, `p[1]`");
     assert_eq!(refused("duration = p"), "`p` is no parameter of the model: these are `p[0]`, `p[1]`");
     assert!(refused("duration = p[0], duration = p[1]").contains("`duration` is given twice"));
-    assert!(refused("index_reduction, duration = p[0]").contains("do not go together"));
+    assert!(refused("index_reduction, duration = p[0]").contains("does not support `index_reduction`"));
     let none = read(Form::Ode, "duration = p", "fn f(x: f64) -> f64 { x }").err().expect("no parameter");
     assert_eq!(none, "`p` is no parameter of the model: it has none");
 }

@@ -51,13 +51,13 @@ fn mistakes() {
     let refused = |attribute: &str| model(Form::Ode, attribute, item).err().expect("it is refused");
     assert_eq!(refused("linear = v"), "`v` is no control of the model: these are `u[0]`, `u[1]`");
     assert_eq!(refused("linear = [u[0], u]"), "`u` is linear already");
-    assert!(refused("integrals(work)").contains("what `work` is the integral of is missing"));
+    assert!(refused("integrals(work)").contains("the integrand of `work` is missing"));
     assert!(refused("integrals(work = x, work = u[0])").contains("`work` is given twice"));
     let function =
         |attribute: &str, item: &str| model(Form::Function, attribute, item).err().expect("refused");
     let rate = "fn f(x: f64, u: [f64; 2], du: [f64; 2]) -> f64 { x * u[0] + du[0] }";
     assert!(function("", rate).contains("say which ones, as in `linear = u`"));
-    assert!(function("linear = u[1]", rate).contains("whose control is constant"));
+    assert!(function("linear = u[1]", rate).contains("the rate of a piecewise constant control"));
     let short = "fn f(x: f64, u: [f64; 2], du: f64) -> f64 { x * u[0] + du }";
     assert_eq!(function("linear = u", short), "`du` has 1 number and `u` has 2 numbers");
     let integrals = "fn f(x: f64, u: f64, q: [f64; 2]) -> f64 { x * u + q[1] }";

@@ -243,8 +243,10 @@ pub enum OcpError {
     },
     /// Something that cannot be said of this problem.
     Unsupported {
-        /// What, and what can be said instead.
+        /// What.
         what: &'static str,
+        /// What can be said instead.
+        remedy: &'static str,
     },
     /// The end of the horizon is free, and a function depends on the time of the integrator.
     DependsOnTime {

@@ -150,8 +150,8 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
     }
     fn check(&self, there: There) -> Result<(), OcpError> {
         if there.u {
-            let what = "a boundary condition at every node: it is a terminal constraint";
-            return Err(OcpError::Unsupported { what });
+            let what = "a boundary condition as a path constraint";
+            return Err(OcpError::Unsupported { what, remedy: "Give it to `terminal_constraints`" });
         }
         let name = <Self as Constraints<S, T>>::name;
         let labels = Labels { part: Part::TerminalBounds, stage: there.stage, name };

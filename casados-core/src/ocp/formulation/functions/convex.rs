@@ -144,7 +144,7 @@ fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
     for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
         let (weight, delta) = (weight.to_f64(), delta.to_f64());
         if !(weight >= 0.0 && weight.is_finite()) {
-            return invalid(i, weight, "finite and not negative");
+            return invalid(i, weight, "finite and at least 0");
         }
         if !(delta > 0.0 && delta.is_finite()) {
             return invalid(i, delta, "finite and positive: it is the `delta` of Huber's function");
@@ -285,7 +285,7 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
         for k in 0..F::Outputs::NY {
             let curvature = phi[(k, k)];
             if curvature < T::ZERO {
-                let (outputs, allowed) = ([k, k], "not negative: the outer function is to be convex");
+                let (outputs, allowed) = ([k, k], "at least 0: the outer function must be convex");
                 let (function, value) = (F::STRUCTURE.name, curvature.to_f64());
                 return Err(OcpError::InvalidWeight { function, outputs, value, allowed });
             }

@@ -36,7 +36,7 @@ pub(in crate::ocp) fn check_matrix<T: Real, V: Matrix<T>>(weights: &V, coupled: 
         |i: usize, j: usize, allowed| Err(Fault { place: [i, j], value: weight(i, j).to_f64(), allowed });
     for i in 0..ny {
         if !(weight(i, i) >= T::ZERO && weight(i, i).is_finite()) {
-            return fault(i, i, "finite and not negative");
+            return fault(i, i, "finite and at least 0");
         }
     }
     if !coupled {

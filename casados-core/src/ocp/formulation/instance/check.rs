@@ -56,9 +56,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn check_functions(&mut self) -> Result<(), OcpError> {
         let intervals = self.intervals();
         if P::Dynamics::INTEGRAL {
-            let what =
-                "a free end time with `WithIntegral`: take `integrals(..)` of the model, or a running cost";
-            return Err(OcpError::Unsupported { what });
+            let what = "a free end time with `WithIntegral`";
+            let remedy = "Take `integrals(..)` of the model, or a running cost";
+            return Err(OcpError::Unsupported { what, remedy });
         }
         let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
         let inside = There { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };

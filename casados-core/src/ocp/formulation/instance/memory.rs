@@ -93,9 +93,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         G: ConstraintsOf<D, T>,
         H: ConstraintsOf<D, T>,
     {
-        let what = "couplings of stages in given memory: take `Problem::on`";
         if matches!(horizon, Horizon::Free { .. }) || H::STARTS > 0 {
-            return Err(OcpError::Unsupported { what });
+            let what = "free end times and boundary conditions in given memory";
+            return Err(OcpError::Unsupported { what, remedy: "Take `Problem::on`" });
         }
         let intervals = horizon.intervals();
         let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));
@@ -142,8 +142,10 @@ impl<V: Copy + Default> Renewable<V> for Vec<V> {
     }
 }
 
-const GIVEN: OcpError =
-    OcpError::Unsupported { what: "bounds of algebraic states in given memory: take `Problem::on`" };
+const GIVEN: OcpError = OcpError::Unsupported {
+    what: "bounds of algebraic states in given memory",
+    remedy: "Take `Problem::on`",
+};
 
 impl<V> Renewable<V> for &[V] {
     fn renew(_: &[V], _: usize) -> Result<Self, OcpError> {

@@ -118,7 +118,7 @@ impl IpmOptions {
         let positive = [("tolerance", self.tolerance), ("acceptable_tolerance", self.acceptable_tolerance)];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(OcpError::InvalidOption { name, value, allowed: "positive and finite" });
+                return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and finite" });
             }
         }
         // Products with units of the problem are finite.

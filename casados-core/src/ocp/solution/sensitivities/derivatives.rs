@@ -166,21 +166,20 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::FreeParameters);
         }
         if self.initial == Initial::Partly {
-            let what =
-                "derivatives of solutions whose controls are linear: write these as states of the model";
-            return Err(OcpError::Unsupported { what });
+            let what = "derivatives of solutions whose controls are linear";
+            return Err(OcpError::Unsupported { what, remedy: "Write these as states of the model" });
         }
         if self.layout().inner > 0 {
             let what =
-                "derivatives of solutions with bounds of algebraic states or at points inside of intervals";
-            return Err(OcpError::Unsupported { what });
+                "derivatives of solutions with bounds of algebraic states or at points inside intervals";
+            return Err(OcpError::Unsupported { what, remedy: "Write these as path constraints at nodes" });
         }
         let value = factors.smoothing.to_f64();
         if !(value >= 0.0 && value.is_finite()) {
             return Err(OcpError::InvalidOption {
                 name: "smoothing",
                 value,
-                allowed: "from 0 on and finite",
+                allowed: "at least 0 and finite",
             });
         }
         let (part, stage) = (Part::Memory, 0);

@@ -74,25 +74,25 @@ impl fmt::Display for TrajectoryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown { model, name, known } if known.is_empty() => {
-                write!(f, "the solution of `{model}` has no `{name}`, nor anything else of this kind")
+                write!(f, "the solution of `{model}` has no variables of this kind, so `{name}` is unknown")
             }
             Self::Unknown { model, name, known } => {
                 write!(f, "the solution of `{model}` has no `{name}`: it has")?;
                 list(f, known)
             }
             Self::Ambiguous { name, found } => {
-                write!(f, "`{name}` means several: say which of")?;
+                write!(f, "`{name}` is ambiguous, it matches")?;
                 list(f, found)
             }
             Self::Length { name, found, expected } => write!(
                 f,
-                "the trajectory has {found} values of `{name}`, and the problem {expected}: `guess_from` interpolates \
-                 where horizons differ"
+                "the trajectory has {found} values of `{name}` instead of {expected}: for other horizons use \
+                 `guess_from`, which interpolates"
             ),
-            Self::Times => f.write_str("the times of the trajectory have to be finite and must not decrease"),
+            Self::Times => f.write_str("the times of the trajectory must be finite and must not decrease"),
             Self::Beyond { name, first, found, times } => write!(
                 f,
-                "`{name}` has {found} values from time {first} on, and the trajectory has {times} times"
+                "`{name}` has {found} values from index {first}, but the trajectory only {times} times"
             ),
             Self::Problem(error) => error.fmt(f),
         }

@@ -231,7 +231,6 @@ pub(in crate::ocp) fn check_pieces<D: Dynamics<T>, T: Real>(dynamics: &D) -> Res
     if dynamics.has_pieces() {
         return Ok(());
     }
-    let what =
-        "points inside of intervals of maps and of lifted stages: take an integrator, or a finer horizon";
-    Err(OcpError::Unsupported { what })
+    let what = "points inside intervals of maps and of lifted stages";
+    Err(OcpError::Unsupported { what, remedy: "Take an integrator, or a finer horizon" })
 }
