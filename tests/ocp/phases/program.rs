@@ -116,20 +116,20 @@ fn derivatives_are_differences() -> Test {
         .join()?;
     disturb(&mut ocp)?;
     let dims = ocp.qp().dims().to_vec();
-    assert_eq!(dims.iter().map(|stage| stage.nx).collect::<Vec<_>>(), [3, 3, 3, 6, 6, 6, 4, 4, 4]);
-    assert_eq!(dims.iter().map(|stage| stage.nu).collect::<Vec<_>>(), [1, 1, 2, 2, 2, 2, 1, 1, 0]);
+    assert_eq!(dims.iter().map(|stage| stage.nx).collect::<Vec<_>>(), [0, 3, 3, 3, 6, 6, 6, 4, 4, 4]);
+    assert_eq!(dims.iter().map(|stage| stage.nu).collect::<Vec<_>>(), [3, 1, 1, 2, 2, 2, 2, 1, 1, 0]);
 
     // What links make of the ends, in this program once more.
     let values = |ocp: &mut HeapOcp<Phases<'_>>, k: usize| Ok::<_, Box<dyn std::error::Error>>(first_order(ocp, k)?.1);
-    let at = variables(&ocp.iterate().stage(2).ok_or("no stage")?);
+    let at = variables(&ocp.iterate().stage(3).ok_or("no stage")?);
     let [x0, x1, duration, linear, p] = at[..] else { return Err("five".into()) };
     let expected = [x0 * x0 * 1.3, (x0 * x1).sin(), 1.3 * duration + x1, linear, 0.0, p];
-    let found = values(&mut ocp, 2)?;
+    let found = values(&mut ocp, 3)?;
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{found:?} {expected:?}");
-    let at = variables(&ocp.iterate().stage(5).ok_or("no stage")?);
+    let at = variables(&ocp.iterate().stage(6).ok_or("no stage")?);
     let [x0, x1, x2, _, q, p, duration, size] = at[..] else { return Err("eight".into()) };
     let expected = [x0 * x1 + p * x2 * x2, q * x1 + p * p, duration, size];
-    let found = values(&mut ocp, 5)?;
+    let found = values(&mut ocp, 6)?;
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{found:?} {expected:?}");
 
     // Central differences of order eight, as in the tests of one horizon, whose bound this is.

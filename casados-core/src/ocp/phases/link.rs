@@ -32,7 +32,9 @@ pub struct PhaseEnd<'a, T> {
 pub struct PhaseDims {
     /// `NX`, `NU`, `NP`, `NZ` of the phase that ends.
     pub(in crate::ocp) ends: [usize; 4],
-    /// States of the phase that begins, without linear controls and integrals.
+    /// States of the phase that ends, and of the one that begins, without linear controls and
+    /// integrals.
+    pub(in crate::ocp) own: usize,
     pub(in crate::ocp) begins: usize,
     /// The last stage of the phase that ends, and whether its time is known there.
     pub(in crate::ocp) stage: usize,
@@ -92,8 +94,7 @@ impl<T: Real> Link<T> for Continuous {
         true
     }
     fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
-        let PhaseDims { ends: [nx, ..], begins, .. } = dims;
-        mismatch("Continuous", "output", [begins, nx])
+        mismatch("Continuous", "output", [dims.begins, dims.own])
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
         assign(values, end.x);
@@ -106,7 +107,7 @@ impl<T: Real> Link<T> for Continuous {
         (columns, ld): (&mut [T], usize),
     ) -> Result<(), OcpError> {
         assign(values, end.x);
-        (0..end.x.len()).for_each(|i| set(columns, i * ld + i, T::ONE));
+        (0..values.len()).for_each(|i| set(columns, i * ld + i, T::ONE));
         Ok(())
     }
     fn curve(&mut self, _: PhaseEnd<'_, T>, _: &[T], _: &mut Terms<'_, T>) {}

@@ -1,8 +1,11 @@
 //! Problems of several phases, solved as one.
 //!
 //! ```text
-//! phase 0: x₀ … x_N   →   x₀ = link(x_N, p) of phase 1 … x_N   →   …
+//! start   →   phase 0: x₀ … x_N   →   phase 1: x₀ = link(x_N, p of phase 0) … x_N   →   …
 //! ```
+//!
+//! What is decided where a phase begins, its parameters and what no link says, are controls of the
+//! stage before it: the last one of the phase before, or a stage without states, the start.
 //!
 //! | | |
 //! | --- | --- |
@@ -28,13 +31,14 @@ use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::instance::{HeapOcp, Initial, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::program::ends;
-use crate::qp::{HeapSolution, Qp, Solution, SolutionStage, StageDims, pad, room, zeros};
+use crate::qp::{HeapSolution, Qp, Solution, SolutionStage, StageDims, assign, pad, room, zeros};
 use crate::scalar::Real;
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 use phase::{Phase, Size};
+use transfer::Place;
 
 /// Problems that follow one another, solved as one: other models, other horizons, other controls.
 ///
@@ -93,6 +97,8 @@ pub struct Phases<'a, T = f64> {
     phases: Vec<Joined<'a, T>>,
     /// A point that is tried, as one of each phase; none before they are joined.
     trials: Vec<Trial<T>>,
+    /// The first state of all, as far as it is given.
+    start: Vec<T>,
 }
 
 /// A point of a phase, and the ends of its intervals and constraints there.
@@ -122,7 +128,7 @@ impl<'a, T: Real> Phases<'a, T> {
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
     {
-        Self { phases: vec![Joined::new(first)], trials: Vec::new() }
+        Self { phases: vec![Joined::new(first)], trials: Vec::new(), start: Vec::new() }
     }
 
     /// With another phase, which begins where the link says.
@@ -138,8 +144,8 @@ impl<'a, T: Real> Phases<'a, T> {
         self
     }
 
-    /// One problem of all phases, whose iterate is the guess of each. Stages are those of the
-    /// phases, one after the other, the last of each and the first of the next two of them.
+    /// One problem of all phases, whose iterate is the guess of each. Its stages are the start and
+    /// those of the phases, one after the other.
     ///
     /// What is set in a phase afterwards takes another `join`.
     ///
@@ -151,16 +157,18 @@ impl<'a, T: Real> Phases<'a, T> {
     pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
-        let mut begins: Vec<usize> = self.phases.iter().skip(1).map(|next| next.size.begins()).collect();
-        begins.push(0);
-        for (phase, begins) in self.phases.iter_mut().zip(begins) {
+        let mut decided: Vec<usize> = self.phases.iter().map(|phase| phase.size.decided()).collect();
+        decided.push(0);
+        let mut decided = decided.into_iter();
+        dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
+        for (phase, decided) in self.phases.iter_mut().zip(decided) {
             phase.first = dims.len();
             let of_phase = phase.problem.qp().dims();
             room(&mut dims, of_phase.len())?;
             let (nx, free) = (phase.size.nx, phase.size.free);
             dims.extend(of_phase.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
-                last.nu = begins;
+                last.nu = decided;
             }
             room(&mut self.trials, 1)?;
             self.trials.push(Trial { at: Solution::new(of_phase)?, ends: zeros(ends(of_phase))? });
@@ -170,7 +178,8 @@ impl<'a, T: Real> Phases<'a, T> {
             qp: Qp::new(&dims)?,
             iterate: Solution::new(&dims)?,
             data: zeros(2 * rows + scratch)?,
-            initial: self.initial(),
+            // The start has no states.
+            initial: Initial::Fixed,
             problem: self,
             objective: T::ZERO,
             stages: [T::ZERO; 2],
@@ -193,7 +202,10 @@ impl<'a, T: Real> Phases<'a, T> {
                 return Err(OcpError::Phase { phase: index, model: phase.problem.names().model, what });
             }
             phase.problem.check()?;
+            phase.size = phase.problem.size();
+            phase.size.given = if index == 0 { phase.size.given } else { phase.size.own };
         }
+        self.start = self.given_start()?;
         for (phase, next) in self.phases.iter().zip(self.phases.iter().skip(1)) {
             if let Some(link) = &phase.link {
                 link.check(phase.problem.dims(next.size.own))?;
@@ -202,12 +214,14 @@ impl<'a, T: Real> Phases<'a, T> {
         Ok(())
     }
 
-    /// What is known of the first state of all.
-    fn initial(&self) -> Initial {
-        match self.phases.first() {
-            Some(first) if first.size.free > 0 && first.problem.initial() == Initial::Fixed => Initial::Partly,
-            first => first.map_or(Initial::Unknown, |first| first.problem.initial()),
+    /// The first state of all, as far as it is given.
+    fn given_start(&self) -> Result<Vec<T>, OcpError> {
+        let Some(Joined { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let mut start = zeros(size.given)?;
+        if let Some(first) = problem.qp().stage(0) {
+            assign(&mut start, first.x_bounds().lower);
         }
+        Ok(start)
     }
 
     /// How large the phase behind each one is.
@@ -215,7 +229,7 @@ impl<'a, T: Real> Phases<'a, T> {
         self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
     }
 
-    /// The phase of a stage of the whole.
+    /// The phase of a stage of the whole; none of the start.
     fn at(&self, stage: usize) -> Option<(usize, &Joined<'a, T>)> {
         self.phases.iter().enumerate().rev().find(|(_, phase)| phase.first <= stage)
     }
@@ -225,20 +239,23 @@ impl<'a, T: Real> Phases<'a, T> {
     fn write_bounds(&mut self, qp: &mut Qp<T, Vec<StageDims>, Vec<T>>, given: &mut [T]) {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
-        for index in 0..self.phases.len() {
-            let next = self.phases.get(index + 1).map(|next| (next.size, &*next.problem));
-            let Some(Joined { problem, size, .. }) = self.phases.get(index) else { return };
+        let mut before = stages.next();
+        for (index, Joined { problem, size, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
-                let Some(mut to) = stages.next() else { return };
-                transfer::bounds(*size, &from, &mut to, index > 0 && k == 0);
-                if k == size.intervals
-                    && let Some((size, next)) = next
-                    && let Some(first) = next.qp().stage(0)
+                if k == 0
+                    && let Some(mut before) = before.take()
                 {
-                    transfer::ranges(size, &first, &mut to);
+                    transfer::decided_bounds(*size, &from, &mut before);
                 }
+                let Some(mut to) = stages.next() else { return };
+                let place = match (index, k) {
+                    (0, 0) => Place::Start,
+                    (_, 0) => Place::Begin,
+                    _ => Place::Inside,
+                };
+                transfer::bounds(*size, &from, &mut to, place);
+                before = Some(to);
             }
-            let Some(Joined { problem, .. }) = self.phases.get_mut(index) else { return };
             for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given()) {
                 let (own, behind) = core::mem::take(to).split_at_mut(from.len());
                 own.copy_from_slice(from);
@@ -249,16 +266,19 @@ impl<'a, T: Real> Phases<'a, T> {
 
     /// The iterates of all phases as that of the whole.
     fn store(&self, to: &mut HeapSolution<T>) {
-        let firsts = self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
-        let nexts = firsts.skip(1).map(Some).chain([None]);
+        let firsts = || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
+        let nexts = firsts().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
             let next = next.and_then(|(size, first)| Some((size, first?)));
             let last = phase.size.intervals;
             let stages = phase.problem.iterate().stages().enumerate();
             stages.map(move |(k, stage)| (phase.size, stage, next.filter(|_| k == last)))
         });
+        let mut start = firsts().next().and_then(|(size, first)| Some((size, first?)));
         to.each_stage_mut(|to| {
-            if let Some((size, from, next)) = stages.next() {
+            if let Some((size, first)) = start.take() {
+                transfer::decide(size, &first, to.u, to.u_lower, to.u_upper);
+            } else if let Some((size, from, next)) = stages.next() {
                 transfer::store(size, &from, to, next);
             }
         });
@@ -266,7 +286,7 @@ impl<'a, T: Real> Phases<'a, T> {
 
     /// The part of each phase in a point of the whole, as its iterate.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
-        let mut before = None;
+        let mut before = stages.next();
         for Joined { problem, size, .. } in &mut self.phases {
             before = transfer::load(*size, &mut stages, problem.iterate_mut(), before);
         }

@@ -10,9 +10,10 @@ use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::program::Parts;
 use crate::ocp::solution::outcome::Outcome;
-use crate::qp::{HeapSolution, QpError, QpField, QpView, Side, SolutionStage, marked, part};
+use crate::qp::{HeapSolution, QpError, QpField, QpView, Side, SolutionStage, assign, marked, part};
 use crate::scalar::Real;
 use crate::shape::Shape;
+use core::ops::Range;
 
 /// The Hessian that a solver takes.
 #[derive(Clone, Copy)]
@@ -32,13 +33,20 @@ pub(super) struct Size {
     pub own: usize,
     /// Linear controls.
     pub linear: usize,
+    /// States whose start the link says; those up to `own + linear` behind them are decided.
+    pub given: usize,
     pub intervals: usize,
 }
 
 impl Size {
-    /// What is free where the phase begins: its linear controls, and its parameters.
-    pub fn begins(&self) -> usize {
-        self.linear + self.free
+    /// The states that are decided where the phase begins.
+    pub fn states(&self) -> Range<usize> {
+        self.given..self.own + self.linear
+    }
+
+    /// How much is decided there: these states, then the parameters.
+    pub fn decided(&self) -> usize {
+        self.states().len() + self.free
     }
 }
 
@@ -51,7 +59,6 @@ pub(super) trait Phase<T: Real> {
     /// What a phase cannot be, of the first one or of another; then its start is free.
     fn refused(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
-    fn initial(&self) -> Initial;
     fn qp(&self) -> QpView<'_, T>;
     fn iterate(&self) -> &HeapSolution<T>;
     fn iterate_mut(&mut self) -> &mut HeapSolution<T>;
@@ -67,6 +74,15 @@ pub(super) trait Phase<T: Real> {
     fn complete(&mut self, outcome: &mut Outcome);
 }
 
+impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
+    /// The first state of the iterate, as far as it is given.
+    fn begin_where_it_is_given(&mut self) {
+        let own = self.names().own_states();
+        let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else { return };
+        assign(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
+    }
+}
+
 impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<P, T> {
     fn size(&self) -> Size {
         let names = self.names();
@@ -75,6 +91,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
             free: self.free.count(),
             own: names.own_states(),
             linear: names.linear.len(),
+            given: if self.initial == Initial::Free { 0 } else { names.own_states() },
             intervals: self.intervals(),
         }
     }
@@ -84,6 +101,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn dims(&self, begins: usize) -> PhaseDims {
         PhaseDims {
             ends: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
+            own: self.names().own_states(),
             begins,
             stage: self.intervals(),
             is_timed: self.free.view().end().is_none(),
@@ -103,6 +121,9 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         if !is_first && matches!(self.initial, Initial::Fixed | Initial::Partly) {
             return Some("an initial state of its own: the link before it says what it is");
         }
+        if is_first && self.initial != Initial::Free {
+            self.begin_where_it_is_given();
+        }
         if !is_first {
             self.initial = Initial::Free;
         }
@@ -111,9 +132,6 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     }
     fn check(&mut self) -> Result<(), OcpError> {
         self.check()
-    }
-    fn initial(&self) -> Initial {
-        self.initial
     }
     fn qp(&self) -> QpView<'_, T> {
         self.qp.view()

@@ -12,7 +12,6 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::ocp::solution::outcome::Outcome;
-use crate::qp::element::set;
 use crate::qp::{
     Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, assign,
     check, part, part_mut, take_mut,
@@ -83,9 +82,15 @@ impl<T: Real> Program<T> for Phases<'_, T> {
     ) -> Result<T, OcpError> {
         let length = intervals_end(ocp.qp.dims());
         let (mut ends, mut values) = ends.split_at_mut_checked(length).unwrap_or_default();
-        let (mut objective, mut stages, mut before) = (T::ZERO, at.stages(), None);
-        let Phases { phases, trials } = &mut ocp.problem;
-        let mut nexts = phases.iter().map(|phase| phase.size).skip(1).collect::<Vec<_>>().into_iter();
+        let (mut objective, mut stages) = (T::ZERO, at.stages());
+        let Phases { phases, trials, start } = &mut ocp.problem;
+        let mut nexts = phases.iter().map(|phase| phase.size).collect::<Vec<_>>().into_iter();
+        let mut before = stages.next();
+        if let (Some(size), Some(decided)) = (nexts.next(), before) {
+            let first = take_mut(&mut ends, size.nx + size.free);
+            assign(first, start);
+            transfer::begin(size, decided.u, first);
+        }
         for (phase, trial) in phases.iter_mut().zip(trials) {
             let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
             objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
@@ -109,7 +114,8 @@ impl<T: Real> Program<T> for Phases<'_, T> {
     }
 
     fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
-        self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1)
+        let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
+        core::iter::once(0..1).chain(phases)
     }
 
     fn name<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
@@ -194,13 +200,9 @@ impl<T: Real> Joined<'_, T> {
         whole: &SolutionStage<'_, T>,
         start: &mut [T],
     ) -> Result<(), OcpError> {
-        let (x, w) = start.split_at_mut_checked(next.nx).unwrap_or_default();
-        let (own, others) = x.split_at_mut_checked(next.own).unwrap_or_default();
         let (Some(link), Some(last)) = (&mut self.link, trial.at.stages().next_back()) else { return Ok(()) };
-        link.value(self.problem.end(last), own)?;
-        others.fill(T::ZERO);
-        assign(others, part(whole.u, 0, next.linear));
-        assign(w, part(whole.u, next.linear, next.free));
+        link.value(self.problem.end(last), part_mut(start, 0, next.given))?;
+        transfer::begin(next, whole.u, start);
         Ok(())
     }
 }
@@ -221,20 +223,17 @@ fn write_link<T: Real>(
     let columns = part_mut(matrix, 0, *states * ld);
     columns.fill(T::ZERO);
     offset.fill(T::ZERO);
-    link.linearise(end, part_mut(offset, 0, next.own), (&mut *columns, ld))?;
-    for (offset, column) in offset.iter_mut().zip(columns.chunks_exact(ld.max(1))).take(next.own) {
+    link.linearise(end, part_mut(offset, 0, next.given), (&mut *columns, ld))?;
+    for (offset, column) in offset.iter_mut().zip(columns.chunks_exact(ld.max(1))).take(next.given) {
         *offset = *offset - dot(column, v);
     }
     let own = size.nx + size.free;
-    let decided = (next.own..next.own + next.linear).chain(next.nx..next.nx + next.free);
-    for (j, state) in decided.enumerate() {
-        set(columns, state * ld + own + j, T::ONE);
-    }
+    transfer::begin_columns(next, own, columns, ld);
     if exact {
         // The gradient of what is quadratic is `∇f − H v`: with another `H`.
         add_symmetric(gradient, hessian, ld, v, n);
         let mut terms = Terms { free: end.free, gradient: &mut [], hessian: &mut **hessian, ld };
-        link.curve(end, part(pi, 0, next.own), &mut terms);
+        link.curve(end, part(pi, 0, next.given), &mut terms);
         convexify(convexification, hessian, ld, own, scratch);
         let product = part_mut(scratch, 0, ld);
         product.fill(T::ZERO);
@@ -256,6 +255,13 @@ impl<T: Real> Phases<'_, T> {
         let ((v, _), mut begin) = (at.vectors(), 0);
         let (mut stages, mut points) = (qp.stages_mut(), at.stages());
         let nexts = self.nexts();
+        if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first()) {
+            let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
+            [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
+            assign(offset, &self.start);
+            transfer::begin_columns(first.size, point.x.len(), matrix, ld);
+            begin += ld;
+        }
         for (Joined { problem, link, size, .. }, next) in self.phases.iter_mut().zip(nexts) {
             for (from, at) in problem.qp().stages().zip(problem.iterate().stages()) {
                 let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
@@ -276,23 +282,30 @@ impl<T: Real> Phases<'_, T> {
     /// A constraint of the QP by its name in its phase.
     fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
         let nothing = (Part::Dimensions, "");
-        let named = self.at(stage).and_then(|(number, phase)| {
-            let (k, Size { nx, free, intervals, .. }) = (stage - phase.first, phase.size);
-            let (number, place) = match field {
-                QpField::StateBounds if index >= nx => (number, (QpField::ControlBounds, k, index - nx)),
-                QpField::ControlBounds if k < intervals => (number, (field, k, index + free)),
-                QpField::ControlBounds => {
-                    let Size { own, linear, .. } = self.phases.get(number + 1)?.size;
-                    let parameter = index.checked_sub(linear);
-                    let linear = (QpField::StateBounds, 0, own + index);
-                    (number + 1, parameter.map_or(linear, |w| (QpField::ControlBounds, 0, w)))
-                }
-                _ => (number, (field, k, index)),
+        let find = || {
+            let found = self.at(stage);
+            let decides = found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
+            let (number, place) = if decides && field == QpField::ControlBounds {
+                let number = found.map_or(0, |(number, _)| number + 1);
+                let Size { given, .. } = self.phases.get(number)?.size;
+                let states = self.phases.get(number)?.size.states().len();
+                let state = (QpField::StateBounds, 0, given + index);
+                let parameter = index.checked_sub(states);
+                (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
+            } else {
+                let (number, phase) = found?;
+                let (k, Size { nx, free, .. }) = (stage - phase.first, phase.size);
+                let place = match field {
+                    QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
+                    QpField::ControlBounds => (field, k, index + free),
+                    _ => (field, k, index),
+                };
+                (number, place)
             };
             let name = self.phases.get(number)?.problem.name(place, side);
             Some(ConstraintName { phase: Some(number), ..name })
-        });
+        };
         let (part, name) = nothing;
-        named.unwrap_or(ConstraintName { part, stage, name, output: 0, point: 0, side, phase: None })
+        find().unwrap_or(ConstraintName { part, stage, name, output: 0, point: 0, side, phase: None })
     }
 }

@@ -10,12 +10,12 @@
 use super::phase::Size;
 use crate::qp::element::set;
 use crate::qp::{
-    Arrays, Bounds, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part, part_mut,
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part, part_mut,
 };
 use crate::scalar::Real;
 
-/// A point of the whole, at the stages of a phase, as one of the phase. What is decided at its end
-/// goes to `decided`; `before` are the multipliers of what was decided at its start.
+/// A point of the whole, at the stages of a phase, as one of the phase; `before` is the stage at
+/// which its start was decided, the result the one at its end.
 pub(super) fn load<'s, T: Real>(
     size: Size,
     from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
@@ -32,7 +32,7 @@ pub(super) fn load<'s, T: Real>(
 }
 
 fn load_stage<T: Real>(
-    Size { nx, free, linear, .. }: Size,
+    size @ Size { nx, free, .. }: Size,
     from: &SolutionStage<'_, T>,
     to: SolutionStageMut<'_, T>,
     before: Option<SolutionStage<'_, T>>,
@@ -51,10 +51,14 @@ fn load_stage<T: Real>(
     assign(to.dynamics, from.dynamics);
     assign(to.g_lower, from.g_lower);
     assign(to.g_upper, from.g_upper);
-    // The ranges of parameters are bounds of where they are decided.
+    // What is decided has its bounds where it is.
     if let Some(before) = before {
-        assign(to.u_lower, part(before.u_lower, linear, free));
-        assign(to.u_upper, part(before.u_upper, linear, free));
+        for (from, x, u) in [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
+        {
+            let (states, parameters) = from.split_at_checked(size.states().len()).unwrap_or_default();
+            assign(x.get_mut(size.states()).unwrap_or_default(), states);
+            assign(u, part(parameters, 0, free));
+        }
     }
 }
 
@@ -79,13 +83,25 @@ pub(super) fn store<T: Real>(
     assign(to.dynamics, from.dynamics);
     assign(to.g_lower, from.g_lower);
     assign(to.g_upper, from.g_upper);
-    if let Some((Size { own, linear, free, .. }, next)) = next {
-        let (of_linear, of_free) = to.u.split_at_mut_checked(linear).unwrap_or_default();
-        assign(of_linear, part(next.x, own, linear));
-        assign(of_free, part(next.u, 0, free));
-        for (to, from) in [(to.u_lower, next.u_lower), (to.u_upper, next.u_upper)] {
-            assign(to.get_mut(linear..).unwrap_or_default(), part(from, 0, free));
-        }
+    if let Some((size, next)) = next {
+        decide(size, &next, to.u, to.u_lower, to.u_upper);
+    }
+}
+
+/// What is decided where a phase begins, from its first stage, with the multipliers of its bounds.
+pub(super) fn decide<T: Real>(
+    size: Size,
+    first: &SolutionStage<'_, T>,
+    to: &mut [T],
+    lower: &mut [T],
+    upper: &mut [T],
+) {
+    for (to, x, u) in
+        [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
+    {
+        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
+        assign(states, x.get(size.states()).unwrap_or_default());
+        assign(parameters, u);
     }
 }
 
@@ -95,67 +111,73 @@ fn lists<'a, T>(bounds: &Bounds<'a, T>) -> [&'a [T]; 6] {
     [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
 }
 
-/// Bounds of a stage. Where a phase begins behind another one, those of its parameters are bounds
-/// of where they are decided, and integrals have none: the link says that they are zero.
+/// Six vectors of bounds and penalties.
+fn lists_mut<T>(bounds: BoundsMut<'_, T>) -> [&mut [T]; 6] {
+    let BoundsMut { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = bounds;
+    [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
+}
+
+/// Where in a horizon of phases a stage is, for its bounds.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Place {
+    /// The first stage of all: its states are given or decided.
+    Start,
+    /// The first stage of another phase.
+    Begin,
+    Inside,
+}
+
+/// Bounds of a stage, without those of what is decided before it, and of integrals where these
+/// begin.
 pub(super) fn bounds<T: Real>(
-    Size { nx, free, own, linear, .. }: Size,
+    Size { nx, free, own, .. }: Size,
     from: &Stage<'_, T>,
     to: &mut StageMut<'_, T>,
-    begins: bool,
+    place: Place,
 ) {
-    let (x, u, g) = (from.x_bounds(), from.u_bounds(), from.g_bounds());
-    let all = [lists(&x), lists(&u), lists(&g)];
-    let width = to.dims().nu;
-    let bounds = to.x_bounds_mut();
-    let [of_x, of_u, of_g] = all;
-    for (list, (x, u)) in [
-        bounds.lower,
-        bounds.upper,
-        bounds.lower_linear,
-        bounds.lower_quadratic,
-        bounds.upper_linear,
-        bounds.upper_quadratic,
-    ]
-    .into_iter()
-    .zip(of_x.into_iter().zip(of_u))
-    {
-        let (first, second) = list.split_at_mut_checked(nx).unwrap_or_default();
-        assign(part_mut(first, 0, if begins { own + linear } else { nx }), x);
-        if !begins {
-            assign(second, part(u, 0, free));
+    let of_u = lists(&from.u_bounds());
+    let count = match place {
+        Place::Start => 0,
+        Place::Begin => own,
+        Place::Inside => nx,
+    };
+    for (to, (x, u)) in lists_mut(to.x_bounds_mut()).into_iter().zip(lists(&from.x_bounds()).into_iter().zip(of_u)) {
+        assign(part_mut(to, 0, count), x);
+        if place == Place::Inside {
+            assign(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
         }
     }
-    let controls = to.u_bounds_mut();
-    copy(of_u.map(|list| list.get(free..).unwrap_or_default()), controls, width);
-    copy(of_g, to.g_bounds_mut(), usize::MAX);
-}
-
-/// The ranges of the parameters of a phase, as bounds of what is decided at the stage before.
-pub(super) fn ranges<T: Real>(
-    Size { free, linear, .. }: Size,
-    first: &Stage<'_, T>,
-    to: &mut StageMut<'_, T>,
-) {
-    let (bounds, mut to) = (first.u_bounds(), to.u_bounds_mut());
-    for w in 0..free {
-        let [lower, upper, ..] = lists(&bounds).map(|list| list.get(w).copied().unwrap_or(T::ZERO));
-        to.set(linear + w, lower, upper);
+    for (to, from) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_u) {
+        assign(to, from.get(free..).unwrap_or_default());
+    }
+    for (to, from) in lists_mut(to.g_bounds_mut()).into_iter().zip(lists(&from.g_bounds())) {
+        assign(to, from);
     }
 }
 
-fn copy<T: Real>(from: [&[T]; 6], to: crate::qp::BoundsMut<'_, T>, most: usize) {
-    for (to, from) in [
-        to.lower,
-        to.upper,
-        to.lower_linear,
-        to.lower_quadratic,
-        to.upper_linear,
-        to.upper_quadratic,
-    ]
-    .into_iter()
-    .zip(from)
-    {
-        assign(to, part(from, 0, from.len().min(most)));
+/// Bounds of what is decided where a phase begins, from its first stage.
+pub(super) fn decided_bounds<T: Real>(size: Size, first: &Stage<'_, T>, to: &mut StageMut<'_, T>) {
+    let of_first = lists(&first.x_bounds()).into_iter().zip(lists(&first.u_bounds()));
+    for (to, (x, u)) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_first) {
+        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
+        assign(states, x.get(size.states()).unwrap_or_default());
+        assign(parameters, part(u, 0, size.free));
+    }
+}
+
+/// Where a phase begins: what is decided, and zero of what is neither decided nor given.
+pub(super) fn begin<T: Real>(size: Size, decided: &[T], start: &mut [T]) {
+    let (states, parameters) = decided.split_at_checked(size.states().len()).unwrap_or_default();
+    let (x, w) = start.split_at_mut_checked(size.nx).unwrap_or_default();
+    x.get_mut(size.given..).unwrap_or_default().fill(T::ZERO);
+    assign(x.get_mut(size.states()).unwrap_or_default(), states);
+    assign(w, parameters);
+}
+
+/// The same as columns of the QP, where what is decided are the variables from `first` on.
+pub(super) fn begin_columns<T: Real>(size: Size, first: usize, columns: &mut [T], ld: usize) {
+    for (j, state) in size.states().chain(size.nx..size.nx + size.free).enumerate() {
+        set(columns, state * ld + first + j, T::ONE);
     }
 }
 
