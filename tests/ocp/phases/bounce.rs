@@ -1,7 +1,9 @@
 //! A ball that hits the ground at a time that is found.
 
 use crate::Test;
-use casados::ocp::{GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Jump, OcpError, Phases, Problem};
+use casados::ocp::{
+    ExactFormulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Jump, OcpError, Phases, Problem,
+};
 use casados::prelude::*;
 
 /// Height and speed, in m and m/s, and the place along the ground; a wind that is a control.
@@ -31,21 +33,17 @@ mod ball {
     fn effort(_x: &State, u: f64, _p: &Flight) -> f64 {
         u * u
     }
-    #[function]
-    fn hurry(_x: &State, _u: f64, p: &Flight) -> f64 {
-        p.duration
-    }
 }
 
 const GRAVITY: f64 = 9.81;
 
 /// A ball that falls from a height and bounces `count` times, with a wind; each flight takes as
 /// long as it takes.
-fn flights(count: usize, n: usize) -> Result<Vec<HeapOcp<impl casados::ocp::ExactFormulation<f64>>>, OcpError> {
+fn flights(count: usize, n: usize) -> Result<Vec<HeapOcp<impl ExactFormulation<f64>>>, OcpError> {
     let flight = |index: usize| {
         let mut flight = Problem::new(Irk::<Ball, Gauss<2>>::new(Options::default())?)
             .running_cost(GeneralCost::<Effort>::new())
-            .on(Horizon::free(n, 0.01..=10.0, 0.3))?;
+            .on(Horizon::free(n, 0.01..=10.0, 0.6))?;
         flight.set_parameters(.., &[0.0, GRAVITY])?.guess(&[0.5, 0.0, 0.0, 0.0], &[0.0])?;
         if index < count {
             flight.bound("x.height", n.., 0.0, 0.0)?;
@@ -79,9 +77,8 @@ fn times_of_impact_are_those_of_the_closed_form() -> Test {
         for by_sqp in [false, true] {
             let mut flights = flights(count, 6)?;
             let (first, others) = flights.split_first_mut().ok_or("none")?;
-            let bounces = others.iter_mut().fold(Phases::new(first), |all, next| {
-                all.then(Jump::<Impact>::new(), next)
-            });
+            let bounces =
+                others.iter_mut().fold(Phases::new(first), |all, next| all.then(Jump::<Impact>::new(), next));
             let mut bounces = bounces.join()?;
             let outcome = if by_sqp {
                 HeapSqp::new(&bounces)?.solve(&mut bounces)?
@@ -103,9 +100,8 @@ fn times_of_impact_are_those_of_the_closed_form() -> Test {
     Ok(())
 }
 
-/// The best wind of one bounce: accelerations `u₁`, `u₂` that fall linearly, by Pontryagin's
-/// principle in closed form. In each flight `u = −½ (a (τ − t) + b)` with the multipliers of the
-/// place, which goes through the impact, and of the drift, of which the impact leaves 0.9; both
+/// The best wind of one bounce, by Pontryagin's principle in closed form: it falls linearly in each
+/// flight, with the multipliers of the place and of the drift, of which the impact leaves 0.9. Both
 /// flights last as long as gravity says.
 #[test]
 fn multipliers_go_through_the_impact() -> Test {
@@ -116,14 +112,14 @@ fn multipliers_go_through_the_impact() -> Test {
     assert!(outcome.is_converged(), "{outcome}");
     drop(bounce);
     let [t1, t2] = durations(1)[..] else { return Err("two".into()) };
-    // u₂ = ½ λ (t₂ − t), u₁ = ½ λ (t₁ − t + 0.9 t₂), where λ is the multiplier of the place: the
-    // place at the end is λ/2 times the integral of the squares of these slopes.
+    // u₂ = ½ λ (t₂ − t), u₁ = ½ λ (t₁ − t + 0.9 t₂), where λ is the multiplier of the place. Where it
+    // ends, a metre away, is ½ λ times the integral of the squares of what ½ λ is multiplied by.
     let squares = (t2.powi(3) + (t1 + 0.9 * t2).powi(3) - (0.9 * t2).powi(3)) / 3.0;
     let lambda = 2.0 / squares;
     let (one, other) = (flights[0].solution()?, flights[1].solution()?);
     let start = 0.5 * lambda * (t1 + 0.9 * t2);
-    // The control of an interval is the mean of the line in it, but for what stairs cost: the
-    // square of the length of an interval.
+    // The control of an interval is the mean of the line in it. Of the squares stairs lose the
+    // twelfth of those of an interval, 2e-6 of them.
     let h = t1 / 200.0;
     let first = one.control("u")?[0];
     assert!((first - (start - 0.25 * lambda * h)).abs() < 2e-5 * start, "{first} {start}");

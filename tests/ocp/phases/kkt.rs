@@ -40,11 +40,14 @@ pub fn variables(at: &SolutionStage<'_, f64>) -> Vec<f64> {
 /// Bounds with their multipliers hold at values.
 fn sides(bounds: &Bounds<'_, f64>, values: &[f64], lower: &[f64], upper: &[f64]) -> Test {
     for (i, &value) in values.iter().enumerate() {
-        for (distance, multiplier) in [(value - bounds.lower[i], lower[i]), (bounds.upper[i] - value, upper[i])] {
+        for (distance, multiplier) in
+            [(value - bounds.lower[i], lower[i]), (bounds.upper[i] - value, upper[i])]
+        {
             let size = 1.0 + value.abs();
             assert!(distance > -TOLERANCE * size, "{i}: {value} {bounds:?}");
             assert!(multiplier > -TOLERANCE, "{i}: {multiplier}");
-            let product = if distance.is_finite() { distance.abs().min(1.0) * multiplier } else { multiplier };
+            let product =
+                if distance.is_finite() { distance.abs().min(1.0) * multiplier } else { multiplier };
             assert!(product.abs() < TOLERANCE * (1.0 + multiplier.abs()), "{i}: {distance} {multiplier}");
         }
     }

@@ -122,7 +122,12 @@ fn stage(phase: usize) -> [f64; 4] {
 type Burning<P> = Result<HeapOcp<P>, OcpError>;
 
 /// A phase of known duration, with a guess that follows from one direction.
-fn burning(phase: usize, n: usize, x0: &mut [f64; 7], u: [f64; 3]) -> Burning<impl ExactFormulation<f64> + use<>> {
+fn burning(
+    phase: usize,
+    n: usize,
+    x0: &mut [f64; 7],
+    u: [f64; 3],
+) -> Burning<impl ExactFormulation<f64> + use<>> {
     let p = stage(phase);
     let direction = Constraint::<Direction>::new([1.0], [1.0]);
     let mut burning = Problem::new(Irk::<Burn, Gauss<4>>::new(Options::default())?)
@@ -139,7 +144,10 @@ fn last(n: usize, x0: &[f64; 7], u: [f64; 3]) -> Burning<impl ExactFormulation<f
     let orbit = target();
     let mut last = Problem::new(Irk::<Insertion, Gauss<4>>::new(Options::default())?)
         .path_constraints(direction)
-        .terminal_constraints((Constraint::<Orbit>::new(orbit, orbit), Constraint::<Direction>::new([1.0], [1.0])))
+        .terminal_constraints((
+            Constraint::<Orbit>::new(orbit, orbit),
+            Constraint::<Direction>::new([1.0], [1.0]),
+        ))
         .terminal_cost(GeneralCost::<Payload>::new())
         .on(Horizon::free(n, 0.1..=0.7, 0.65))?;
     last.set_parameters(.., &stage(3))?.guess(x0, &u)?.free_initial_state().guess_by_simulation()?;

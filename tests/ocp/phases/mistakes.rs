@@ -2,7 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Continuous, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Jump, OcpError, Part, Phases, Problem, Status,
+    Continuous, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, Jump, OcpError, Part, Phases, Problem,
+    Status,
 };
 use casados::prelude::*;
 
@@ -62,13 +63,17 @@ fn links_that_do_not_fit() -> Test {
     assert!(expected, "{error}");
     assert!(error.to_string().contains("`Three` has 3 outputs instead of 2"));
 
-    let error = Phases::new(&mut one).then(Jump::<OfThree>::new(), &mut other).join().err().ok_or("it fits")?;
+    let error =
+        Phases::new(&mut one).then(Jump::<OfThree>::new(), &mut other).join().err().ok_or("it fits")?;
     let expected =
         matches!(error, OcpError::LinkDimension { link: "OfThree", what: "x", expected: 2, found: 3 });
     assert!(expected, "{error}");
 
-    let error =
-        Phases::new(&mut one).then(Jump::<ByControl>::new(), &mut other).join().err().ok_or("there is none")?;
+    let error = Phases::new(&mut one)
+        .then(Jump::<ByControl>::new(), &mut other)
+        .join()
+        .err()
+        .ok_or("there is none")?;
     let expected =
         matches!(error, OcpError::NotThere { function: "ByControl", variable: "u", terminal: true });
     assert!(expected, "{error}");
@@ -77,11 +82,11 @@ fn links_that_do_not_fit() -> Test {
         Phases::new(&mut one).then(Jump::<ByTime>::new(), &mut other).join().err().ok_or("it is free")?;
     assert!(matches!(error, OcpError::DependsOnTime { function: "ByTime" }), "{error}");
 
-    let mut larger = Problem::new(Irk::<Carts, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(3, 0.1))?;
+    let mut larger =
+        Problem::new(Irk::<Carts, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(3, 0.1))?;
     larger.set_parameters(.., &[1.0])?.guess(&[0.0; 3], &[0.0])?;
     let error = Phases::new(&mut one).then(Continuous, &mut larger).join().err().ok_or("it fits")?;
-    let expected =
-        matches!(error, OcpError::LinkDimension { link: "Continuous", expected: 3, found: 2, .. });
+    let expected = matches!(error, OcpError::LinkDimension { link: "Continuous", expected: 3, found: 2, .. });
     assert!(expected, "{error}");
     Ok(())
 }
@@ -142,7 +147,8 @@ fn what_is_infeasible_is_said_of_its_phase() -> Test {
         } else {
             HeapIpm::new(&both)?.solve(&mut both)?
         };
-        let (Status::Infeasible { constraint, .. } | Status::InfeasibleQp { constraint, .. }) = outcome.status
+        let (Status::Infeasible { constraint, .. } | Status::InfeasibleQp { constraint, .. }) =
+            outcome.status
         else {
             return Err(format!("it is infeasible: {outcome}").into());
         };

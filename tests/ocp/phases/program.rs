@@ -120,7 +120,8 @@ fn derivatives_are_differences() -> Test {
     assert_eq!(dims.iter().map(|stage| stage.nu).collect::<Vec<_>>(), [3, 1, 1, 2, 2, 2, 2, 1, 1, 0]);
 
     // What links make of the ends, in this program once more.
-    let values = |ocp: &mut HeapOcp<Phases<'_>>, k: usize| Ok::<_, Box<dyn std::error::Error>>(first_order(ocp, k)?.1);
+    let values =
+        |ocp: &mut HeapOcp<Phases<'_>>, k: usize| Ok::<_, Box<dyn std::error::Error>>(first_order(ocp, k)?.1);
     let at = variables(&ocp.iterate().stage(3).ok_or("no stage")?);
     let [x0, x1, duration, linear, p] = at[..] else { return Err("five".into()) };
     let expected = [x0 * x0 * 1.3, (x0 * x1).sin(), 1.3 * duration + x1, linear, 0.0, p];
@@ -152,7 +153,9 @@ fn derivatives_are_differences() -> Test {
             for (i, weight) in weights.into_iter().enumerate() {
                 let change = (i + 1) as f64 * step;
                 let (plus, minus) = (at(change)?, at(-change)?);
-                for (sums, (plus, minus)) in [(&mut second, (plus.0, minus.0)), (&mut first, (plus.1, minus.1))] {
+                for (sums, (plus, minus)) in
+                    [(&mut second, (plus.0, minus.0)), (&mut first, (plus.1, minus.1))]
+                {
                     for (sum, (plus, minus)) in sums.iter_mut().zip(plus.into_iter().zip(minus)) {
                         *sum += weight / step * (plus - minus);
                     }

@@ -84,14 +84,10 @@ fn solution_is_that_of_the_recursion_of_riccati() -> Test {
         let weights = DMatrix::from_diagonal(&dvector![5.0, 1.0, 2.0]);
         let mut value =
             Value(weights.clone(), -(&weights * &target), 0.5 * (&weights * &target).dot(&target));
-        let (a, b) = (
-            dmatrix![1.0, 0.1, 0.0; 0.0, 0.8, 0.2; 0.0, 0.0, 0.7],
-            dmatrix![0.0, 0.0; 1.0, 0.0; -0.3, 1.0],
-        );
-        let (q, r) = (
-            DMatrix::from_diagonal(&dvector![0.2, 1.0, 0.4]),
-            DMatrix::from_diagonal(&dvector![0.1, 0.7]),
-        );
+        let (a, b) =
+            (dmatrix![1.0, 0.1, 0.0; 0.0, 0.8, 0.2; 0.0, 0.0, 0.7], dmatrix![0.0, 0.0; 1.0, 0.0; -0.3, 1.0]);
+        let (q, r) =
+            (DMatrix::from_diagonal(&dvector![0.2, 1.0, 0.4]), DMatrix::from_diagonal(&dvector![0.1, 0.7]));
         let mut gains = Vec::new();
         for _ in 0..second_intervals {
             let (before, gain, shift) = value.before([&a, &b, &q, &r], &DVector::zeros(3));

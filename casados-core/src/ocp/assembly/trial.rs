@@ -28,7 +28,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(in crate::ocp) fn evaluate_functions(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
+    pub(in crate::ocp) fn evaluate_functions(
+        &mut self,
+        at: &Solution<T, D, M>,
+        ends: &mut [T],
+    ) -> Result<T, OcpError> {
         let layout @ Layout { intervals, .. } = self.layout();
         let (nx, free) = (P::Shape::NX, self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
@@ -118,7 +122,13 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
             assign(lower, part(values, row, count));
-            shift_limits(columns, [n, ld], here, [lower, upper], given.map(|limits| part(limits, row, count)));
+            shift_limits(
+                columns,
+                [n, ld],
+                here,
+                [lower, upper],
+                given.map(|limits| part(limits, row, count)),
+            );
             (begin, row, ends) = (begin + ld, row + count, behind);
         }
     }

@@ -6,12 +6,10 @@
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.8.
 
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_first_fixed};
-use crate::ocp::program::Program;
-use crate::qp::{
-    Bounds, Places, QpView, StageDims, add_symmetric, assign, is_marked, part, part_mut,
-};
+use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, is_marked, part, part_mut};
 use crate::scalar::Real;
 use core::ops::Range as Stages;
 
@@ -199,12 +197,7 @@ fn units_of_variable<T: Real>(
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
-fn units_of_row<T: Real>(
-    qp: QpView<'_, T>,
-    v: &[T],
-    (stages, i): (Stages<usize>, usize),
-    units: &mut [T],
-) {
+fn units_of_row<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>, usize), units: &mut [T]) {
     let mut range = Range::EMPTY;
     let (mut slope, mut distance) = (T::ZERO, T::ZERO);
     for (place, stage) in

@@ -306,7 +306,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// A constraint of the QP by its name in the problem.
-    pub(in crate::ocp) fn name_of_row(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
+    pub(in crate::ocp) fn name_of_row(
+        &self,
+        field: QpField,
+        stage: usize,
+        index: usize,
+        side: Side,
+    ) -> ConstraintName {
         let names = self.names();
         let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
         let mut point = 0;

@@ -3,9 +3,9 @@
 use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::ipm::HeapIpm;
 use crate::ocp::nlp::sqp::HeapSqp;
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Outcome;
 use crate::qp::QpSolver;
 use crate::scalar::Real;

@@ -176,7 +176,9 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
     fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
         let own = [F::Shape::NX, F::Shape::NU, F::Shape::NP, F::Shape::NZ];
         let name = F::STRUCTURE.name;
-        for (argument, (expected, found)) in ["x", "u", "p", "z"].into_iter().zip(dims.ends.into_iter().zip(own)) {
+        for (argument, (expected, found)) in
+            ["x", "u", "p", "z"].into_iter().zip(dims.ends.into_iter().zip(own))
+        {
             mismatch(name, argument, [expected, found])?;
         }
         mismatch(name, "output", [dims.begins, F::Outputs::NY])?;

@@ -78,7 +78,9 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// The first state of the iterate, as far as it is given.
     fn begin_where_it_is_given(&mut self) {
         let own = self.names().own_states();
-        let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else { return };
+        let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
+            return;
+        };
         assign(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
     }
 }

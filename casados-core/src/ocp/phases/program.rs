@@ -13,8 +13,8 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::ocp::solution::outcome::Outcome;
 use crate::qp::{
-    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, assign,
-    check, part, part_mut, take_mut,
+    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, assign, check,
+    part, part_mut, take_mut,
 };
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -255,7 +255,8 @@ impl<T: Real> Phases<'_, T> {
         let ((v, _), mut begin) = (at.vectors(), 0);
         let (mut stages, mut points) = (qp.stages_mut(), at.stages());
         let nexts = self.nexts();
-        if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first()) {
+        if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
+        {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
             assign(offset, &self.start);

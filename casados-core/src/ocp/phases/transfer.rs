@@ -10,7 +10,8 @@
 use super::phase::Size;
 use crate::qp::element::set;
 use crate::qp::{
-    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part, part_mut,
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part,
+    part_mut,
 };
 use crate::scalar::Real;
 
@@ -53,7 +54,8 @@ fn load_stage<T: Real>(
     assign(to.g_upper, from.g_upper);
     // What is decided has its bounds where it is.
     if let Some(before) = before {
-        for (from, x, u) in [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
+        for (from, x, u) in
+            [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
         {
             let (states, parameters) = from.split_at_checked(size.states().len()).unwrap_or_default();
             assign(x.get_mut(size.states()).unwrap_or_default(), states);
@@ -141,7 +143,9 @@ pub(super) fn bounds<T: Real>(
         Place::Begin => own,
         Place::Inside => nx,
     };
-    for (to, (x, u)) in lists_mut(to.x_bounds_mut()).into_iter().zip(lists(&from.x_bounds()).into_iter().zip(of_u)) {
+    for (to, (x, u)) in
+        lists_mut(to.x_bounds_mut()).into_iter().zip(lists(&from.x_bounds()).into_iter().zip(of_u))
+    {
         assign(part_mut(to, 0, count), x);
         if place == Place::Inside {
             assign(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));

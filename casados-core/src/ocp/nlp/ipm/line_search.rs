@@ -7,10 +7,10 @@ use super::kkt::work::Work;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, GAMMA_PHI, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides,
 };
+use crate::ocp::program::Program;
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
@@ -140,8 +140,7 @@ where
                 return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
-            let bends =
-                !P::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
+            let bends = !P::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
             if alpha == longest
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
@@ -188,11 +187,7 @@ where
     }
 
     /// The point and the slacks after a part of the step.
-    pub fn place_trial<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        part_of_step: T,
-    ) -> Option<()> {
+    pub fn place_trial<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, part_of_step: T) -> Option<()> {
         ocp.step_length = Some(part_of_step);
         let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         self.trial.copy_from(&ocp.iterate);

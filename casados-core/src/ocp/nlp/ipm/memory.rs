@@ -75,11 +75,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
 }
 
 /// Numbers of Newton's equations, numbers beside them, and indices.
-const fn lengths<P: Program<T>, T: Real>(
-    dims: &[StageDims],
-    bounds: usize,
-    equations: usize,
-) -> [usize; 3] {
+const fn lengths<P: Program<T>, T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
     let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
     let work = Work::<T>::length(dims, ends(dims), &counts);
     [Iterate::<T>::memory(dims, &counts) + equations, work, counts.indices()]

@@ -28,8 +28,8 @@ pub use options::{Globalisation, SqpOptions};
 
 use crate::ocp::assembly::curvature::{Exact, GaussNewton};
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::program::Program;
 use crate::ocp::nlp::elastic;
+use crate::ocp::program::Program;
 #[cfg(feature = "alloc")]
 use crate::ocp::solution::log::{Iteration, Log};
 #[cfg(feature = "alloc")]

@@ -5,10 +5,10 @@ use super::state::State;
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, larger};
@@ -75,11 +75,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Makes a simulation with the controls of the guess the iterate and linearises there; what was
     /// the iterate is a trial then. What it violates, if it has values.
-    fn simulate_guess<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        start: SecondStart,
-    ) -> Option<f64>
+    fn simulate_guess<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, start: SecondStart) -> Option<f64>
     where
         C: Curvature<P::Dynamics, T>,
     {

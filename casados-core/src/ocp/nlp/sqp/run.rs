@@ -10,9 +10,9 @@ use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::solver::{self, Method, Next};
 use crate::ocp::nlp::watch::Watch;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
@@ -167,11 +167,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The curvature of the QP along its step, of which the iterate has gone a part.
-    fn curvature_of_step<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
-    ) -> f64 {
+    fn curvature_of_step<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> f64 {
         self.scale(ocp, state, Way::Into);
         let curvature = ocp.curvature(&self.solution);
         self.scale(ocp, state, Way::Back);

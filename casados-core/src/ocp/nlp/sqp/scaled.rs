@@ -11,8 +11,8 @@ use super::Sqp;
 use super::state::State;
 use crate::ocp::assembly::units::{Sizes, Units, WIDE, of_tolerance};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::elastic::{self, Worst};
+use crate::ocp::program::Program;
 use crate::qp::interior::at;
 use crate::qp::{
     Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, pad, part, part_mut,
@@ -136,11 +136,7 @@ impl<T: Real> Scale<'_, T> {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Finds the units at the iterate, where the QP is written.
-    pub(super) fn find_units<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-    ) {
+    pub(super) fn find_units<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>) {
         let rows = self.work.as_mut().get_mut(penalties_end(ocp)..).unwrap_or_default();
         let Sizes { force, .. } = ocp.find_units(rows, self.trial.view_mut().v);
         let force = if (1.0 / WIDE..=WIDE).contains(&force) { 1.0 } else { power::<T>(force) };
@@ -178,12 +174,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP, the iterate and the solution, into units or back.
-    pub(super) fn scale<P: Program<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
-        way: Way,
-    ) {
+    pub(super) fn scale<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>, way: Way) {
         let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
         let scale = Scale { units, way, judges: false };
         scale.qp(&mut ocp.qp);

@@ -4,8 +4,8 @@ use super::scaling::{of_gaps, of_sides, sum};
 use crate::ocp::assembly::units::Units;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::ocp::nlp::filter::Measure;
+use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::qp::interior::{Iterate, Sides};
 use crate::qp::{Places, Solution, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
@@ -88,11 +88,12 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let rows = part_mut(rows, place.row, place.rows);
             assign(rows, part(v, place.v, place.n));
             let bounds = stage.g_bounds();
-            let [of_lower, of_upper, of_stage] = [&mut given_lower, &mut given_upper, &mut values].map(|list| {
-                let (own, behind) = list.split_at_checked(place.ng).unwrap_or_default();
-                *list = behind;
-                own
-            });
+            let [of_lower, of_upper, of_stage] =
+                [&mut given_lower, &mut given_upper, &mut values].map(|list| {
+                    let (own, behind) = list.split_at_checked(place.ng).unwrap_or_default();
+                    *list = behind;
+                    own
+                });
             let rows = rows.get_mut(place.ld..).unwrap_or_default();
             let limits = bounds.lower.iter().zip(bounds.upper).zip(of_lower.iter().zip(of_upper));
             for ((row, &value), ((&lower, &upper), (&given_lower, &given_upper))) in

@@ -3,7 +3,6 @@
 use super::phase::exit;
 use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
@@ -11,6 +10,7 @@ use crate::ocp::nlp::ipm::violations::Phase;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
