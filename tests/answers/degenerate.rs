@@ -182,7 +182,8 @@ fn d07_waechter_biegler() -> Test {
     let mut ocp = on_one!(problem!(First, TwoSides, [1.0, 0.5], [NONE, NONE]), [-2.0, 0.0]);
     ocp.bound("u[1]", .., 0.0, 0.0)?;
     let (part, side) = (Part::PathBounds, Side::Lower);
-    let expected = ConstraintName { part, stage: 0, name: "TwoSides", output: 1, point: 0, side };
+    let expected =
+        ConstraintName { part, stage: 0, name: "TwoSides", output: 1, point: 0, side, phase: None };
     run(&mut ocp, |ocp, outcome| {
         let solved = outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6);
         solved || (is_infeasible(outcome, expected, 1.5) && near(&u(ocp), &[-1.0, 0.0], 1e-4))
@@ -228,7 +229,7 @@ fn d11_state_out_of_reach() -> Test {
     let mut ocp = on_one!(problem!(Energy), [0.0, 0.0]);
     ocp.bound("u[0]", .., -1.0, 1.0)?.bound("x[0]", 1.., 3.0, 4.0)?;
     let (part, side) = (Part::StateBounds, Side::Lower);
-    let expected = ConstraintName { part, stage: 1, name: "x[0]", output: 0, point: 0, side };
+    let expected = ConstraintName { part, stage: 1, name: "x[0]", output: 0, point: 0, side, phase: None };
     run(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 2.0))?;
     Ok(())
 }
@@ -254,7 +255,7 @@ fn d12_contradictory_equations() -> Test {
 fn d13_no_real_solution() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Square, [-NONE], [-1.0]), [0.5, 0.0]);
     let (part, side) = (Part::PathBounds, Side::Upper);
-    let expected = ConstraintName { part, stage: 0, name: "Square", output: 0, point: 0, side };
+    let expected = ConstraintName { part, stage: 0, name: "Square", output: 0, point: 0, side, phase: None };
     run(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 1.0))?;
     Ok(())
 }

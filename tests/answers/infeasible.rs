@@ -43,6 +43,7 @@ fn out_of_reach() -> Test {
             output: 0,
             point: 0,
             side: Side::Lower,
+            phase: None,
         };
         match outcome.status {
             Status::Infeasible { constraint, violation } if elastic => {

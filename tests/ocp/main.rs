@@ -33,6 +33,7 @@ mod ipm;
 mod lifted;
 mod linear_equations;
 mod options;
+mod phases;
 mod random;
 mod real_time;
 mod scaling;

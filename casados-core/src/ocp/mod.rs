@@ -84,6 +84,9 @@ mod dynamics;
 mod feedback;
 mod formulation;
 mod nlp;
+#[cfg(feature = "alloc")]
+mod phases;
+mod program;
 mod solution;
 
 pub use assembly::convexify::Convexification;
@@ -136,6 +139,12 @@ pub use nlp::ocp_solver::OcpSolver;
 #[cfg(feature = "alloc")]
 pub use nlp::sqp::HeapSqp;
 pub use nlp::sqp::{Globalisation, Sqp, SqpOptions};
+#[cfg(feature = "alloc")]
+pub use phases::{Continuous, Jump, Link, PhaseDynamics, Phases};
+#[cfg(feature = "alloc")]
+#[doc(hidden)]
+pub use phases::{PhaseDims, PhaseEnd};
+pub use program::Program;
 pub use solution::log::{Iteration, Log, Times};
 pub use solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]

@@ -238,7 +238,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         Some(self.view_mut().into_stage(place))
     }
     /// All stages, in order, to be written.
-    #[cfg(feature = "casadi")]
+    #[cfg(feature = "alloc")]
     pub(crate) fn each_stage_mut(&mut self, mut write: impl FnMut(SolutionStageMut<'_, T>)) {
         let mut view = self.view_mut();
         for place in Places::<T>::new(view.dims) {

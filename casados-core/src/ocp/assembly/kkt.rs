@@ -53,8 +53,8 @@ fn conditions<T: Real, E: Packed<T>>(
     let mut penalties = 0.0;
     let mut arriving: &[T] = &[];
     let (periodic, shared) = (qp.periodic(), qp.shared());
-    let (first, last) = (qp.dims().first().copied().unwrap_or_default(), qp.dims().len().saturating_sub(1));
-    let ld = pad::<T>(first.nx + first.nu);
+    let last = qp.dims().len().saturating_sub(1);
+    let ld = pad::<T>(qp.dims().iter().map(|stage| stage.nx + stage.nu).max().unwrap_or(0));
     let (scratch, joint) = scratch.split_at_mut_checked(2 * ld).unwrap_or_default();
     let joint = part_mut(joint, 0, ld);
     joint.fill(T::ZERO);

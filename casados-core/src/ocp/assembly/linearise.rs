@@ -18,21 +18,12 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{Arrays, Residuals, StageDims, add_symmetric, assign, larger, pad, part, part_mut};
+use crate::qp::{Arrays, StageDims, add_symmetric, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
-    /// programming.
-    ///
-    /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
-        self.linearise_with_observer(curvature, &mut |_, _| {})
-    }
-
     /// [`Ocp::linearise`], and shows every interval to `watch`.
     pub(in crate::ocp) fn linearise_with_observer<C: Curvature<P::Dynamics, T>>(
         &mut self,
@@ -246,7 +237,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
     }
+}
 
+impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
     pub(in crate::ocp) fn forget_gradients(&mut self) {
         let (v, _) = self.iterate.vectors();
@@ -274,21 +267,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             begin += ld;
         }
     }
-
-    /// How well the iterate satisfies the conditions of optimality of the problem, and the
-    /// objective with penalties of soft bounds; after [`Ocp::linearise`].
-    #[must_use]
-    pub fn residuals(&mut self) -> (Residuals, f64) {
-        let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let (mut residuals, penalties) =
-            crate::ocp::assembly::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
-        if P::Dynamics::LIFTED {
-            let [_, stages] = self.stages;
-            residuals.dynamics = larger(residuals.dynamics, stages.to_f64());
-        }
-        (residuals, self.objective.to_f64() + penalties)
-    }
 }
 
 /// The costs of all intervals, and what is left of the equations of lifted stages.
@@ -313,16 +291,6 @@ pub(super) fn shift_limits<T: Real>(
         let shift = dot(part(column, 0, n), v) - *lower;
         (*lower, *upper) = (low + shift, high + shift);
     }
-}
-
-/// How many numbers `φ` of every interval and `g` of every stage are.
-pub(in crate::ocp) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
-    let path = match dims {
-        [first, .., _] => first.ng,
-        _ => 0,
-    };
-    let of_stage = P::Shape::NX.saturating_add(path);
-    dims.len().saturating_sub(1).saturating_mul(of_stage).saturating_add(P::Terminal::ROWS)
 }
 
 /// The distance of stages in vectors `v`.

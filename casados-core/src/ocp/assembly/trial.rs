@@ -5,7 +5,7 @@ use crate::linalg::dot;
 use crate::ocp::assembly::algebraic;
 #[cfg(feature = "alloc")]
 use crate::ocp::assembly::inside::{Costs, Rows};
-use crate::ocp::assembly::linearise::{ends, ld_of, shift_limits};
+use crate::ocp::assembly::linearise::shift_limits;
 use crate::ocp::assembly::start::link_start;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
@@ -15,6 +15,7 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nod
 use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::qp::{Arrays, Solution, StageDims, assign, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -27,7 +28,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
+    pub(in crate::ocp) fn evaluate_functions(
+        &mut self,
+        at: &Solution<T, D, M>,
+        ends: &mut [T],
+    ) -> Result<T, OcpError> {
         let layout @ Layout { intervals, .. } = self.layout();
         let (nx, free) = (P::Shape::NX, self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
@@ -96,40 +101,35 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.stages = of_stages;
         Ok(objective)
     }
+}
 
-    /// How many numbers `φ` of every interval and `g` of every stage are.
-    pub(crate) fn ends(&self) -> usize {
-        ends::<P, T>(self.qp.dims())
-    }
-
-    /// Rows of the path constraints.
-    pub(in crate::ocp) fn rows(&self) -> usize {
-        path_rows::<P, T>(self.layout())
-    }
-
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Constants of the linearised dynamics and constraints such that these are exact at some
     /// point, whose `ends` are given: what a second-order correction solves.
     pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
-        let layout @ Layout { intervals, .. } = self.layout();
-        let (nx, path) = (P::Shape::NX, path_rows::<P, T>(layout));
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let (v, _) = at.vectors();
-        let values = ends.get(intervals * nx..).unwrap_or_default();
-        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+        let Parts { qp, given, .. } = P::split(self);
+        let ((v, _), mut begin, mut row) = (at.vectors(), 0, 0);
+        let (mut ends, values) = ends.split_at_checked(intervals_end(qp.dims())).unwrap_or_default();
+        for mut stage in qp.stages_mut() {
+            let count = stage.dims().ng;
             let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
-            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
-            let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
+            let here = part(v, begin, n);
+            let (phi, behind) = ends.split_at_checked(next).unwrap_or_default();
             for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
                 *offset = x - dot(column, here);
             }
             let columns = matrix.get(next * ld..).unwrap_or_default();
-            let first = k * path;
-            let count = if k < intervals { path } else { P::Terminal::ROWS };
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
-            assign(lower, part(values, first, count));
-            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, first, count));
-            shift_limits(columns, [n, ld], here, [lower, upper], given);
+            assign(lower, part(values, row, count));
+            shift_limits(
+                columns,
+                [n, ld],
+                here,
+                [lower, upper],
+                given.map(|limits| part(limits, row, count)),
+            );
+            (begin, row, ends) = (begin + ld, row + count, behind);
         }
     }
 }

@@ -6,11 +6,12 @@
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.8.
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_first_fixed};
-use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, part, part_mut};
+use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, is_marked, part, part_mut};
 use crate::scalar::Real;
+use core::ops::Range as Stages;
 
 /// No unit is larger, or smaller than its inverse: squares of units are numbers.
 const FARTHEST: f64 = 1e12;
@@ -80,7 +81,7 @@ impl Range {
     }
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// All units at the iterate, where the QP was written without second derivatives of
     /// constraints.
     ///
@@ -88,15 +89,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn find_units(&self, rows: &mut [T], scratch: &mut [T]) -> Sizes {
         rows.fill(T::ONE);
         let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
-        let last = qp.dims.len().saturating_sub(1);
-        let variables = qp.dims.first().map_or(0, |dims| dims.nx + dims.nu);
-        for i in 0..variables {
-            units_of_variable(qp, v, i, rows);
-        }
-        let (path, terminal) = (0..last, last..last + 1);
-        for stages in [path, terminal] {
-            for i in 0..qp.dims.get(stages.start).map_or(0, |dims| dims.ng) {
-                units_of_row(qp, v, (stages.clone(), i), rows);
+        for span in self.problem.spans(qp.dims.len()) {
+            let last = span.end.saturating_sub(1);
+            let (path, terminal) = (span.start..last, last..span.end);
+            let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
+            for i in 0..nx + nu {
+                // Controls of the last stage are those that all stages share, or others.
+                let is_one = i < nx || is_marked(qp.shared(), i - nx);
+                let stages = if is_one { span.clone() } else { path.clone() };
+                units_of_variable(qp, v, (stages, i), rows);
+            }
+            let of_last = qp.dims.get(last).map_or(0, |dims| dims.nu);
+            for j in (0..of_last).filter(|&j| !is_marked(qp.shared(), j)) {
+                units_of_variable(qp, v, (terminal.clone(), nx + j), rows);
+            }
+            for stages in [path, terminal] {
+                for i in 0..qp.dims.get(stages.start).map_or(0, |dims| dims.ng) {
+                    units_of_row(qp, v, (stages.clone(), i), rows);
+                }
             }
         }
         let force = unit_of_forces(qp, v, rows, scratch);
@@ -156,10 +166,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
 /// one.
-fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut [T]) {
+fn units_of_variable<T: Real>(
+    qp: QpView<'_, T>,
+    v: &[T],
+    (stages, i): (Stages<usize>, usize),
+    units: &mut [T],
+) {
     let mut range = Range::EMPTY;
     let mut guess = T::ZERO;
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(place, _)| i < place.n) {
+    let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
+    let of_places = qp.stages().skip(stages.start);
+    for (place, stage) in places().zip(of_places) {
         guess = guess.max(at(v, (place.v + i) as u32).abs());
         let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
         let Bounds { lower, upper, .. } = bounds;
@@ -174,18 +191,13 @@ fn units_of_variable<T: Real>(qp: QpView<'_, T>, v: &[T], i: usize, units: &mut 
         range.add(guess);
     }
     let unit = range.unit_far_from_one();
-    for place in Places::<T>::new(qp.dims).filter(|place| i < place.n) {
+    for place in places() {
         set(units, place.row + i, unit);
     }
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
-fn units_of_row<T: Real>(
-    qp: QpView<'_, T>,
-    v: &[T],
-    (stages, i): (core::ops::Range<usize>, usize),
-    units: &mut [T],
-) {
+fn units_of_row<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>, usize), units: &mut [T]) {
     let mut range = Range::EMPTY;
     let (mut slope, mut distance) = (T::ZERO, T::ZERO);
     for (place, stage) in

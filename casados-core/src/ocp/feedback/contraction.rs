@@ -2,7 +2,6 @@
 //! reduce the merit function by beside what their QPs predict.
 
 use crate::linalg::dot;
-use crate::ocp::assembly::linearise;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::split;
@@ -152,7 +151,7 @@ type Reductions<P, T, D, M> =
 
 /// How many numbers a monitor takes for a problem: weights, and ends of intervals.
 pub(in crate::ocp) const fn memory<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> [usize; 2] {
-    [Solution::<T, (), ()>::memory(dims), linearise::ends::<P, T>(dims)]
+    [Solution::<T, (), ()>::memory(dims), crate::ocp::program::ends(dims)]
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Monitor<P, T, D, M> {

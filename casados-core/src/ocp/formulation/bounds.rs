@@ -18,6 +18,7 @@ use core::ops::{Range, RangeBounds};
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Bounds of a general constraint of a stage, as they were given.
+    #[cfg(feature = "casadi")]
     pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
         let (intervals, layout) = (self.intervals(), self.layout());
         let rows = intervals * path_rows::<P, T>(layout) + P::Terminal::ROWS;
@@ -305,8 +306,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// A constraint of the QP by its name in the problem.
-    #[must_use]
-    pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
+    pub(in crate::ocp) fn name_of_row(
+        &self,
+        field: QpField,
+        stage: usize,
+        index: usize,
+        side: Side,
+    ) -> ConstraintName {
         let names = self.names();
         let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
         let mut point = 0;
@@ -327,22 +333,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 None => (Part::PathBounds, P::Path::name(index)),
             },
         };
-        ConstraintName { part, stage, name, output, point, side }
-    }
-
-    /// The constraint that makes a QP infeasible.
-    #[must_use]
-    pub fn infeasible(&self, error: &QpError) -> Option<ConstraintName> {
-        match *error {
-            QpError::Infeasible { field, stage, index, side, .. } => {
-                Some(self.name(field, stage, index, side))
-            }
-            _ => None,
-        }
+        ConstraintName { part, stage, name, output, point, side, phase: None }
     }
 
     /// The derivative that makes a QP one without values.
-    pub(in crate::ocp) fn derivative(&self, error: &QpError) -> Option<OcpError> {
+    pub(in crate::ocp) fn derivative_without_value(&self, error: &QpError) -> Option<OcpError> {
         // Whatever a solver says of a QP without values. Derivatives come first in it, before the
         // bounds and constants that are made with them.
         if matches!(error, QpError::Infeasible { .. }) {

@@ -9,7 +9,7 @@ use crate::ocp::formulation::error::{OcpError, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{StageDims, marked};
+use crate::qp::StageDims;
 use crate::scalar::Real;
 use crate::structure::means;
 
@@ -102,29 +102,5 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn is_uncoupled(&self) -> Result<(), OcpError> {
         if self.qp().is_coupled() { Err(OcpError::Coupled) } else { Ok(()) }
-    }
-
-    /// Makes shared controls of the iterate those of stage 0.
-    pub(in crate::ocp) fn join_controls(&mut self) {
-        let intervals = self.intervals();
-        for j in marked(self.qp.view().shared()) {
-            let Some(value) = self.iterate.stage(0).and_then(|stage| stage.u.get(j).copied()) else { return };
-            for k in 1..=intervals {
-                if let Some(u) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(j)) {
-                    *u = value;
-                }
-            }
-        }
-    }
-
-    /// Makes periodic states of the last stage of the iterate those of the first one.
-    pub(in crate::ocp) fn join_states(&mut self) {
-        let last = self.intervals();
-        for i in marked(self.qp.view().periodic()) {
-            let Some(value) = self.iterate.stage(0).and_then(|stage| stage.x.get(i).copied()) else { return };
-            if let Some(x) = self.iterate.stage_mut(last).and_then(|stage| stage.x.get_mut(i)) {
-                *x = value;
-            }
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! Bounds that contradict each other before anything is evaluated: those of variables that are one.
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{Bounds, QpField, Side, StageDims, marked};
 use crate::scalar::Real;
@@ -32,7 +32,7 @@ impl Interval {
     }
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Infeasible, if hard bounds of a shared control at several stages, or those of a periodic
     /// state at both ends, have no number in common: the lower bound is violated by the distance
     /// between both where the upper one holds.

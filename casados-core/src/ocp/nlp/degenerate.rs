@@ -3,7 +3,7 @@
 
 use crate::linalg::dot;
 use crate::ocp::formulation::instance::{Initial, Ocp};
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::{Bounds, Places, Solution, StageDims, part};
 use crate::scalar::Real;
 
@@ -22,7 +22,7 @@ pub(super) enum Perturbed {
     States,
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Whether there is such a constraint at the iterate, where the QP was written.
     pub(super) fn has_vanishing_gradient(&self) -> bool {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());

@@ -2,7 +2,7 @@
 //! solution.
 
 use crate::ocp::formulation::instance::{Initial, Ocp};
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 pub(in crate::ocp) use crate::qp::Violation as Worst;
 use crate::qp::{StageDims, pad, worst};
 use crate::scalar::Real;
@@ -21,7 +21,7 @@ const fn rows(dims: StageDims) -> usize {
     dims.nx.saturating_add(dims.nu).saturating_add(dims.ng)
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Remembers all linear penalties: pairs of those of lower and upper bounds.
     pub(in crate::ocp) fn remember_penalties(&self, memory: &mut [T]) {
         let mut pairs = memory.as_chunks_mut().0.iter_mut();

@@ -1,13 +1,12 @@
 //! Where a run begins.
 
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::{Bounds, Solution, StageDims};
 use crate::scalar::Real;
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Linearises at the guess; where something has no value there, at the point nearest to it that
     /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
     ///
@@ -16,24 +15,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// That at the guess, if there is none at that point either.
-    pub(in crate::ocp) fn linearise_guess<C: Curvature<P::Dynamics, T>>(
+    pub(in crate::ocp) fn linearise_guess(
         &mut self,
-        curvature: C,
+        mut linearise: impl FnMut(&mut Self) -> Result<(), OcpError>,
         copy: &mut Solution<T, D, M>,
         perturbs: bool,
     ) -> Result<bool, OcpError> {
-        let Err(error) = self.linearise(curvature) else {
+        let Err(error) = linearise(self) else {
             if !perturbs {
                 return Ok(false);
             }
-            return self.leave_degenerate_start(copy, |ocp| ocp.linearise(curvature));
+            return self.leave_degenerate_start(copy, linearise);
         };
         if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {
             return Err(error);
         }
         copy.copy_from(&self.iterate);
         self.clip();
-        let result = self.linearise(curvature);
+        let result = linearise(self);
         if result.is_err() {
             self.iterate.copy_from(copy);
         }

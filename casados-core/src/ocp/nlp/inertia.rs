@@ -3,7 +3,7 @@
 //! Program. 106, 2006, section 3.1).
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::{QpError, StageDims};
 use crate::scalar::Real;
 
@@ -38,7 +38,7 @@ impl InertiaCorrection {
     }
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Solves the QP at the iterate with as much regularisation `delta`, beside what it has, as it
     /// takes.
     ///

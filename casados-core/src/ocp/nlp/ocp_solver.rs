@@ -1,12 +1,11 @@
 //! What solves problems, whatever the method.
 
-use crate::ocp::assembly::curvature::Curvature;
+use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::HeapIpm;
 use crate::ocp::nlp::sqp::HeapSqp;
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Outcome;
 use crate::qp::QpSolver;
 use crate::scalar::Real;
@@ -50,7 +49,7 @@ pub trait OcpSolver<P, T: Real>: Clone + Send {
     fn solve(&mut self, ocp: &mut HeapOcp<P, T>) -> Result<Outcome, OcpError>;
 }
 
-impl<P: Formulation<T>, T: Real, S, C> OcpSolver<P, T> for HeapSqp<S, C, T>
+impl<P: Program<T>, T: Real, S, C> OcpSolver<P, T> for HeapSqp<S, C, T>
 where
     S: QpSolver<T> + Clone + Send,
     C: Curvature<P::Dynamics, T> + Send,
@@ -60,7 +59,10 @@ where
     }
 }
 
-impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> OcpSolver<P, T> for HeapIpm<T> {
+impl<P: Program<T>, T: Real> OcpSolver<P, T> for HeapIpm<T>
+where
+    Exact: Curvature<P::Dynamics, T>,
+{
     fn solve(&mut self, ocp: &mut HeapOcp<P, T>) -> Result<Outcome, OcpError> {
         HeapIpm::solve(self, ocp)
     }

@@ -10,7 +10,8 @@ use crate::ocp::formulation::instance::data::{Layout, inputs, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::nlp::degenerate::Perturbed;
-use crate::qp::{Places, Solution, StageDims, assign, pad, part, part_mut};
+use crate::ocp::program::Program;
+use crate::qp::{Places, Solution, StageDims, assign, pad, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -36,7 +37,7 @@ pub(in crate::ocp) enum SecondStart {
 /// It asks for one after so many steps in a row that lead nowhere.
 pub(in crate::ocp) const RESTART_AFTER: usize = 16;
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes a guess the iterate, moved into its bounds, with the states that follow from its
     /// controls, or from controls beside them; what was the iterate is in `guess` then. Whether
     /// these have values: otherwise the iterate stays.
@@ -78,9 +79,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 return false;
             }
             let mut moved = 0.0;
-            let v = at.view_mut().v;
-            for (k, place) in Places::<T>::new(self.qp().dims).enumerate().skip(1) {
-                let ends = part(ends, (k - 1) * place.nx, place.nx);
+            let (v, mut behind) = (at.view_mut().v, &*ends);
+            for place in Places::<T>::new(self.qp().dims).skip(1) {
+                let (ends, next) = behind.split_at_checked(place.nx).unwrap_or_default();
+                behind = next;
                 for (i, (x, &end)) in part_mut(v, place.v, place.nx).iter_mut().zip(ends).enumerate() {
                     let unit = units.get(place.row + i).copied().unwrap_or(T::ONE);
                     moved += ((end - *x) / unit).abs().to_f64();
@@ -139,7 +141,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn guess_by_simulation(&mut self) -> Result<&mut Self, OcpError> {
-        if P::Dynamics::LIFTED {
+        if P::LIFTED {
             return Err(OcpError::NoIntegrator);
         }
         self.roll_out(|ocp, k, end| {

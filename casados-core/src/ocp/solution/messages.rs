@@ -58,13 +58,14 @@ impl fmt::Display for ConstraintName {
         if matches!(self.part, Part::PathBounds | Part::TerminalBounds) {
             write!(f, " (output {})", self.output)?;
         }
-        if self.part == Part::ParameterBounds {
-            return Ok(());
+        match self.part {
+            Part::ParameterBounds => {}
+            _ if self.point > 0 => write!(f, " at point {} inside of interval {}", self.point, self.stage)?,
+            _ => write!(f, " at stage {}", self.stage)?,
         }
-        if self.point > 0 {
-            write!(f, " at point {} inside of interval {}", self.point, self.stage)
-        } else {
-            write!(f, " at stage {}", self.stage)
+        match self.phase {
+            Some(phase) => write!(f, " of phase {phase}"),
+            None => Ok(()),
         }
     }
 }
@@ -244,6 +245,16 @@ impl fmt::Display for OcpError {
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it must be {allowed}")
             }
+            Self::LinkDimension { link, what: "output", expected, found } => write!(
+                f,
+                "the link `{link}` has {found} outputs instead of {expected}: one for each state of the next phase"
+            ),
+            Self::LinkDimension { link, what, expected, found } => write!(
+                f,
+                "the link `{link}` has {found} elements of `{what}` instead of {expected}: its function has the \
+                 arguments of the model that ends"
+            ),
+            Self::Phase { phase, model, what } => write!(f, "phase {phase} (`{model}`) cannot have {what}"),
             Self::Qp(error) => error.fmt(f),
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }

@@ -2,7 +2,7 @@
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::{Iteration, Times};
 use crate::qp::{QpError, Residuals, StageDims, Violation};
 use crate::scalar::Real;
@@ -282,7 +282,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The status of a run whose violations cannot be made smaller.
     pub(in crate::ocp) fn status_of_worst(&self, worst: &Violation) -> Status {
         let Violation { field, stage, index, side, violation } = *worst;

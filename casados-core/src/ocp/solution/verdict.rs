@@ -13,7 +13,7 @@ use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Completes the outcome of a run.
-    pub(in crate::ocp) fn complete(&mut self, outcome: &mut Outcome) {
+    pub(in crate::ocp) fn complete_outcome(&mut self, outcome: &mut Outcome) {
         outcome.is_convex = self.is_convex();
         #[cfg(feature = "alloc")]
         if !outcome.is_solved() && !outcome.status.names_a_constraint() {

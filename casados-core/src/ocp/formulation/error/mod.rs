@@ -287,6 +287,26 @@ pub enum OcpError {
         /// What it may be.
         allowed: &'static str,
     },
+    /// A link between phases does not fit them.
+    LinkDimension {
+        /// The function of the link.
+        link: &'static str,
+        /// Which of its arguments, or its outputs.
+        what: &'static str,
+        /// The length that the phases ask for.
+        expected: usize,
+        /// Its length.
+        found: usize,
+    },
+    /// Something that a phase of several cannot have.
+    Phase {
+        /// Which, from 0 on.
+        phase: usize,
+        /// Its model.
+        model: &'static str,
+        /// What.
+        what: &'static str,
+    },
     /// The QP has no solution.
     Qp(QpError),
     /// Memory could not be allocated.

@@ -149,4 +149,6 @@ pub struct ConstraintName {
     pub point: usize,
     /// The side.
     pub side: Side,
+    /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+    pub phase: Option<usize>,
 }

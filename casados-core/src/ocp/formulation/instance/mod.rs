@@ -1,5 +1,6 @@
 //! A problem on a horizon, with its data, its iterate and its QP.
 
+mod access;
 mod check;
 pub(in crate::ocp) mod data;
 pub(in crate::ocp) mod inside;
@@ -20,7 +21,7 @@ use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, s
 use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::set;
-use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part_mut};
+use crate::qp::{Qp, Solution, SolutionStage, StageDims, assign, pad, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 #[cfg(feature = "alloc")]
@@ -211,32 +212,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// Finds out whether memory of a run has the dimensions of the problem.
-    ///
-    /// # Errors
-    /// [`OcpError::Length`]
-    pub(in crate::ocp) fn fits(&self, dims: &[StageDims]) -> Result<(), OcpError> {
-        let part = Part::Dimensions;
-        let (expected, found) = (self.qp.dims().len(), dims.len());
-        if expected != found {
-            return Err(OcpError::Length { part, stage: 0, expected, found });
-        }
-        for (stage, (a, b)) in self.qp.dims().iter().zip(dims).enumerate() {
-            for (expected, found) in [(a.nx, b.nx), (a.nu, b.nu), (a.ng, b.ng)] {
-                if expected != found {
-                    return Err(OcpError::Length { part, stage, expected, found });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// How many intervals the horizon has.
-    #[must_use]
-    pub fn intervals(&self) -> usize {
-        self.qp.dims().len().saturating_sub(1)
-    }
-
     /// How large it is.
     #[inline(always)]
     pub(crate) fn layout(&self) -> Layout {
@@ -245,34 +220,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             bounds_algebraic: self.inner.bounds_algebraic::<P>(),
             ..Layout::new(self.intervals(), self.free.count())
         }
-    }
-
-    /// The functions of the problem: weights of costs and options of integrators may be changed
-    /// there.
-    pub fn problem(&mut self) -> &mut P {
-        &mut self.problem
-    }
-
-    /// The QP at the iterate of the last [`Ocp::linearise`].
-    #[must_use]
-    pub fn qp(&self) -> QpView<'_, T> {
-        self.qp.view()
-    }
-
-    /// The QP, and the iterate as the place of its solution.
-    pub fn qp_and_iterate(&mut self) -> (QpView<'_, T>, &mut Solution<T, D, M>) {
-        (self.qp.view(), &mut self.iterate)
-    }
-
-    /// States, controls and multipliers.
-    #[must_use]
-    pub fn iterate(&self) -> &Solution<T, D, M> {
-        &self.iterate
-    }
-
-    /// States, controls and multipliers, to be changed.
-    pub fn iterate_mut(&mut self) -> &mut Solution<T, D, M> {
-        &mut self.iterate
     }
 
     /// A stage of the iterate.

@@ -6,10 +6,10 @@ use super::kkt::newton::{evaluate, kkt_view, refine, resolve};
 use super::kkt::work::Work;
 use super::predictor;
 use super::state::State;
+use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, StageDims, Store};
 use crate::scalar::Real;
@@ -24,14 +24,14 @@ const CLOSE: f64 = 1.0;
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// The search direction; without the curvature of dynamics and constraints where that needs too
     /// much regularisation, far from a feasible point.
-    pub(super) fn search_direction<P: Formulation<T>>(
+    pub(super) fn search_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<Result<bool, QpError>, OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         let before = (state.regularisation, state.progress, state.mu);
         let direction = self.regularised_direction(ocp, state, row);
@@ -47,13 +47,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
     /// The QP at the iterate without multipliers of dynamics and constraints, on which no step
     /// depends but by the curvature that they give to the Hessian.
-    fn forget_curvature<P: Formulation<T>>(
+    fn forget_curvature<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
     ) -> Result<(), OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         ocp.iterate.view_mut().dynamics.fill(T::ZERO);
         Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
@@ -71,7 +71,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ///
     /// # Errors
     /// Those of the recursion, where no regularisation helps.
-    fn regularised_direction<P: Formulation<T>>(
+    fn regularised_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,

@@ -4,7 +4,7 @@ use super::Ipm;
 use super::IpmOptions;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Log;
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
@@ -41,7 +41,7 @@ impl<T: Real> HeapIpm<T> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
+    pub fn new<P: Program<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
         Ok(Self {
             options: IpmOptions::new::<T>(),

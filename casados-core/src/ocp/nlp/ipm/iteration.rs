@@ -12,15 +12,15 @@ use super::Ipm;
 use super::kkt::work::Work;
 use super::restoration::elastic;
 use crate::ocp::assembly::convexify::Convexification;
-use crate::ocp::assembly::curvature::{Exact, Slopes};
+use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::assembly::units::of_tolerance;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageAction};
+use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::{Filter, Measure};
 use crate::ocp::nlp::solver::{Method, Next};
 use crate::ocp::nlp::watch::Watch;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpError, StageDims, Store, larger};
@@ -48,17 +48,17 @@ struct Direction {
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
-    pub(super) fn linearise<P: Formulation<T>>(
+    pub(super) fn linearise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
     ) -> Result<(), OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         if !state.has_slacks {
             if !core::mem::take(&mut state.is_linearised) {
-                ocp.linearise(Slopes)?;
+                P::slopes(ocp)?;
             }
             if state.lengths.alone {
                 ocp.forget_gradients();
@@ -76,7 +76,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     }
 
     /// Residuals and barrier parameter at the iterate, and the best iterate.
-    fn assess<P: Formulation<T>>(
+    fn assess<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -90,7 +90,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut view = solution.view_mut();
         iterate.store(&mut view);
         let objective = if state.lengths.alone { plain } else { plain + penalties };
-        if P::Dynamics::LIFTED {
+        if P::LIFTED {
             residuals.dynamics = larger(residuals.dynamics, of_stages);
         }
         if self.options.final_mu > 0.0 {
@@ -98,7 +98,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
                 barrier::residuals(&iterate.sides, self.options.final_mu);
         }
         let work = Work::new(ends, &state.capacity, self.work.as_mut());
-        let of_stages = if P::Dynamics::LIFTED { of_stages } else { 0.0 };
+        let of_stages = if P::LIFTED { of_stages } else { 0.0 };
         let units = state.lengths.units(work.units);
         let Relative { barrier, error, others } =
             relative(&residuals, &iterate, view.dynamics, units, of_stages);
@@ -120,7 +120,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             (state.best_residual, state.best_iteration) = (size, *row);
             state.best_violation = state.violation;
             self.best.copy_from(&ocp.iterate);
-            ocp.problem.parts().dynamics.move_stages(StageAction::Remember);
+            ocp.problem.move_stages(StageAction::Remember);
         }
         let acceptable = !is_alone && size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
@@ -131,7 +131,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
-    fn here<P: Formulation<T>>(
+    fn here<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -142,7 +142,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let iterate = kkt_view(ocp.qp.view(), &lengths, numbers, indices)?;
         let mut work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
         let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
-        if P::Dynamics::LIFTED {
+        if P::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
             let mut room = LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut work };
             here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
@@ -160,7 +160,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
-    fn along<P: Formulation<T>>(
+    fn along<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_>,
@@ -193,7 +193,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
     /// How far the search direction is gone. A corrected one is gone as far as it may be, or
     /// not at all: then the direction is that without the correction.
-    fn search<P: Formulation<T>>(
+    fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -228,7 +228,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     }
 
     /// Goes the step that was accepted.
-    fn accept<P: Formulation<T>>(
+    fn accept<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_>,
@@ -258,7 +258,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.go(part, T::from_f64(dual));
         barrier::keep_near_centre(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
-        ocp.problem.parts().dynamics.move_stages(StageAction::Go(part));
+        ocp.problem.move_stages(StageAction::Go(part));
         // The line search ends where it accepts a point; a tiny step has none.
         ocp.has_algebraic = !direction.tiny;
         Ok(())
@@ -267,7 +267,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
 impl<P, T, D, M, I> Method<P, T, D, M> for Ipm<T, D, M, I>
 where
-    P: Formulation<T, Dynamics: SecondOrder<T>>,
+    P: Program<T>,
+    Exact: Curvature<P::Dynamics, T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: Store<T>,

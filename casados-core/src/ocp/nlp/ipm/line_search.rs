@@ -6,12 +6,11 @@ use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp, refine};
 use super::kkt::work::Work;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, GAMMA_PHI, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides,
 };
+use crate::ocp::program::Program;
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
@@ -113,7 +112,7 @@ where
     I: Store<u32>,
 {
     /// Whether the filter accepts a step of this length; a point without a value is not accepted.
-    pub fn accepts<P: Formulation<T>>(
+    pub fn accepts<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
@@ -127,7 +126,7 @@ where
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]; points without a value are not good enough.
-    pub fn search<P: Formulation<T>>(
+    pub fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -144,8 +143,7 @@ where
                 return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
-            let bends =
-                !P::Dynamics::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
+            let bends = !P::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
             if alpha == longest
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
@@ -162,7 +160,7 @@ where
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
     /// value.
-    pub fn measure<P: Formulation<T>>(
+    pub fn measure<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         mu: f64,
@@ -173,7 +171,7 @@ where
         let objective = if self.lengths.alone { 0.0 } else { objective };
         ocp.step_length = Some(T::ZERO);
         let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
-        if P::Dynamics::LIFTED {
+        if P::LIFTED {
             gaps += ocp.stages[0].to_f64();
         }
         let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
@@ -192,11 +190,7 @@ where
     }
 
     /// The point and the slacks after a part of the step.
-    pub fn place_trial<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        part_of_step: T,
-    ) -> Option<()> {
+    pub fn place_trial<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, part_of_step: T) -> Option<()> {
         ocp.step_length = Some(part_of_step);
         let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         self.trial.copy_from(&ocp.iterate);
@@ -217,7 +211,7 @@ where
 
     /// Second-order corrections: constraints take their values at the point that was tried.
     /// Afterwards the step is what was accepted, or what it was before.
-    fn correct<P: Formulation<T>>(
+    fn correct<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,

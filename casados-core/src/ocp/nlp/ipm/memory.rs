@@ -4,9 +4,8 @@ use super::Ipm;
 use super::IpmOptions;
 use super::kkt::lengths::all_soft;
 use super::kkt::work::Work;
-use crate::ocp::assembly::linearise::ends;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::{Program, ends};
 use crate::qp::interior::{Counts, Iterate};
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
@@ -23,7 +22,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
     /// [`InteriorPoint::memory_of_coupling`](crate::qp::InteriorPoint::memory_of_coupling) numbers
     /// more.
     #[must_use]
-    pub const fn memory<P: Formulation<T>>(
+    pub const fn memory<P: Program<T>>(
         dims: &[StageDims],
         bounds: usize,
         equations: usize,
@@ -41,7 +40,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
     ///
     /// # Errors
     /// [`OcpError::Length`]
-    pub fn in_memory<P: Formulation<T>>(
+    pub fn in_memory<P: Program<T>>(
         dims: &'a [StageDims],
         bounds: usize,
         equations: usize,
@@ -76,12 +75,8 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
 }
 
 /// Numbers of Newton's equations, numbers beside them, and indices.
-const fn lengths<P: Formulation<T>, T: Real>(
-    dims: &[StageDims],
-    bounds: usize,
-    equations: usize,
-) -> [usize; 3] {
+const fn lengths<P: Program<T>, T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
     let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
-    let work = Work::<T>::length(dims, ends::<P, T>(dims), &counts);
+    let work = Work::<T>::length(dims, ends(dims), &counts);
     [Iterate::<T>::memory(dims, &counts) + equations, work, counts.indices()]
 }

@@ -10,7 +10,7 @@ use super::restoration::phase;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
@@ -19,7 +19,7 @@ const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Slacks and multipliers of the first iteration, or of new penalties.
-    pub(super) fn begin<P: Formulation<T>>(
+    pub(super) fn begin<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -64,7 +64,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     }
 
     /// Writes the multipliers that the Hessian has.
-    pub(super) fn curve<P: Formulation<T>>(
+    pub(super) fn curve<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_>,
@@ -83,7 +83,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     }
 
     /// Lets go of multipliers that hold slacks shorter than distances from bounds.
-    pub(super) fn reset_small_slacks<P: Formulation<T>>(
+    pub(super) fn reset_small_slacks<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_>,

@@ -5,12 +5,11 @@ use super::kkt::lengths::Lengths;
 use super::kkt::start::push_inside;
 use super::kkt::work::Work;
 use super::state::State;
-use crate::ocp::assembly::curvature::Slopes;
+use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::solver;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 use crate::qp::{QpField, StageDims, Store};
@@ -26,9 +25,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// [`OcpError::Length`] where the memory is that of another problem; [`OcpError::Missing`],
     /// [`OcpError::InvalidOption`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`]
     /// where a function has no value at the start.
-    pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
+    pub fn solve<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         self.run(ocp, &mut |_| ControlFlow::Continue(()), &mut || false)
     }
@@ -61,13 +60,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// assert_eq!(ipm.solve_until(&mut ocp, &mut || true)?.status, Status::OutOfTime);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn solve_until<P: Formulation<T>>(
+    pub fn solve_until<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         over: &mut dyn FnMut() -> bool,
     ) -> Result<Outcome, OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
     }
@@ -76,31 +75,31 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ///
     /// # Errors
     /// As [`Ipm::solve`].
-    pub fn solve_observed<P: Formulation<T>>(
+    pub fn solve_observed<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
     ) -> Result<Outcome, OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         self.run(ocp, observer, &mut || false)
     }
 
-    fn run<P: Formulation<T>>(
+    fn run<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
         over: &mut dyn FnMut() -> bool,
     ) -> Result<Outcome, OcpError>
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         ocp.fits(self.trial.dims())?;
         self.options.check()?;
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        let perturbed = ocp.linearise_guess(Slopes, &mut self.trial, self.options.perturb_start)?;
+        let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial, self.options.perturb_start)?;
         let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
         let mut state = State::new(over, (lengths, capacity), is_linearised, &self.options);
         state.has_perturbed_start = perturbed;
@@ -131,7 +130,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
     /// Memory for all that may come, a point inside of the bounds, and what is remembered of the
     /// problem; whether the point is still the one that the problem was linearised at.
-    fn prepare<P: Formulation<T>>(
+    fn prepare<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
     ) -> Result<(Lengths, Lengths, bool), OcpError> {

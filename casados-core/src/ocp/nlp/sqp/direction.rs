@@ -8,8 +8,8 @@ use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;
@@ -46,12 +46,12 @@ pub(super) enum Direction {
 }
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    pub(super) fn penalties<'s, P: Formulation<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
+    pub(super) fn penalties<'s, P: Program<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
         self.work.as_ref().get(ocp.ends()..penalties_end(ocp)).unwrap_or_default()
     }
 
     /// Penalties in place of hard bounds.
-    fn set_elastic<P: Formulation<T>>(
+    fn set_elastic<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -68,7 +68,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Bounds as they were given.
-    pub(super) fn leave_elastic<P: Formulation<T>>(
+    pub(super) fn leave_elastic<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -84,7 +84,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP at the iterate; in elastic mode if it has no solution otherwise.
-    pub(super) fn direction<P: Formulation<T>>(
+    pub(super) fn direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -111,7 +111,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The same where the QP, the iterate and all constants are in units.
-    fn direction_in_units<P: Formulation<T>>(
+    fn direction_in_units<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -154,7 +154,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// `known`, the error of the QP with hard bounds, where that with penalties has no solution
     /// either; that of the latter if there is none.
-    fn elastic_direction<P: Formulation<T>>(
+    fn elastic_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -205,7 +205,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// minimises these alone tells whether larger penalties would (R. H. Byrd, J. Nocedal, R. A.
     /// Waltz, "Steering exact penalty methods for nonlinear programming", Optim. Methods Softw. 23,
     /// 2008).
-    fn steer<P: Formulation<T>>(
+    fn steer<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -253,7 +253,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     ///
     /// Afterwards penalties are those beside which the objective counts nothing.
-    fn feasibility_step<P: Formulation<T>>(
+    fn feasibility_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -280,7 +280,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The sum of violations that the solution of the QP leaves, by its linearisation.
-    fn violation_of_solution<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
+    fn violation_of_solution<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
         let (_, sum) = ocp.worst(self.penalties(ocp), &[]);
         core::mem::swap(&mut ocp.iterate, &mut self.solution);
@@ -288,7 +288,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP with as much regularisation as it takes.
-    fn regularised<P: Formulation<T>>(
+    fn regularised<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -313,7 +313,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP from the iterate, with the iterations that are left of its share.
-    fn solve_qp<P: Formulation<T>>(
+    fn solve_qp<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         state: &mut State<'_, T>,

@@ -3,28 +3,26 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::split;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::Measure;
+use crate::ocp::program::{Parts, Program, intervals_end};
+use crate::qp::element::get;
 use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::Real;
-use crate::shape::Shape;
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
     /// change of `penalties`.
     pub(in crate::ocp) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
-        let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let (from, _) = self.iterate.vectors();
+        let Parts { qp, iterate, scratch, .. } = P::split(self);
+        let (from, _) = iterate.vectors();
         let (to, _) = solution.vectors();
         let (mut slope, mut begin) = (T::ZERO, 0);
         let mut soft = -penalties;
-        for (stage, point) in self.qp.view().stages().zip(solution.stages()) {
+        for (stage, point) in qp.view().stages().zip(solution.stages()) {
             let view = stage.arrays();
             let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
             begin += view.ld;
-            let (direction, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
+            let (direction, rest) = scratch.split_at_mut_checked(view.ld).unwrap_or_default();
             let gradient = part_mut(rest, 0, view.ld);
             for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
                 *d = w - v;
@@ -47,15 +45,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
     pub(super) fn curvature(&mut self, solution: &Solution<T, D, M>) -> f64 {
-        let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let ((from, _), (to, _)) = (self.iterate.vectors(), solution.vectors());
+        let Parts { qp, iterate, scratch, .. } = P::split(self);
+        let ((from, _), (to, _)) = (iterate.vectors(), solution.vectors());
         let (mut curvature, mut square, mut begin) = (T::ZERO, T::ZERO, 0);
-        for stage in self.qp.view().stages() {
+        for stage in qp.view().stages() {
             let view = stage.arrays();
             let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
             begin += view.ld;
-            let (direction, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
+            let (direction, rest) = scratch.split_at_mut_checked(view.ld).unwrap_or_default();
             let force = part_mut(rest, 0, view.ld);
             for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
                 *d = w - v;
@@ -81,26 +78,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<Measure, OcpError> {
         let objective = self.evaluate(at, ends)?;
         let mut sum = Measure { objective: objective.to_f64(), violation: 0.0 };
-        let (intervals, nx, rows) = (self.intervals(), P::Shape::NX, self.rows());
-        let values = ends.get(intervals * nx..).unwrap_or_default();
-        let mut stages = at.stages().peekable();
+        let Parts { qp, given: [lower, upper], .. } = P::split(self);
+        let (mut ends, values) = ends.split_at_checked(intervals_end(qp.dims())).unwrap_or_default();
+        let (mut stages, mut row) = (at.stages().peekable(), 0);
         let mut weights = weights.stages();
-        for (k, stage) in self.qp.view().stages().enumerate() {
+        for stage in qp.view().stages() {
             let Some(point) = stages.next() else { break };
             let weights = weights.next();
             if let Some(next) = stages.peek() {
-                for (i, (&phi, &x)) in part(ends, k * nx, nx).iter().zip(next.x).enumerate() {
+                let (phi, behind) = ends.split_at_checked(next.x.len()).unwrap_or_default();
+                ends = behind;
+                for (i, (&phi, &x)) in phi.iter().zip(next.x).enumerate() {
                     sum.violation += of_gap(weights.as_ref(), i, phi - x);
                 }
             }
             sum += of_variables(&stage, &point, weights.as_ref());
             let bounds = stage.g_bounds();
             for index in 0..bounds.lower.len() {
-                let limits = self.limits(k, index);
-                let value = values.get(k * rows + index).copied().unwrap_or(T::ZERO);
+                let [lower, upper, value] = [lower, upper, values].map(|list| get(list, row + index));
                 let weights = weights.map(|w| [w.g_lower, w.g_upper]);
-                sum += side(&bounds, index, limits, value, weights);
+                sum += side(&bounds, index, [lower, upper], value, weights);
             }
+            row += bounds.lower.len();
         }
         Ok(sum)
     }

@@ -28,8 +28,8 @@ pub use options::{Globalisation, SqpOptions};
 
 use crate::ocp::assembly::curvature::{Exact, GaussNewton};
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic;
+use crate::ocp::program::Program;
 #[cfg(feature = "alloc")]
 use crate::ocp::solution::log::{Iteration, Log};
 #[cfg(feature = "alloc")]
@@ -133,7 +133,7 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn new<P: Formulation<T>>(
+    pub fn new<P: Program<T>>(
         ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
     ) -> Result<Self, OcpError> {
         let mut solver = HeapInteriorPoint::new();
@@ -150,7 +150,7 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn with_solver<P: Formulation<T>>(
+    pub fn with_solver<P: Program<T>>(
         ocp: &crate::ocp::formulation::instance::HeapOcp<P, T>,
         qp_solver: S,
     ) -> Result<Self, OcpError> {
@@ -211,10 +211,10 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
 impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
     /// How many numbers it takes for a problem; `usize::MAX` if they are more than that.
     #[must_use]
-    pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
+    pub const fn memory<P: Program<T>>(dims: &[StageDims]) -> usize {
         Solution::<T, (), ()>::memory(dims)
             .saturating_mul(4)
-            .saturating_add(crate::ocp::assembly::linearise::ends::<P, T>(dims))
+            .saturating_add(crate::ocp::program::ends(dims))
             .saturating_add(elastic::memory(dims))
             .saturating_add(scaled::memory::<T>(dims))
     }
@@ -223,7 +223,7 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
     ///
     /// # Errors
     /// [`OcpError::Length`]
-    pub fn in_memory<P: Formulation<T>>(
+    pub fn in_memory<P: Program<T>>(
         qp_solver: S,
         dims: &'a [StageDims],
         memory: &'a mut [T],

@@ -14,7 +14,7 @@ use super::state::State;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Program;
 use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric, part};
 use crate::scalar::Real;
 
@@ -28,7 +28,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`].
-    pub(super) fn first_multipliers<P: Formulation<T>>(
+    pub(super) fn first_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -57,7 +57,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Whether the Hessian has positive diagonal elements at all controls.
     fn controls_have_curvature(&self) -> bool {
         self.qp.view().stages().all(|stage| {

@@ -4,12 +4,11 @@ use super::Sqp;
 use super::state::State;
 use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
-use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, larger};
@@ -23,7 +22,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// once, where it failed, or has had penalties for long and a simulation with the controls of
     /// the guess violates less than its iterate. It was long steps at first that led astray, or
     /// gaps that were to be closed over unstable dynamics.
-    pub(super) fn try_restart<P: Formulation<T>>(
+    pub(super) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -76,18 +75,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Makes a simulation with the controls of the guess the iterate and linearises there; what was
     /// the iterate is a trial then. What it violates, if it has values.
-    fn simulate_guess<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        start: SecondStart,
-    ) -> Option<f64>
+    fn simulate_guess<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, start: SecondStart) -> Option<f64>
     where
         C: Curvature<P::Dynamics, T>,
     {
         self.trial.copy_from(&self.weights);
         self.trial.multipliers_mut().fill(T::ZERO);
         let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if P::Dynamics::LIFTED || !ocp.simulate_guess(&mut self.trial, ends, start) {
+        if P::LIFTED || !ocp.simulate_guess(&mut self.trial, ends, start) {
             return None;
         }
         if ocp.linearise(self.curvature).is_err() {

@@ -10,9 +10,9 @@ use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::solver::{self, Method, Next};
 use crate::ocp::nlp::watch::Watch;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
@@ -49,7 +49,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
     /// full steps went to a point at which something has no value: then the iterate is the best
     /// one, too.
-    pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
+    pub fn solve<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
@@ -60,7 +60,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// As [`Sqp::solve`].
-    pub fn solve_observed<P: Formulation<T>>(
+    pub fn solve_observed<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
@@ -97,7 +97,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// assert!(sqp.solve_until(&mut ocp, &mut || Instant::now() > deadline)?.is_converged());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn solve_until<P: Formulation<T>>(
+    pub fn solve_until<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         over: &mut dyn FnMut() -> bool,
@@ -108,7 +108,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
     }
 
-    fn run<P: Formulation<T>>(
+    fn run<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
@@ -152,7 +152,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Lets the filter decide from now on where the merit function creeps.
-    fn switch_to_filter<P: Formulation<T>>(
+    fn switch_to_filter<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -167,11 +167,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The curvature of the QP along its step, of which the iterate has gone a part.
-    fn curvature_of_step<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
-    ) -> f64 {
+    fn curvature_of_step<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> f64 {
         self.scale(ocp, state, Way::Into);
         let curvature = ocp.curvature(&self.solution);
         self.scale(ocp, state, Way::Back);
@@ -179,7 +175,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The full step, or one that a line search finds.
-    fn take_step<P: Formulation<T>>(
+    fn take_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -197,7 +193,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// A step in the direction of the QP; nothing where none is short enough, or the QP has no
     /// solution.
-    fn attempt_step<P: Formulation<T>>(
+    fn attempt_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -239,7 +235,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The iterate stays, and the next iteration tries another QP there; how the run ends if there
     /// is none.
-    fn stay<P: Formulation<T>>(
+    fn stay<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -275,7 +271,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 impl<P, S, C, T, D, M> Method<P, T, D, M> for Sqp<S, C, T, D, M>
 where
-    P: Formulation<T>,
+    P: Program<T>,
     S: QpSolver<T>,
     C: Curvature<P::Dynamics, T>,
     T: Real,
@@ -294,8 +290,10 @@ where
             // The line search has linearised here already.
             Some(seconds) => row.times.linearise = seconds,
             None if row.iteration == 0 => {
-                row.perturbed =
-                    ocp.linearise_guess(self.curvature, &mut self.trial, self.options.perturb_start)?;
+                let curvature = self.curvature;
+                let linearise = |ocp: &mut Ocp<P, T, D, M>| ocp.linearise(curvature);
+                let perturbs = self.options.perturb_start;
+                row.perturbed = ocp.linearise_guess(linearise, &mut self.trial, perturbs)?;
                 if row.perturbed {
                     self.weights.copy_from(&ocp.iterate);
                 }

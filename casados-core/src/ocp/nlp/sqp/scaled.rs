@@ -11,8 +11,8 @@ use super::Sqp;
 use super::state::State;
 use crate::ocp::assembly::units::{Sizes, Units, WIDE, of_tolerance};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::{self, Worst};
+use crate::ocp::program::Program;
 use crate::qp::interior::at;
 use crate::qp::{
     Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, pad, part, part_mut,
@@ -136,11 +136,7 @@ impl<T: Real> Scale<'_, T> {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Finds the units at the iterate, where the QP is written.
-    pub(super) fn find_units<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-    ) {
+    pub(super) fn find_units<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>) {
         let rows = self.work.as_mut().get_mut(penalties_end(ocp)..).unwrap_or_default();
         let Sizes { force, .. } = ocp.find_units(rows, self.trial.view_mut().v);
         let force = if (1.0 / WIDE..=WIDE).contains(&force) { 1.0 } else { power::<T>(force) };
@@ -159,7 +155,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
-    pub(super) fn tightens<P: Formulation<T>>(
+    pub(super) fn tightens<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -178,12 +174,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The QP, the iterate and the solution, into units or back.
-    pub(super) fn scale<P: Formulation<T>>(
-        &mut self,
-        ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
-        way: Way,
-    ) {
+    pub(super) fn scale<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>, way: Way) {
         let Some(units) = units(self.work.as_ref(), ocp, state) else { return };
         let scale = Scale { units, way, judges: false };
         scale.qp(&mut ocp.qp);
@@ -192,7 +183,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The multipliers of the solution and the weights of violations, into units or back.
-    pub(super) fn scale_weights<P: Formulation<T>>(
+    pub(super) fn scale_weights<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -205,7 +196,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The largest residual in what tolerances are multiplied by.
-    pub(super) fn judge<P: Formulation<T>>(
+    pub(super) fn judge<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -227,7 +218,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// A violation in units, in those of the problem.
-    pub(super) fn in_problem<P: Formulation<T>>(&self, ocp: &Ocp<P, T, D, M>, worst: Worst) -> Worst {
+    pub(super) fn in_problem<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, worst: Worst) -> Worst {
         let rows = self.work.as_ref().get(penalties_end(ocp)..).unwrap_or_default();
         let places = Places::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
         let unit = places.map_or(1.0, |place| {
@@ -245,7 +236,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 /// The units in the memory of a run, where they are not all one.
 fn units<'s, P, T, D, M>(work: &'s [T], ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) -> Option<Units<'s, T>>
 where
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
@@ -257,7 +248,7 @@ where
 /// The linear penalties that are remembered, in the memory of a run.
 pub(super) fn penalties_mut<'s, P, T, D, M>(work: &'s mut [T], ocp: &Ocp<P, T, D, M>) -> &'s mut [T]
 where
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
@@ -266,7 +257,7 @@ where
 }
 
 /// Where penalties end in the memory of a run, and units begin.
-pub(super) fn penalties_end<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(super) fn penalties_end<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
 ) -> usize {
     ocp.ends() + elastic::memory(ocp.qp.dims())

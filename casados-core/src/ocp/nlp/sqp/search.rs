@@ -8,9 +8,9 @@ use super::state::{State, Taken};
 use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::Measure;
 use crate::ocp::nlp::watch::Watch;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
@@ -33,7 +33,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError`] of the linearisation at the iterate, if that has to be repeated.
-    pub(super) fn search<P: Formulation<T>>(
+    pub(super) fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -83,7 +83,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Weights of violations before the first line search: those of a filter are the inverses of
     /// units and stay.
-    pub(super) fn forget_weights<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
+    pub(super) fn forget_weights<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &State<'_, T>) {
         let weighted = state.globalisation(&self.options) == Globalisation::Merit;
         self.weights.multipliers_mut().fill(if weighted { T::ZERO } else { T::ONE });
         if !weighted {
@@ -93,7 +93,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// What there is at a part of the step, if it has a value.
-    fn measure_at<P: Formulation<T>>(
+    fn measure_at<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -113,7 +113,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Takes a step that is good enough, or half of it, a quarter and so on, as long as the merit
     /// function says that its least is before, and shrinks. The length.
-    fn backtrack_to_minimiser<P: Formulation<T>>(
+    fn backtrack_to_minimiser<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -138,14 +138,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The line from the iterate to the solution of the QP, with new weights of violations.
-    fn merit_model<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
+    fn merit_model<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> Line {
         let (here, slope) = self.update_weights(ocp, state);
         Line { here: here.over(state.force()), slope: slope / state.force() }
     }
 
     /// Objective and weighted violations at the iterate, with new weights, and the slope of the
     /// objective.
-    fn update_weights<P: Formulation<T>>(
+    fn update_weights<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &State<'_, T>,
@@ -177,7 +177,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The full step, tried by linearising there.
-    fn try_linearised<P: Formulation<T>>(
+    fn try_linearised<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,
@@ -204,7 +204,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The full step, with constraints corrected by their values at its end: they bend away.
-    fn corrected<P: Formulation<T>>(
+    fn corrected<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_, T>,

@@ -4,12 +4,11 @@ use super::scaling::{of_gaps, of_sides, sum};
 use crate::ocp::assembly::units::Units;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::filter::Measure;
+use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::qp::interior::{Iterate, Sides};
 use crate::qp::{Places, Solution, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
-use crate::shape::Shape;
 
 /// `Σ λ_e e + ½ q e²` of violations of soft sides, and `−Σ log` of slacks and violations.
 pub(in crate::ocp::nlp::ipm) fn penalties_and_barrier<T: Real>(
@@ -68,7 +67,7 @@ pub(in crate::ocp::nlp::ipm) fn slope<T: Real>(iterate: &Iterate<'_, T>, mu: f64
     slope
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Objective, and the values of all rows at a point, in the units of the QP's bounds; ends of
     /// intervals and constraints in `ends`.
     ///
@@ -81,22 +80,28 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         rows: &mut [T],
     ) -> Result<f64, OcpError> {
         let objective = self.evaluate(at, ends)?.to_f64();
-        let (intervals, nx, count) = (self.intervals(), P::Shape::NX, self.rows());
-        let values = ends.get(intervals * nx..).unwrap_or_default();
-        let (v, _) = at.vectors();
-        let qp = self.qp.view();
+        let Parts { qp, given, .. } = P::split(self);
+        let qp = qp.view();
+        let mut values = ends.get(intervals_end(qp.dims)..).unwrap_or_default();
+        let ((v, _), [mut given_lower, mut given_upper]) = (at.vectors(), given);
         for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
             let rows = part_mut(rows, place.row, place.rows);
             assign(rows, part(v, place.v, place.n));
             let bounds = stage.g_bounds();
-            for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
+            let [of_lower, of_upper, of_stage] =
+                [&mut given_lower, &mut given_upper, &mut values].map(|list| {
+                    let (own, behind) = list.split_at_checked(place.ng).unwrap_or_default();
+                    *list = behind;
+                    own
+                });
+            let rows = rows.get_mut(place.ld..).unwrap_or_default();
+            let limits = bounds.lower.iter().zip(bounds.upper).zip(of_lower.iter().zip(of_upper));
+            for ((row, &value), ((&lower, &upper), (&given_lower, &given_upper))) in
+                rows.iter_mut().zip(of_stage).zip(limits)
+            {
                 // Bounds of the QP are those that were given, and what its linear part leaves.
-                let [given_lower, given_upper] = self.limits(place.stage, index);
                 let shift = if lower.is_finite() { lower - given_lower } else { upper - given_upper };
-                let value = values.get(place.stage * count + index).copied().unwrap_or(T::ZERO);
-                if let Some(row) = rows.get_mut(place.ld + index) {
-                    *row = if shift.is_finite() { value + shift } else { value };
-                }
+                *row = if shift.is_finite() { value + shift } else { value };
             }
         }
         Ok(objective)
@@ -104,11 +109,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The sum of the gaps between the ends of intervals and the states that follow, in units.
     pub(in crate::ocp::nlp::ipm) fn gaps_at(&self, at: &Solution<T, D, M>, ends: &[T], units: &[T]) -> f64 {
-        let nx = P::Shape::NX;
-        let mut sum = 0.0;
-        for (k, (next, place)) in at.stages().zip(Places::<T>::new(at.dims())).skip(1).enumerate() {
-            let units = part(units, place.row, nx);
-            for ((&phi, &x), &unit) in part(ends, k * nx, nx).iter().zip(next.x).zip(units) {
+        let (mut sum, mut ends) = (0.0, ends);
+        for (next, place) in at.stages().zip(Places::<T>::new(at.dims())).skip(1) {
+            let (phi, behind) = ends.split_at_checked(place.nx).unwrap_or_default();
+            ends = behind;
+            for ((&phi, &x), &unit) in phi.iter().zip(next.x).zip(part(units, place.row, place.nx)) {
                 sum += ((phi - x) / unit).abs().to_f64();
             }
         }

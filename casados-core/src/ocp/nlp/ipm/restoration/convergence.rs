@@ -3,11 +3,11 @@
 use super::elastic;
 use super::phase;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::solver::Next;
+use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
@@ -15,7 +15,7 @@ use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// What follows the residuals of an iteration.
-    pub(in crate::ocp::nlp::ipm) fn next<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn next<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -50,7 +50,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
 impl State<'_> {
     /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
-    fn tightens<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn tightens<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         work: &mut Work<'_, T>,

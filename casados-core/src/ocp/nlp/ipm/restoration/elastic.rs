@@ -1,12 +1,12 @@
 //! Penalties where no step makes progress, and what they tell of a problem without a solution.
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::regularisation::Regularisation;
 use crate::ocp::nlp::ipm::state::State;
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::StageDims;
 use crate::scalar::Real;
@@ -20,7 +20,7 @@ const ELASTIC_MU: f64 = 0.1;
 
 /// The hard bound that is violated most, in units, while penalties stand for it.
 pub(in crate::ocp::nlp::ipm) fn worst<
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
@@ -37,7 +37,7 @@ pub(in crate::ocp::nlp::ipm) fn worst<
 /// violation has an objective of `f(v̄) + ρ θ(v̄)` at least: a violation that costs less than the
 /// objective has changed by on the way may be there because it pays.
 pub(in crate::ocp::nlp::ipm) fn verdict<
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
@@ -62,7 +62,7 @@ pub(in crate::ocp::nlp::ipm) fn verdict<
 
 /// Penalties, in units, in place of hard bounds; slacks begin anew.
 pub(in crate::ocp::nlp::ipm) fn soften<
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,

@@ -12,7 +12,6 @@
 
 use super::elastic::{self, soften};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
@@ -20,6 +19,7 @@ use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::nlp::solver::Next;
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
 use crate::qp::interior::{Sides, at};
@@ -35,7 +35,7 @@ const MONOTONE_FIRST_BELOW: f64 = 1e-2;
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Goes on where no step makes progress: violations alone, then with a monotone barrier
     /// parameter, then with penalties. The status if all of that has been tried.
-    pub(in crate::ocp::nlp::ipm) fn recover<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn recover<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -80,7 +80,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 }
 
 /// Begins a phase.
-fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn enter<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State<'_>,
     given: (&[T], &[T]),
@@ -94,7 +94,7 @@ fn enter<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 
 /// Ends it: bounds are as hard as they were.
 pub(in crate::ocp::nlp::ipm) fn exit<
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
@@ -114,7 +114,7 @@ pub(in crate::ocp::nlp::ipm) fn exit<
 
 /// What follows an iterate of a phase: the end of the run, the end of the phase, or nothing.
 pub(in crate::ocp::nlp::ipm) fn check_convergence<
-    P: Formulation<T>,
+    P: Program<T>,
     T: Real,
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,

@@ -1,10 +1,8 @@
 //! A second attempt, from a simulation with the controls of the guess.
 
 use super::phase::exit;
-use crate::ocp::assembly::curvature::Slopes;
-use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
+use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
@@ -12,6 +10,7 @@ use crate::ocp::nlp::ipm::violations::Phase;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
+use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;
@@ -22,18 +21,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     /// bounds by less than the point that it is at. Over unstable dynamics gaps may be what leads
     /// astray, and violations that stay there say nothing of the problem. A run that ended
     /// with the violations of the guess begins again at a simulation with controls beside its.
-    pub(in crate::ocp::nlp::ipm) fn try_restart<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
         end: Option<Status>,
     ) -> bool
     where
-        P::Dynamics: SecondOrder<T>,
+        Exact: Curvature<P::Dynamics, T>,
     {
         let stalls = end.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::Dynamics::LIFTED {
+        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::LIFTED {
             return false;
         }
         let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
@@ -57,7 +56,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             if !ocp.simulate_guess(&mut self.trial, work.ends, start) {
                 continue;
             }
-            let is_linearised = ocp.linearise(Slopes).is_ok();
+            let is_linearised = P::slopes(ocp).is_ok();
             let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
             if is_linearised && found < most * left {
                 exit(ocp, state, work.penalties, &self.options);

@@ -10,14 +10,13 @@
 //! grows would end the ray, however far the bound is. Where dynamics are not linear the states are
 //! those that follow from the controls of a point on the ray.
 
-use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::newton::kkt_view;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::line_search::LineSearch;
 use crate::ocp::nlp::ipm::state::State;
+use crate::ocp::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::at;
 use crate::qp::{Places, StageDims, Store, part};
@@ -31,7 +30,7 @@ const NEXT_RAY: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Whether variables are very large, and the step is a ray along which the problem has no end.
-    pub(in crate::ocp::nlp::ipm) fn is_unbounded<P: Formulation<T>>(
+    pub(in crate::ocp::nlp::ipm) fn is_unbounded<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
@@ -62,7 +61,7 @@ where
     I: Store<u32>,
 {
     /// Whether the objective falls along the ray of the step, and no constraint ends it.
-    fn has_no_end<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, tolerance: f64) -> bool {
+    fn has_no_end<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, tolerance: f64) -> bool {
         let force = self.lengths.sizes.force;
         let Some([size, step]) = self.sizes(ocp) else { return false };
         let Some(mut before) = self.along_ray(ocp, 0.0, tolerance * size) else { return false };
@@ -82,7 +81,7 @@ where
     }
 
     /// The largest variable and the largest step, in units; nothing where one is zero.
-    fn sizes<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>) -> Option<[f64; 2]> {
+    fn sizes<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>) -> Option<[f64; 2]> {
         let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let sizes = [&*iterate.v, &*iterate.step].map(|numbers| {
             Places::<T>::new(iterate.qp.dims).fold(0.0, |largest: f64, place| {
@@ -98,7 +97,7 @@ where
     /// constraint ends the ray, not a number where a function has no value. Violations may be
     /// `tolerance` times what the point has moved, and that at the iterate itself, where distances
     /// are kept.
-    fn along_ray<P: Formulation<T>>(
+    fn along_ray<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         alpha: f64,
@@ -107,7 +106,7 @@ where
         self.place_trial(ocp, T::from_f64(alpha))?;
         let mut objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).unwrap_or(f64::NAN);
         let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
-        if P::Dynamics::LIFTED {
+        if P::LIFTED {
             gaps += ocp.stages[0].to_f64();
         } else if gaps > self.limit(ocp, alpha, tolerance) {
             // States that follow from the controls.
@@ -126,7 +125,7 @@ where
     }
 
     /// By how much the trial point may violate constraints.
-    fn limit<P: Formulation<T>>(&self, ocp: &Ocp<P, T, D, M>, alpha: f64, tolerance: f64) -> f64 {
+    fn limit<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, alpha: f64, tolerance: f64) -> f64 {
         if alpha == 0.0 {
             return tolerance;
         }
@@ -141,7 +140,7 @@ where
 
     /// By how much distances to hard bounds have shrunk at the trial point, or are violated at the
     /// `first` one, and residuals of equations, in units; what violations of soft bounds cost.
-    fn shrinkage<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, first: bool) -> Option<(f64, f64)> {
+    fn shrinkage<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>, first: bool) -> Option<(f64, f64)> {
         let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let (rows, units, kept) = (&*self.work.rows, &*self.work.units, &mut *self.work.slack_step);
         let mut sum = 0.0;

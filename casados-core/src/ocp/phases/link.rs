@@ -1,0 +1,210 @@
+//! What connects the end of a phase with the start of the next one.
+
+use crate::function::{ArrayV, Function};
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::functions::constraint::{Constraint, Constraints, Spot};
+use crate::ocp::formulation::functions::point::{Terms, There, read};
+use crate::qp::element::set;
+use crate::qp::{assign, part_mut};
+use crate::scalar::Real;
+use crate::shape::{Array, Outputs, Plain, Shape};
+use bytemuck::Zeroable;
+use core::fmt;
+
+/// The end of a phase.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct PhaseEnd<'a, T> {
+    pub(in crate::ocp) stage: usize,
+    pub(in crate::ocp) x: &'a [T],
+    /// Free parameters, and where they are among those of the model.
+    pub(in crate::ocp) w: &'a [T],
+    pub(in crate::ocp) free: Free<'a>,
+    /// The parameters that were set.
+    pub(in crate::ocp) p: &'a [T],
+    pub(in crate::ocp) t: T,
+}
+
+/// What a link is to fit.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct PhaseDims {
+    /// `NX`, `NU`, `NP`, `NZ` of the phase that ends.
+    pub(in crate::ocp) ends: [usize; 4],
+    /// States of the phase that ends, and of the one that begins, without linear controls and
+    /// integrals.
+    pub(in crate::ocp) own: usize,
+    pub(in crate::ocp) begins: usize,
+    /// The last stage of the phase that ends, and whether its time is known there.
+    pub(in crate::ocp) stage: usize,
+    pub(in crate::ocp) is_timed: bool,
+}
+
+/// What connects the end of a phase with the start of the next one: [`Jump`], or [`Continuous`].
+///
+/// ```
+/// use casados::ocp::{Continuous, Link};
+///
+/// fn is_named<L: Link<f64>>(link: &L, name: &str) -> bool { link.name() == name }
+/// assert!(is_named(&Continuous, "Continuous"));
+/// ```
+pub trait Link<T: Real> {
+    /// What it is called in messages.
+    fn name(&self) -> &'static str;
+    /// Whether it is linear.
+    #[doc(hidden)]
+    fn is_linear(&self) -> bool;
+    /// Whether it is a function of the one phase with an output for each state of the other.
+    #[doc(hidden)]
+    fn check(&self, dims: PhaseDims) -> Result<(), OcpError>;
+    /// The first state of the next phase.
+    #[doc(hidden)]
+    fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError>;
+    /// With its derivatives, a column over the variables of the stage for each state.
+    #[doc(hidden)]
+    fn linearise(
+        &mut self,
+        end: PhaseEnd<'_, T>,
+        values: &mut [T],
+        columns: (&mut [T], usize),
+    ) -> Result<(), OcpError>;
+    /// Adds its second derivatives with these multipliers.
+    #[doc(hidden)]
+    fn curve(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut Terms<'_, T>);
+}
+
+/// The states go on as they are.
+///
+/// [`Phases`](crate::ocp::Phases) has an example.
+///
+/// ```
+/// use casados::ocp::{Continuous, Link};
+///
+/// assert_eq!(Link::<f64>::name(&Continuous), "Continuous");
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Continuous;
+
+impl<T: Real> Link<T> for Continuous {
+    fn name(&self) -> &'static str {
+        "Continuous"
+    }
+    fn is_linear(&self) -> bool {
+        true
+    }
+    fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
+        mismatch("Continuous", "output", [dims.begins, dims.own])
+    }
+    fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
+        assign(values, end.x);
+        Ok(())
+    }
+    fn linearise(
+        &mut self,
+        end: PhaseEnd<'_, T>,
+        values: &mut [T],
+        (columns, ld): (&mut [T], usize),
+    ) -> Result<(), OcpError> {
+        assign(values, end.x);
+        (0..values.len()).for_each(|i| set(columns, i * ld + i, T::ONE));
+        Ok(())
+    }
+    fn curve(&mut self, _: PhaseEnd<'_, T>, _: &[T], _: &mut Terms<'_, T>) {}
+}
+
+/// The states of the next phase are a function of the states and parameters at the end of a phase:
+/// an impact, what is dropped at a separation, another frame.
+///
+/// The function has the arguments of the model that ends, and depends on no control and no
+/// algebraic state; it has an output for each state of the model that begins. Its derivatives of
+/// first and second order are exact. What is decided at the switch, as an impulse, is a free
+/// parameter of the phase that ends.
+///
+/// [`Phases`](crate::ocp::Phases) has an example.
+///
+/// ```
+/// use casados::ocp::{Jump, Link};
+/// use casados::prelude::*;
+///
+/// /// A ball of which the ground leaves nine tenths of the speed.
+/// #[function]
+/// fn impact(x: [f64; 2]) -> [f64; 2] { [x[0], -0.9 * x[1]] }
+///
+/// assert_eq!(Link::<f64>::name(&Jump::<Impact>::new()), "Impact");
+/// ```
+pub struct Jump<F: Function, T: Plain = f64> {
+    function: Constraint<F, T>,
+    v: ArrayV<F, T>,
+}
+
+impl<F: Function, T: Real> Jump<F, T> {
+    /// By this function.
+    #[must_use]
+    pub fn new() -> Self {
+        let none = T::from_f64(f64::INFINITY);
+        let function = Constraint::new(Array::from_fn(|_| -none), Array::from_fn(|_| none));
+        Self { function, v: Zeroable::zeroed() }
+    }
+
+    fn read(&mut self, PhaseEnd { x, w, free, p, t, .. }: PhaseEnd<'_, T>) {
+        let begin = 2 * F::Shape::NX + F::Shape::NZ + F::Shape::NU;
+        read::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
+        free.write(part_mut(self.v.as_mut(), begin, F::Shape::NP), w);
+    }
+}
+
+impl<F: Function, T: Real> Default for Jump<F, T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<F: Function, T: Plain> fmt::Debug for Jump<F, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Jump").field(&F::STRUCTURE.name).finish()
+    }
+}
+
+impl<F: Function, T: Real> Link<T> for Jump<F, T> {
+    fn name(&self) -> &'static str {
+        F::STRUCTURE.name
+    }
+    fn is_linear(&self) -> bool {
+        F::STRUCTURE.hessian.is_empty()
+    }
+    fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
+        let own = [F::Shape::NX, F::Shape::NU, F::Shape::NP, F::Shape::NZ];
+        let name = F::STRUCTURE.name;
+        for (argument, (expected, found)) in
+            ["x", "u", "p", "z"].into_iter().zip(dims.ends.into_iter().zip(own))
+        {
+            mismatch(name, argument, [expected, found])?;
+        }
+        mismatch(name, "output", [dims.begins, F::Outputs::NY])?;
+        There { z: false, u: false, stage: dims.stage, t: dims.is_timed }.check::<F>()
+    }
+    fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
+        self.read(end);
+        self.function.value(&self.v, values, Spot::new(end.stage, end.free, &[]))
+    }
+    fn linearise(
+        &mut self,
+        end: PhaseEnd<'_, T>,
+        values: &mut [T],
+        (columns, ld): (&mut [T], usize),
+    ) -> Result<(), OcpError> {
+        self.read(end);
+        self.function.linearise(&self.v, values, columns, ld, Spot::new(end.stage, end.free, &[]))
+    }
+    fn curve(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut Terms<'_, T>) {
+        self.read(end);
+        self.function.curve(&self.v, multipliers, Spot::new(end.stage, end.free, &[]), terms);
+    }
+}
+
+/// # Errors
+/// [`OcpError::LinkDimension`]
+fn mismatch(link: &'static str, what: &'static str, [expected, found]: [usize; 2]) -> Result<(), OcpError> {
+    if expected == found { Ok(()) } else { Err(OcpError::LinkDimension { link, what, expected, found }) }
+}

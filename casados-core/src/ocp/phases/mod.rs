@@ -1,0 +1,313 @@
+//! Problems of several phases, solved as one.
+//!
+//! ```text
+//! start   →   phase 0: x₀ … x_N   →   phase 1: x₀ = link(x_N, p of phase 0) … x_N   →   …
+//! ```
+//!
+//! What is decided where a phase begins, its parameters and what no link says, are controls of the
+//! stage before it: the last one of the phase before, or a stage without states, the start.
+//!
+//! | | |
+//! | --- | --- |
+//! | `link` | what connects two phases |
+//! | `phase` | a phase, whatever its problem is |
+//! | `transfer` | points, bounds and QPs go from a phase to the whole and back |
+//! | `program` | what solvers ask |
+
+mod link;
+mod phase;
+mod program;
+mod transfer;
+
+pub use link::{Continuous, Jump, Link};
+#[doc(hidden)]
+pub use link::{PhaseDims, PhaseEnd};
+pub use program::PhaseDynamics;
+
+use crate::ocp::formulation::error::OcpError;
+use crate::ocp::formulation::free::FreeParameters;
+use crate::ocp::formulation::functions::dynamics::SecondOrder;
+use crate::ocp::formulation::instance::inside::InnerPoints;
+use crate::ocp::formulation::instance::{HeapOcp, Initial, Ocp};
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::ends;
+use crate::qp::{HeapSolution, Qp, Solution, SolutionStage, StageDims, assign, pad, room, zeros};
+use crate::scalar::Real;
+use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+use phase::{Phase, Size};
+use transfer::Place;
+
+/// Problems that follow one another, solved as one: other models, other horizons, other controls.
+///
+/// ```text
+/// min  Σ_i (costs of phase i)        x₀ of phase i+1 = link_i(x_N, p of phase i)
+/// ```
+///
+/// A phase is a problem on a horizon, with bounds, costs, constraints, free parameters and guesses
+/// by its own names. How long it takes is fixed, or found ([`Horizon::free`](crate::ocp::Horizon));
+/// each has its own clock, which begins at its first node. The first one has an initial state, that
+/// of another is what its [`Link`] makes of the end of the one before: [`Continuous`], or a
+/// [`Jump`].
+///
+/// `join` makes one problem of them, which [`Sqp`](crate::ocp::Sqp) and [`Ipm`](crate::ocp::Ipm)
+/// solve with exact derivatives, in time that is linear in the number of intervals. It borrows the
+/// phases; after a solver each has its part of the iterate, with multipliers.
+///
+/// Parameters of a phase are states of the whole, with `w₊ = w`; each phase carries its own alone.
+///
+/// # Example
+/// A ball is thrown up, hits the ground where half of its speed is left, and is to be as high as it
+/// was after as short a time as possible. The speed at the start is bounded.
+/// ```
+/// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Jump, Phases, Problem};
+/// use casados::prelude::*;
+///
+/// /// Height and speed in units of a gravity of one.
+/// #[ode(duration = p)]
+/// fn fall(x: [f64; 2], _p: f64) -> [f64; 2] { [x[1], -1.0] }
+/// #[function]
+/// fn impact(x: [f64; 2], _p: f64) -> [f64; 2] { [x[0], -0.5 * x[1]] }
+/// #[function]
+/// fn time(_x: [f64; 2], _p: f64) -> f64 { 1.0 }
+///
+/// let n = 4;
+/// let flight = |longest: f64| {
+///     Problem::new(Irk::<Fall, Gauss<2>>::new(Options::default())?)
+///         .running_cost(GeneralCost::<Time>::new())
+///         .on(Horizon::free(n, 0.1..=longest, 1.0))
+/// };
+/// let (mut down, mut up) = (flight(5.0)?, flight(5.0)?);
+/// down.free_initial_state().bound("x[0]", ..1, 1.0, 1.0)?.bound("x[1]", ..1, -3.0, 3.0)?;
+/// down.bound("x[0]", n.., 0.0, 0.0)?.guess(&[0.5, -1.0], &[])?;
+/// up.bound("x[0]", n.., 1.0, 1.0)?.guess(&[0.5, 1.0], &[])?;
+///
+/// let mut bounce = Phases::new(&mut down).then(Jump::<Impact>::new(), &mut up).join()?;
+/// assert!(HeapIpm::new(&bounce)?.solve(&mut bounce)?.is_converged());
+/// drop(bounce);
+/// // Thrown down as fast as it may be: it hits the ground with √(3² + 2).
+/// let speed = 11.0_f64.sqrt();
+/// assert!((down.solution()?.end_time() - (speed - 3.0)).abs() < 1e-6);
+/// assert!((up.solution()?.state("x[1]")?[0] - 0.5 * speed).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Phases<'a, T = f64> {
+    phases: Vec<Joined<'a, T>>,
+    /// A point that is tried, as one of each phase; none before they are joined.
+    trials: Vec<Trial<T>>,
+    /// The first state of all, as far as it is given.
+    start: Vec<T>,
+}
+
+/// A point of a phase, and the ends of its intervals and constraints there.
+struct Trial<T> {
+    at: HeapSolution<T>,
+    ends: Vec<T>,
+}
+
+/// A phase, and what follows it.
+struct Joined<'a, T> {
+    problem: &'a mut dyn Phase<T>,
+    link: Option<Box<dyn Link<T> + 'a>>,
+    size: Size,
+    /// The first of its stages among all.
+    first: usize,
+}
+
+impl<T> fmt::Debug for Phases<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Phases").field("phases", &self.phases.len()).finish()
+    }
+}
+
+impl<'a, T: Real> Phases<'a, T> {
+    /// Of the first phase.
+    pub fn new<P>(first: &'a mut HeapOcp<P, T>) -> Self
+    where
+        P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
+    {
+        Self { phases: vec![Joined::new(first)], trials: Vec::new(), start: Vec::new() }
+    }
+
+    /// With another phase, which begins where the link says.
+    #[must_use]
+    pub fn then<P>(mut self, link: impl Link<T> + 'a, next: &'a mut HeapOcp<P, T>) -> Self
+    where
+        P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
+    {
+        if let Some(last) = self.phases.last_mut() {
+            last.link = Some(Box::new(link));
+        }
+        self.phases.push(Joined::new(next));
+        self
+    }
+
+    /// One problem of all phases, whose iterate is the guess of each. Its stages are the start and
+    /// those of the phases, one after the other.
+    ///
+    /// What is set in a phase afterwards takes another `join`.
+    ///
+    /// # Errors
+    /// [`OcpError::LinkDimension`], [`OcpError::NotThere`], [`OcpError::DependsOnTime`] of a link;
+    /// [`OcpError::Phase`] of an initial state behind the first phase, of collocation, periodic
+    /// states and shared controls; [`OcpError::Missing`] and others of a phase that is not complete
+    /// ([`Ocp::check`]); [`OcpError::OutOfMemory`].
+    pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
+        self.check()?;
+        let mut dims: Vec<StageDims> = Vec::new();
+        let mut decided: Vec<usize> = self.phases.iter().map(|phase| phase.size.decided()).collect();
+        decided.push(0);
+        let mut decided = decided.into_iter();
+        dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
+        for (phase, decided) in self.phases.iter_mut().zip(decided) {
+            phase.first = dims.len();
+            let of_phase = phase.problem.qp().dims();
+            room(&mut dims, of_phase.len())?;
+            let (nx, free) = (phase.size.nx, phase.size.free);
+            dims.extend(of_phase.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
+            if let Some(last) = dims.last_mut() {
+                last.nu = decided;
+            }
+            room(&mut self.trials, 1)?;
+            self.trials.push(Trial { at: Solution::new(of_phase)?, ends: zeros(ends(of_phase))? });
+        }
+        let (rows, scratch) = (dims.iter().map(|stage| stage.ng).sum::<usize>(), scratch::<T>(&dims));
+        let mut ocp = Ocp {
+            qp: Qp::new(&dims)?,
+            iterate: Solution::new(&dims)?,
+            data: zeros(2 * rows + scratch)?,
+            // The start has no states.
+            initial: Initial::Fixed,
+            problem: self,
+            objective: T::ZERO,
+            stages: [T::ZERO; 2],
+            free: FreeParameters::default(),
+            inner: InnerPoints::default(),
+            step_length: None,
+            has_algebraic: false,
+        };
+        let Ocp { problem, qp, iterate, data, .. } = &mut ocp;
+        problem.write_bounds(qp, data.get_mut(..2 * rows).unwrap_or_default());
+        problem.store(iterate);
+        Ok(ocp)
+    }
+
+    /// # Errors
+    /// Those of [`Phases::join`].
+    fn check(&mut self) -> Result<(), OcpError> {
+        for (index, phase) in self.phases.iter_mut().enumerate() {
+            if let Some(what) = phase.problem.refused(index == 0) {
+                return Err(OcpError::Phase { phase: index, model: phase.problem.names().model, what });
+            }
+            phase.problem.check()?;
+            phase.size = phase.problem.size();
+            phase.size.given = if index == 0 { phase.size.given } else { phase.size.own };
+        }
+        self.start = self.given_start()?;
+        for (phase, next) in self.phases.iter().zip(self.phases.iter().skip(1)) {
+            if let Some(link) = &phase.link {
+                link.check(phase.problem.dims(next.size.own))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The first state of all, as far as it is given.
+    fn given_start(&self) -> Result<Vec<T>, OcpError> {
+        let Some(Joined { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let mut start = zeros(size.given)?;
+        if let Some(first) = problem.qp().stage(0) {
+            assign(&mut start, first.x_bounds().lower);
+        }
+        Ok(start)
+    }
+
+    /// How large the phase behind each one is.
+    fn nexts(&self) -> Vec<Option<Size>> {
+        self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
+    }
+
+    /// The phase of a stage of the whole; none of the start.
+    fn at(&self, stage: usize) -> Option<(usize, &Joined<'a, T>)> {
+        self.phases.iter().enumerate().rev().find(|(_, phase)| phase.first <= stage)
+    }
+
+    /// Bounds of all stages, and those of constraints as they were given: the lower ones, then the
+    /// upper ones.
+    fn write_bounds(&mut self, qp: &mut Qp<T, Vec<StageDims>, Vec<T>>, given: &mut [T]) {
+        let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
+        let mut stages = qp.stages_mut();
+        let mut before = stages.next();
+        for (index, Joined { problem, size, .. }) in self.phases.iter_mut().enumerate() {
+            for (k, from) in problem.qp().stages().enumerate() {
+                if k == 0
+                    && let Some(mut before) = before.take()
+                {
+                    transfer::decided_bounds(*size, &from, &mut before);
+                }
+                let Some(mut to) = stages.next() else { return };
+                let place = match (index, k) {
+                    (0, 0) => Place::Start,
+                    (_, 0) => Place::Begin,
+                    _ => Place::Inside,
+                };
+                transfer::bounds(*size, &from, &mut to, place);
+                before = Some(to);
+            }
+            for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given()) {
+                let (own, behind) = core::mem::take(to).split_at_mut(from.len());
+                own.copy_from_slice(from);
+                *to = behind;
+            }
+        }
+    }
+
+    /// The iterates of all phases as that of the whole.
+    fn store(&self, to: &mut HeapSolution<T>) {
+        let firsts = || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
+        let nexts = firsts().skip(1).map(Some).chain([None]);
+        let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
+            let next = next.and_then(|(size, first)| Some((size, first?)));
+            let last = phase.size.intervals;
+            let stages = phase.problem.iterate().stages().enumerate();
+            stages.map(move |(k, stage)| (phase.size, stage, next.filter(|_| k == last)))
+        });
+        let mut start = firsts().next().and_then(|(size, first)| Some((size, first?)));
+        to.each_stage_mut(|to| {
+            if let Some((size, first)) = start.take() {
+                transfer::decide(size, &first, to.u, to.u_lower, to.u_upper);
+            } else if let Some((size, from, next)) = stages.next() {
+                transfer::store(size, &from, to, next);
+            }
+        });
+    }
+
+    /// The part of each phase in a point of the whole, as its iterate.
+    fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
+        let mut before = stages.next();
+        for Joined { problem, size, .. } in &mut self.phases {
+            before = transfer::load(*size, &mut stages, problem.iterate_mut(), before);
+        }
+    }
+}
+
+impl<'a, T: Real> Joined<'a, T> {
+    fn new<P>(problem: &'a mut HeapOcp<P, T>) -> Self
+    where
+        P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
+    {
+        let size = Phase::<T>::size(problem);
+        Self { problem, link: None, size, first: 0 }
+    }
+}
+
+/// Room for two matrices and a vector over the variables of a stage, or for four vectors.
+fn scratch<T>(dims: &[StageDims]) -> usize {
+    let of_stage = |stage: &StageDims| {
+        let n = stage.nx + stage.nu;
+        (2 * n + 4) * pad::<T>(n)
+    };
+    dims.iter().map(of_stage).max().unwrap_or(0)
+}

@@ -1,0 +1,183 @@
+//! A phase, whatever its problem is.
+
+use super::link::{PhaseDims, PhaseEnd};
+use crate::ocp::assembly::convexify::Convexification;
+use crate::ocp::assembly::curvature::{Exact, GaussNewton};
+use crate::ocp::formulation::error::{ConstraintName, OcpError};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
+use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::names::Names;
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::program::Parts;
+use crate::ocp::solution::outcome::Outcome;
+use crate::qp::{HeapSolution, QpError, QpField, QpView, Side, SolutionStage, assign, marked, part};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use core::ops::Range;
+
+/// The Hessian that a solver takes.
+#[derive(Clone, Copy)]
+pub(super) struct Kind {
+    pub exact: bool,
+    pub convexification: Convexification,
+}
+
+/// How large a phase is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    /// States.
+    pub nx: usize,
+    /// Free parameters.
+    pub free: usize,
+    /// States without linear controls and integrals.
+    pub own: usize,
+    /// Linear controls.
+    pub linear: usize,
+    /// States whose start the link says; those up to `own + linear` behind them are decided.
+    pub given: usize,
+    pub intervals: usize,
+}
+
+impl Size {
+    /// The states that are decided where the phase begins.
+    pub fn states(&self) -> Range<usize> {
+        self.given..self.own + self.linear
+    }
+
+    /// How much is decided there: these states, then the parameters.
+    pub fn decided(&self) -> usize {
+        self.states().len() + self.free
+    }
+}
+
+/// A phase, whatever its problem is.
+pub(super) trait Phase<T: Real> {
+    fn size(&self) -> Size;
+    fn names(&self) -> Names;
+    /// What a link at its end is to fit that leads to so many states.
+    fn dims(&self, begins: usize) -> PhaseDims;
+    /// What a phase cannot be, of the first one or of another; then its start is free.
+    fn refused(&mut self, is_first: bool) -> Option<&'static str>;
+    fn check(&mut self) -> Result<(), OcpError>;
+    fn qp(&self) -> QpView<'_, T>;
+    fn iterate(&self) -> &HeapSolution<T>;
+    fn iterate_mut(&mut self) -> &mut HeapSolution<T>;
+    /// Bounds of constraints as they were given.
+    fn given(&mut self) -> [&[T]; 2];
+    /// Writes the QP at the iterate; the objective.
+    fn linearise(&mut self, kind: Kind) -> Result<T, OcpError>;
+    fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
+    /// The end at this point of the last stage.
+    fn end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
+    fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
+    fn derivative(&self, error: &QpError) -> Option<OcpError>;
+    fn complete(&mut self, outcome: &mut Outcome);
+}
+
+impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
+    /// The first state of the iterate, as far as it is given.
+    fn begin_where_it_is_given(&mut self) {
+        let own = self.names().own_states();
+        let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
+            return;
+        };
+        assign(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
+    }
+}
+
+impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<P, T> {
+    fn size(&self) -> Size {
+        let names = self.names();
+        Size {
+            nx: P::Shape::NX,
+            free: self.free.count(),
+            own: names.own_states(),
+            linear: names.linear.len(),
+            given: if self.initial == Initial::Free { 0 } else { names.own_states() },
+            intervals: self.intervals(),
+        }
+    }
+    fn names(&self) -> Names {
+        <P::Dynamics as Dynamics<T>>::NAMES
+    }
+    fn dims(&self, begins: usize) -> PhaseDims {
+        PhaseDims {
+            ends: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
+            own: self.names().own_states(),
+            begins,
+            stage: self.intervals(),
+            is_timed: self.free.view().end().is_none(),
+        }
+    }
+    fn refused(&mut self, is_first: bool) -> Option<&'static str> {
+        let free = self.free.count();
+        if P::Dynamics::LIFTED {
+            return Some("collocation, whose stages are variables: take an integrator");
+        }
+        if marked(self.qp.view().periodic()).next().is_some() {
+            return Some("periodic states: a phase begins where the one before it ends");
+        }
+        if marked(self.qp.view().shared()).any(|control| control >= free) {
+            return Some("shared controls: take free parameters of the model, `free`");
+        }
+        if !is_first && matches!(self.initial, Initial::Fixed | Initial::Partly) {
+            return Some("an initial state of its own: the link before it says what it is");
+        }
+        if is_first && self.initial != Initial::Free {
+            self.begin_where_it_is_given();
+        }
+        if !is_first {
+            self.initial = Initial::Free;
+        }
+        self.join_controls();
+        None
+    }
+    fn check(&mut self) -> Result<(), OcpError> {
+        self.check()
+    }
+    fn qp(&self) -> QpView<'_, T> {
+        self.qp.view()
+    }
+    fn iterate(&self) -> &HeapSolution<T> {
+        &self.iterate
+    }
+    fn iterate_mut(&mut self) -> &mut HeapSolution<T> {
+        self.has_algebraic = false;
+        &mut self.iterate
+    }
+    fn given(&mut self) -> [&[T]; 2] {
+        let Parts { given, .. } = P::split(self);
+        given
+    }
+    fn linearise(&mut self, Kind { exact, convexification }: Kind) -> Result<T, OcpError> {
+        if exact {
+            self.linearise(Exact { convexification })?;
+        } else {
+            self.linearise(GaussNewton { convexification })?;
+        }
+        Ok(self.objective)
+    }
+    fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError> {
+        self.evaluate(at, ends)
+    }
+    fn end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T> {
+        let (stage, np, data) = (self.intervals(), P::Shape::NP, self.data.as_slice());
+        PhaseEnd {
+            stage,
+            x: at.x,
+            w: part(at.u, 0, self.free.count()),
+            free: self.free.view(),
+            p: part(data, stage + 1 + stage * np, np),
+            t: data.get(stage).copied().unwrap_or(T::ZERO),
+        }
+    }
+    fn name(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
+        self.name(field, stage, index, side)
+    }
+    fn derivative(&self, error: &QpError) -> Option<OcpError> {
+        self.derivative(error)
+    }
+    fn complete(&mut self, outcome: &mut Outcome) {
+        self.complete(outcome);
+    }
+}

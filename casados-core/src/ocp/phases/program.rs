@@ -1,0 +1,312 @@
+//! What solvers ask of phases: each answers for its stages, and links for what is between them.
+
+use super::link::{Link, PhaseEnd};
+use super::phase::{Kind, Size};
+use super::{Joined, Phases, Trial, transfer};
+use crate::linalg::dot;
+use crate::ocp::assembly::convexify::{Convexification, convexify};
+use crate::ocp::assembly::curvature::{Curvature, Exact, GaussNewton};
+use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
+use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
+use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::program::{Parts, Program, intervals_end};
+use crate::ocp::solution::outcome::Outcome;
+use crate::qp::{
+    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, assign, check,
+    part, part_mut, take_mut,
+};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// What the curvature of [`Phases`] is of: of the dynamics of each phase.
+///
+/// No value has this type.
+///
+/// ```
+/// use casados::ocp::{Curvature, Exact, PhaseDynamics};
+///
+/// fn is_exact<C: Curvature<PhaseDynamics, f64>>(_: C) -> bool { C::EXACT }
+/// assert!(is_exact(Exact::default()));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub enum PhaseDynamics {}
+
+macro_rules! curvatures {
+    ($($number:ty, $curvature:ty, $exact:expr;)*) => {$(
+        impl Curvature<PhaseDynamics, $number> for $curvature {
+            const EXACT: bool = $exact;
+            fn convexification(&self) -> Convexification {
+                self.convexification
+            }
+            fn run(
+                self,
+                dynamics: &mut PhaseDynamics,
+                _: &Nodes<'_, $number>,
+                _: Sink<'_, $number>,
+            ) -> Result<(), OcpError> {
+                match *dynamics {}
+            }
+        }
+    )*};
+}
+
+curvatures! {
+    f64, Exact, true;
+    f32, Exact, true;
+    f64, GaussNewton, false;
+    f32, GaussNewton, false;
+}
+
+impl<T: Real> Program<T> for Phases<'_, T> {
+    type Dynamics = PhaseDynamics;
+
+    fn linearise<C: Curvature<PhaseDynamics, T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &mut Ocp<Self, T, D, M>,
+        curvature: C,
+    ) -> Result<(), OcpError> {
+        write(ocp, Kind { exact: C::EXACT, convexification: curvature.convexification() })
+    }
+
+    fn slopes<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &mut Ocp<Self, T, D, M>,
+    ) -> Result<(), OcpError> {
+        write(ocp, Kind { exact: false, convexification: Convexification::None })
+    }
+
+    fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &mut Ocp<Self, T, D, M>,
+        at: &Solution<T, D, M>,
+        ends: &mut [T],
+    ) -> Result<T, OcpError> {
+        let length = intervals_end(ocp.qp.dims());
+        let (mut ends, mut values) = ends.split_at_mut_checked(length).unwrap_or_default();
+        let (mut objective, mut stages) = (T::ZERO, at.stages());
+        let Phases { phases, trials, start } = &mut ocp.problem;
+        let mut nexts = phases.iter().map(|phase| phase.size).collect::<Vec<_>>().into_iter();
+        let mut before = stages.next();
+        if let (Some(size), Some(decided)) = (nexts.next(), before) {
+            let first = take_mut(&mut ends, size.nx + size.free);
+            assign(first, start);
+            transfer::begin(size, decided.u, first);
+        }
+        for (phase, trial) in phases.iter_mut().zip(trials) {
+            let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
+            objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
+            write_ends(phase.size, trial, &mut ends, &mut values);
+            if let (Some(next), Some(last)) = (nexts.next(), last) {
+                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
+            }
+            before = last;
+        }
+        Ok(objective)
+    }
+
+    fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &mut Ocp<Self, T, D, M>,
+    ) -> Parts<'_, T, D, M> {
+        let Ocp { qp, iterate, data, .. } = ocp;
+        let rows = qp.dims().iter().map(|stage| stage.ng).sum();
+        let (lower, rest) = data.as_mut().split_at_mut_checked(rows).unwrap_or_default();
+        let (upper, scratch) = rest.split_at_mut_checked(rows).unwrap_or_default();
+        Parts { qp, iterate, given: [lower, upper], scratch }
+    }
+
+    fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
+        let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
+        core::iter::once(0..1).chain(phases)
+    }
+
+    fn name<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &Ocp<Self, T, D, M>,
+        place: (QpField, usize, usize),
+        side: Side,
+    ) -> ConstraintName {
+        ocp.problem.name_of_row(place, side)
+    }
+
+    fn derivative<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &Ocp<Self, T, D, M>,
+        error: &QpError,
+    ) -> Option<OcpError> {
+        ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
+            // What no phase has is of a link.
+            let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
+            let (_, phase) = ocp.problem.at(stage)?;
+            let function = phase.link.as_ref()?.name();
+            let stage = stage - phase.first;
+            Some(OcpError::NonFiniteFunction { function, stage, output: 0, value })
+        })
+    }
+
+    fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        ocp: &mut Ocp<Self, T, D, M>,
+        outcome: &mut Outcome,
+    ) {
+        let Ocp { problem, iterate, .. } = ocp;
+        problem.load(iterate.stages());
+        outcome.is_convex = true;
+        let mut worst = None;
+        for (index, phase) in problem.phases.iter_mut().enumerate() {
+            let mut own = Outcome { violated: None, ..outcome.clone() };
+            phase.problem.complete(&mut own);
+            outcome.is_convex &= own.is_convex && phase.link.as_ref().is_none_or(|link| link.is_linear());
+            if let Some((name, violation)) = own.violated
+                && worst.is_none_or(|(_, largest)| violation > largest)
+            {
+                worst = Some((ConstraintName { phase: Some(index), ..name }, violation));
+            }
+        }
+        outcome.violated = worst;
+    }
+}
+
+/// Writes the QP at the iterate, and the objective.
+fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<Phases<'_, T>, T, D, M>,
+    kind: Kind,
+) -> Result<(), OcpError> {
+    ocp.problem.load(ocp.iterate.stages());
+    let mut objective = T::ZERO;
+    for phase in &mut ocp.problem.phases {
+        objective = objective + phase.problem.linearise(kind)?;
+    }
+    ocp.objective = objective;
+    let Ocp { problem, qp, iterate, data, .. } = ocp;
+    let rows = 2 * qp.dims().iter().map(|stage| stage.ng).sum::<usize>();
+    let scratch = data.as_mut().get_mut(rows..).unwrap_or_default();
+    problem.write_qp(qp, iterate, scratch, kind)
+}
+
+/// Ends of the intervals of a phase, with its parameters as states that stay, and its constraints.
+fn write_ends<T: Real>(size: Size, trial: &Trial<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
+    let Size { nx, free, intervals, .. } = size;
+    let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
+    for (k, point) in trial.at.stages().enumerate().take(intervals) {
+        let (x, w) = take_mut(ends, nx + free).split_at_mut_checked(nx).unwrap_or_default();
+        assign(x, part(phi, k * nx, nx));
+        assign(w, point.u);
+    }
+    assign(take_mut(values, g.len()), g);
+}
+
+impl<T: Real> Joined<'_, T> {
+    /// Where the next phase begins: what the link makes of the end, and what is decided there.
+    fn write_start(
+        &mut self,
+        next: Size,
+        trial: &Trial<T>,
+        whole: &SolutionStage<'_, T>,
+        start: &mut [T],
+    ) -> Result<(), OcpError> {
+        let (Some(link), Some(last)) = (&mut self.link, trial.at.stages().next_back()) else { return Ok(()) };
+        link.value(self.problem.end(last), part_mut(start, 0, next.given))?;
+        transfer::begin(next, whole.u, start);
+        Ok(())
+    }
+}
+
+/// Where the next phase begins in the QP, at the last stage of a phase and its point `v` with
+/// multipliers `pi`.
+fn write_link<T: Real>(
+    link: &mut dyn Link<T>,
+    end: PhaseEnd<'_, T>,
+    [size, next]: [Size; 2],
+    arrays: &mut Arrays<'_, T>,
+    (v, pi): (&[T], &[T]),
+    scratch: &mut [T],
+    Kind { exact, convexification }: Kind,
+) -> Result<(), OcpError> {
+    let Arrays { n, ld, next: states, matrix, hessian, gradient, offset, .. } = arrays;
+    let (n, ld) = (*n, *ld);
+    let columns = part_mut(matrix, 0, *states * ld);
+    columns.fill(T::ZERO);
+    offset.fill(T::ZERO);
+    link.linearise(end, part_mut(offset, 0, next.given), (&mut *columns, ld))?;
+    for (offset, column) in offset.iter_mut().zip(columns.chunks_exact(ld.max(1))).take(next.given) {
+        *offset = *offset - dot(column, v);
+    }
+    let own = size.nx + size.free;
+    transfer::begin_columns(next, own, columns, ld);
+    if exact {
+        // The gradient of what is quadratic is `∇f − H v`: with another `H`.
+        add_symmetric(gradient, hessian, ld, v, n);
+        let mut terms = Terms { free: end.free, gradient: &mut [], hessian: &mut **hessian, ld };
+        link.curve(end, part(pi, 0, next.given), &mut terms);
+        convexify(convexification, hessian, ld, own, scratch);
+        let product = part_mut(scratch, 0, ld);
+        product.fill(T::ZERO);
+        add_symmetric(product, hessian, ld, v, n);
+        gradient.iter_mut().zip(&*product).for_each(|(g, &product)| *g = *g - product);
+    }
+    Ok(())
+}
+
+impl<T: Real> Phases<'_, T> {
+    /// The QPs of all phases as that of the whole, with the links between them.
+    fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        qp: &mut Qp<T, D, M>,
+        at: &Solution<T, D, M>,
+        scratch: &mut [T],
+        kind: Kind,
+    ) -> Result<(), OcpError> {
+        let ((v, _), mut begin) = (at.vectors(), 0);
+        let (mut stages, mut points) = (qp.stages_mut(), at.stages());
+        let nexts = self.nexts();
+        if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
+        {
+            let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
+            [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
+            assign(offset, &self.start);
+            transfer::begin_columns(first.size, point.x.len(), matrix, ld);
+            begin += ld;
+        }
+        for (Joined { problem, link, size, .. }, next) in self.phases.iter_mut().zip(nexts) {
+            for (from, at) in problem.qp().stages().zip(problem.iterate().stages()) {
+                let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
+                let mut arrays = to.arrays();
+                transfer::qp(*size, &from, &mut arrays);
+                let v = part(v, begin, arrays.ld);
+                begin += arrays.ld;
+                // The last stage of a phase leads nowhere in its own QP.
+                if let (Some(next), Some(link), true) = (next, &mut *link, at.dynamics.is_empty()) {
+                    let (end, sizes, at) = (problem.end(at), [*size, next], (v, point.dynamics));
+                    write_link(link.as_mut(), end, sizes, &mut arrays, at, scratch, kind)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A constraint of the QP by its name in its phase.
+    fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
+        let nothing = (Part::Dimensions, "");
+        let find = || {
+            let found = self.at(stage);
+            let decides = found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
+            let (number, place) = if decides && field == QpField::ControlBounds {
+                let number = found.map_or(0, |(number, _)| number + 1);
+                let Size { given, .. } = self.phases.get(number)?.size;
+                let states = self.phases.get(number)?.size.states().len();
+                let state = (QpField::StateBounds, 0, given + index);
+                let parameter = index.checked_sub(states);
+                (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
+            } else {
+                let (number, phase) = found?;
+                let (k, Size { nx, free, .. }) = (stage - phase.first, phase.size);
+                let place = match field {
+                    QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
+                    QpField::ControlBounds => (field, k, index + free),
+                    _ => (field, k, index),
+                };
+                (number, place)
+            };
+            let name = self.phases.get(number)?.problem.name(place, side);
+            Some(ConstraintName { phase: Some(number), ..name })
+        };
+        let (part, name) = nothing;
+        find().unwrap_or(ConstraintName { part, stage, name, output: 0, point: 0, side, phase: None })
+    }
+}

@@ -1,0 +1,224 @@
+//! What goes from a phase to the whole and back: points with their multipliers, bounds, and QPs.
+//!
+//! ```text
+//! stage of a phase   (x | w, u)        of the whole   (x, w | u)        w₊ = w
+//! ```
+//!
+//! The order of variables is the same: what are controls `w` of a phase, shared by its stages, are
+//! states of the whole.
+
+use super::phase::Size;
+use crate::qp::element::set;
+use crate::qp::{
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part,
+    part_mut,
+};
+use crate::scalar::Real;
+
+/// A point of the whole, at the stages of a phase, as one of the phase; `before` is the stage at
+/// which its start was decided, the result the one at its end.
+pub(super) fn load<'s, T: Real>(
+    size: Size,
+    from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
+    to: &mut HeapSolution<T>,
+    before: Option<SolutionStage<'s, T>>,
+) -> Option<SolutionStage<'s, T>> {
+    let (mut last, mut begins) = (None, before);
+    to.each_stage_mut(|to| {
+        let Some(from) = from.next() else { return };
+        load_stage(size, &from, to, begins.take());
+        last = Some(from);
+    });
+    last
+}
+
+fn load_stage<T: Real>(
+    size @ Size { nx, free, .. }: Size,
+    from: &SolutionStage<'_, T>,
+    to: SolutionStageMut<'_, T>,
+    before: Option<SolutionStage<'_, T>>,
+) {
+    for (x, u, to_x, to_u) in [
+        (from.x, from.u, to.x, &mut *to.u),
+        (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
+        (from.x_upper, from.u_upper, to.x_upper, &mut *to.u_upper),
+    ] {
+        let (x, w) = x.split_at_checked(nx).unwrap_or_default();
+        let (to_w, to_u) = to_u.split_at_mut_checked(free).unwrap_or_default();
+        assign(to_x, x);
+        assign(to_w, w);
+        assign(to_u, u);
+    }
+    assign(to.dynamics, from.dynamics);
+    assign(to.g_lower, from.g_lower);
+    assign(to.g_upper, from.g_upper);
+    // What is decided has its bounds where it is.
+    if let Some(before) = before {
+        for (from, x, u) in
+            [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
+        {
+            let (states, parameters) = from.split_at_checked(size.states().len()).unwrap_or_default();
+            assign(x.get_mut(size.states()).unwrap_or_default(), states);
+            assign(u, part(parameters, 0, free));
+        }
+    }
+}
+
+/// A stage of a phase as one of the whole; with the first stage of the next phase, where it ends.
+pub(super) fn store<T: Real>(
+    Size { free, .. }: Size,
+    from: &SolutionStage<'_, T>,
+    to: SolutionStageMut<'_, T>,
+    next: Option<(Size, SolutionStage<'_, T>)>,
+) {
+    for (x, u, to_x, to_u) in [
+        (from.x, from.u, to.x, &mut *to.u),
+        (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
+        (from.x_upper, from.u_upper, to.x_upper, &mut *to.u_upper),
+    ] {
+        let (w, u) = u.split_at_checked(free).unwrap_or_default();
+        let (first, second) = to_x.split_at_mut_checked(x.len()).unwrap_or_default();
+        assign(first, x);
+        assign(second, w);
+        assign(to_u, u);
+    }
+    assign(to.dynamics, from.dynamics);
+    assign(to.g_lower, from.g_lower);
+    assign(to.g_upper, from.g_upper);
+    if let Some((size, next)) = next {
+        decide(size, &next, to.u, to.u_lower, to.u_upper);
+    }
+}
+
+/// What is decided where a phase begins, from its first stage, with the multipliers of its bounds.
+pub(super) fn decide<T: Real>(
+    size: Size,
+    first: &SolutionStage<'_, T>,
+    to: &mut [T],
+    lower: &mut [T],
+    upper: &mut [T],
+) {
+    for (to, x, u) in
+        [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
+    {
+        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
+        assign(states, x.get(size.states()).unwrap_or_default());
+        assign(parameters, u);
+    }
+}
+
+/// Six vectors of bounds and penalties.
+fn lists<'a, T>(bounds: &Bounds<'a, T>) -> [&'a [T]; 6] {
+    let Bounds { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = *bounds;
+    [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
+}
+
+/// Six vectors of bounds and penalties.
+fn lists_mut<T>(bounds: BoundsMut<'_, T>) -> [&mut [T]; 6] {
+    let BoundsMut { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = bounds;
+    [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
+}
+
+/// Where in a horizon of phases a stage is, for its bounds.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Place {
+    /// The first stage of all: its states are given or decided.
+    Start,
+    /// The first stage of another phase.
+    Begin,
+    Inside,
+}
+
+/// Bounds of a stage, without those of what is decided before it, and of integrals where these
+/// begin.
+pub(super) fn bounds<T: Real>(
+    Size { nx, free, own, .. }: Size,
+    from: &Stage<'_, T>,
+    to: &mut StageMut<'_, T>,
+    place: Place,
+) {
+    let of_u = lists(&from.u_bounds());
+    let count = match place {
+        Place::Start => 0,
+        Place::Begin => own,
+        Place::Inside => nx,
+    };
+    for (to, (x, u)) in
+        lists_mut(to.x_bounds_mut()).into_iter().zip(lists(&from.x_bounds()).into_iter().zip(of_u))
+    {
+        assign(part_mut(to, 0, count), x);
+        if place == Place::Inside {
+            assign(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
+        }
+    }
+    for (to, from) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_u) {
+        assign(to, from.get(free..).unwrap_or_default());
+    }
+    for (to, from) in lists_mut(to.g_bounds_mut()).into_iter().zip(lists(&from.g_bounds())) {
+        assign(to, from);
+    }
+}
+
+/// Bounds of what is decided where a phase begins, from its first stage.
+pub(super) fn decided_bounds<T: Real>(size: Size, first: &Stage<'_, T>, to: &mut StageMut<'_, T>) {
+    let of_first = lists(&first.x_bounds()).into_iter().zip(lists(&first.u_bounds()));
+    for (to, (x, u)) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_first) {
+        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
+        assign(states, x.get(size.states()).unwrap_or_default());
+        assign(parameters, part(u, 0, size.free));
+    }
+}
+
+/// Where a phase begins: what is decided, and zero of what is neither decided nor given.
+pub(super) fn begin<T: Real>(size: Size, decided: &[T], start: &mut [T]) {
+    let (states, parameters) = decided.split_at_checked(size.states().len()).unwrap_or_default();
+    let (x, w) = start.split_at_mut_checked(size.nx).unwrap_or_default();
+    x.get_mut(size.given..).unwrap_or_default().fill(T::ZERO);
+    assign(x.get_mut(size.states()).unwrap_or_default(), states);
+    assign(w, parameters);
+}
+
+/// The same as columns of the QP, where what is decided are the variables from `first` on.
+pub(super) fn begin_columns<T: Real>(size: Size, first: usize, columns: &mut [T], ld: usize) {
+    for (j, state) in size.states().chain(size.nx..size.nx + size.free).enumerate() {
+        set(columns, state * ld + first + j, T::ONE);
+    }
+}
+
+/// The QP at a stage, without what leads to another phase.
+pub(super) fn qp<T: Real>(Size { nx, free, .. }: Size, from: &Stage<'_, T>, to: &mut Arrays<'_, T>) {
+    let (view, bounds) = (from.arrays(), from.g_bounds());
+    let Arrays { ld, next, rows, matrix, hessian, gradient, offset, limits, .. } = to;
+    let (ld, n) = (*ld, view.n);
+    let from_column = |list, j: usize| part(list, j * view.ld, n);
+    let copy = |to: &mut [T], j: usize, from: &[T]| {
+        let column = part_mut(to, j * ld, ld);
+        let (own, behind) = column.split_at_mut_checked(n).unwrap_or_default();
+        assign(own, from);
+        behind.fill(T::ZERO);
+    };
+    for j in 0..view.next {
+        copy(matrix, j, from_column(view.matrix, j));
+    }
+    if view.next > 0 {
+        for w in nx..nx + free {
+            part_mut(matrix, w * ld, ld).fill(T::ZERO);
+            set(matrix, w * ld + w, T::ONE);
+        }
+        let (own, behind) = offset.split_at_mut_checked(nx).unwrap_or_default();
+        assign(own, view.offset);
+        behind.fill(T::ZERO);
+    }
+    for row in 0..bounds.lower.len() {
+        copy(matrix, *next + row, from_column(view.matrix, view.next + row));
+    }
+    hessian.fill(T::ZERO);
+    gradient.fill(T::ZERO);
+    for j in 0..n {
+        copy(hessian, j, from_column(view.hessian, j));
+    }
+    assign(gradient, part(view.gradient, 0, n));
+    let (lower, rest) = limits.split_at_mut_checked(*rows).unwrap_or_default();
+    assign(part_mut(lower, ld, bounds.lower.len()), bounds.lower);
+    assign(part_mut(rest, ld, bounds.upper.len()), bounds.upper);
+}

@@ -1,0 +1,9 @@
+//! Problems of several phases: closed forms, published values, the QP by differences, mistakes.
+
+mod bounce;
+mod kkt;
+mod launch;
+mod mistakes;
+mod program;
+mod quadratic;
+mod robot;
