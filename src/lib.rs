@@ -208,6 +208,8 @@ pub mod integrator {
 
 /// What memory of an integrator is for, in bounds: `W: Memory + WithForward`.
 pub mod memory {
+    #[cfg(feature = "alloc")]
+    pub use casados_core::memory::Shared;
     pub use casados_core::memory::{
         Memory, WithAdjoint, WithDirectional, WithForward, WithHessian,
         fallback::{Pivoting, Refusing},

@@ -66,6 +66,7 @@ pub mod memory;
 pub mod model;
 pub mod ocp;
 pub mod options;
+pub mod plan;
 #[cfg(feature = "plot")]
 pub mod plot;
 pub mod qp;

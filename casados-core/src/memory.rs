@@ -33,7 +33,7 @@ pub mod mode;
 
 pub use fallback::{Fallback, OptionalPlace};
 #[cfg(feature = "alloc")]
-pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
+pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap, Shared};
 #[cfg(feature = "alloc")]
 pub(crate) use heap::{allocate, extend, push};
 

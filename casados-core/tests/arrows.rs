@@ -13,16 +13,17 @@ const ARROWS: &[(&str, &str)] = &[
     ("structure", ""),
     ("tableau", ""),
     ("error", "tableau"),
-    ("memory", "error"),
     ("options", "error"),
     ("scalar", "shape"),
     ("tables", "scalar"),
     ("record", "shape scalar"),
     ("function", "shape structure scalar"),
     ("model", "shape structure scalar"),
+    ("plan", "shape structure model"),
+    ("memory", "error model plan"),
     ("qp", "scalar"),
     ("dual", "shape scalar model"),
-    ("linalg", "shape tableau memory scalar model"),
+    ("linalg", "shape tableau memory scalar model plan"),
     ("result", "shape model"),
     ("finite", "error shape scalar model linalg result"),
     ("quadrature", "error shape memory scalar function model linalg result finite"),
@@ -37,8 +38,8 @@ const ARROWS: &[(&str, &str)] = &[
     ),
     (
         "irk",
-        "error shape statistics structure tableau memory options scalar model linalg result finite quadrature \
-         integrator",
+        "error shape statistics structure tableau memory options scalar model plan linalg result finite \
+         quadrature integrator",
     ),
     (
         "adaptive",

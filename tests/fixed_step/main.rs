@@ -17,6 +17,7 @@ mod models {
 
 mod algebraic;
 mod analytic;
+mod bindings;
 mod cells;
 mod erk;
 mod erk_reference;

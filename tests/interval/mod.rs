@@ -1,8 +1,9 @@
 //! All checks of one interval of an integrator, with the share of comparisons that may be unable to
 //! tell.
 
+use casados::memory::{WithAdjoint, WithHessian};
 use casados::testing::check_sensitivities;
-use casados::{Dae, Heap, Integrator, Options, Shape};
+use casados::{Dae, Integrator, Options, Shape};
 use nalgebra::SVector;
 
 /// All checks of one interval; of the comparisons with differences at most a tenth may be unable to
@@ -20,7 +21,7 @@ pub fn check<M, I, const NX: usize, const NU: usize, const NP: usize>(
             VectorU<f64> = SVector<f64, NU>,
             VectorP<f64> = SVector<f64, NP>,
         >,
-    I: Integrator<Model = M, Number = f64, Memory = Heap>,
+    I: Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
 {
     let report =
         check_sensitivities::<M, I>(&mut integrator, x0, u, p, h).expect("the interval can be integrated");

@@ -12,10 +12,10 @@ use super::workspace::{Linearization, Step, Work};
 use crate::error::Error;
 use crate::finite::check_gradient;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, kernels, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, kernels};
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
+use crate::plan::{Plan, PlanOf, Table};
 use crate::quadrature::OptionalIntegrand;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
@@ -106,9 +106,10 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     /// `λ_n` from `λ_{n+1}` and `μ`.
     pub(crate) fn advance<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>) {
         let Self { lambda, gradient, mu, shift, sourced, .. } = self;
-        let (jacobian, mu) = (&linear.jacobian, mu.as_ref());
+        let (plan, mu) = (F::plan::<M>(), mu.as_ref());
+        let jacobian = F::Plan::<M>::jacobian(&linear.jacobian);
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
-        dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda: &mut *lambda, gradient: &mut *gradient });
+        dispatch(Advance { plan, jacobian, mu, lambda: &mut *lambda, gradient: &mut *gradient });
         if *sourced {
             let (states, inputs) = shift.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
             add_to_all(lambda, states);
@@ -192,34 +193,40 @@ kernels! {
 }
 
 /// `λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i`, `λ_w −= Σ_i f_w,iᵀ μ_i`
-struct Advance<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+struct Advance<'a, M: Plan, E: Plain, const S: usize, const C: usize> {
+    plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     mu: &'a [[[E; C]; S]],
     lambda: &'a mut [[E; C]],
     gradient: &'a mut [[E; C]],
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M, E, S, C> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         // Lengths that the optimiser knows need no looking at.
-        let (nx, nk, nw) = (M::Shape::NX, M::Shape::NK, M::Shape::NW);
+        let (nx, nk, nw) = (self.plan.nx(), self.plan.nk(), self.plan.nw());
         if self.mu.len() == nk && self.lambda.len() == nx && self.gradient.len() == nw {
             each_row::<A, _>(&mut self);
         }
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M, E, S, C> {
     /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
+    const ROWS: Option<usize> = Table::Entries(1, 5).known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Entries(1, 5).of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 2 + 2 * C * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let (plan, nx, nz) = (self.plan, self.plan.nx(), self.plan.nz());
+        let first = plan.structure().blocks[1];
+        let Some((r, c, values)) = plan.entry(self.jacobian.as_ref(), first + row) else { return };
         let to = if c < 2 * nx {
             self.lambda.get_mut(c - nx)
         } else if c < 2 * nx + nz {
@@ -227,7 +234,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M, 
         } else {
             self.gradient.get_mut(c - nx - nz)
         };
-        if let (Some(to), Some(mu)) = (to, self.mu.get(slot::<M>(r))) {
+        if let (Some(to), Some(mu)) = (to, self.mu.get(plan.slot(r))) {
             subtract::<A, E, S, C>(to, values, mu);
         }
     }

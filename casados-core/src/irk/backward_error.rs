@@ -15,10 +15,10 @@ use super::forward::checksum::{ACCUMULATORS, total};
 use super::forward::sweep::Sweep;
 use super::workspace::{Linearization, Work};
 use crate::irk::coefficients::Coefficients;
-use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, minus_ha, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, minus_ha};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, Dae};
+use crate::model::Dae;
+use crate::plan::{Plan, PlanOf, Table};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
 
@@ -37,7 +37,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         &mut self,
         sweep: &Sweep<M, E, R, S>,
         coefficients: &Coefficients<E, S>,
-        directions: &D,
+        directions: D,
         second: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
@@ -48,16 +48,17 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
             *input = [directions.total(nx + w, second); S];
         }
-        dispatch(VerifyForward::<M, E, S> {
+        dispatch(VerifyForward {
+            plan: F::plan::<M>(),
             start_sums: sweep.start_sums.as_ref(),
             stage_sums: sweep.sums.as_ref(),
             a: &coefficients.a,
             h: self.inputs.time.step,
-            jacobian: &linear.jacobian,
+            jacobian: F::Plan::<M>::jacobian(&linear.jacobian),
             probe,
             sizes,
-            sums: f,
-            terms,
+            sums: F::Plan::<M>::k_mut(f),
+            terms: F::Plan::<M>::k_mut(terms),
         })
     }
 
@@ -70,16 +71,17 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         coefficients: &Coefficients<E, S>,
     ) -> E::Mask {
         let [sums, sizes] = &mut self.probe;
-        dispatch(VerifyAdjoint::<M, E, S, C> {
+        dispatch(VerifyAdjoint {
+            plan: F::plan::<M>(),
             lambda: backward.lambda.as_ref(),
             mu: backward.mu.as_ref(),
             source: if backward.sourced { backward.source.as_ref() } else { &[] },
             a: &coefficients.a,
             b: &coefficients.b,
             h: self.inputs.time.step,
-            jacobian: &kept.unwrap_or(&self.linear).jacobian,
-            sums,
-            sizes,
+            jacobian: F::Plan::<M>::jacobian(&kept.unwrap_or(&self.linear).jacobian),
+            sums: F::Plan::<M>::v_mut(sums),
+            sizes: F::Plan::<M>::v_mut(sizes),
         })
     }
 }
@@ -89,29 +91,31 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`, lane by lane.
     pub(crate) fn is_satisfied(&mut self) -> E::Mask {
         self.complete();
-        dispatch(Satisfied::<M, E, S> {
+        dispatch(Satisfied {
+            plan: F::plan::<M>(),
             f: self.f.as_ref(),
-            points: &self.points,
-            jacobian: &self.linear.jacobian,
-            sizes: &mut self.terms,
+            points: F::Plan::<M>::v(&self.points),
+            jacobian: F::Plan::<M>::jacobian(&self.linear.jacobian),
+            sizes: F::Plan::<M>::k_mut(&mut self.terms),
         })
     }
 }
 
 /// Whether loops over so many entries become straight lines: in registers, of which each entry has
 /// several, they are a small part of a step, unless there are few.
-const fn is_worth_lines<E>(entries: usize) -> bool {
-    size_of::<E>() <= 8 || entries <= 64
+const fn is_worth_lines<E>(entries: Option<usize>) -> bool {
+    size_of::<E>() <= 8 || matches!(entries, Some(..65))
 }
 
-struct Satisfied<'a, M: Dae, E: Plain, const S: usize> {
+struct Satisfied<'a, M: Plan, E: Plain, const S: usize> {
+    plan: M,
     f: &'a [[E; S]],
-    points: &'a ArrayV<M, [E; S]>,
+    points: &'a M::V<[E; S]>,
     jacobian: &'a M::Jacobian<[E; S]>,
-    sizes: &'a mut ArrayK<M, [E; S]>,
+    sizes: &'a mut M::K<[E; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
     type Number = E;
     type Output = E::Mask;
     #[inline(always)]
@@ -129,13 +133,17 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+impl<M: Plan, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::JACOBIAN.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::JACOBIAN.of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 4 * if size_of::<E>() > 8 { S } else { 1 };
     const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Some((r, c, values)) = self.plan.entry(self.jacobian.as_ref(), row) else { return };
         let (Some(sizes), Some(points)) = (self.sizes.as_mut().get_mut(r), self.points.as_ref().get(c))
         else {
             return;
@@ -195,7 +203,8 @@ fn displaced<A: Arithmetic, E: Lanes, const S: usize>(
     (xi, sizes)
 }
 
-struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
+struct VerifyForward<'a, M: Plan, E: Plain, const S: usize> {
+    plan: M,
     start_sums: &'a [[E; ACCUMULATORS]],
     stage_sums: &'a [[[E; ACCUMULATORS]; S]],
     a: &'a [[E; S]; S],
@@ -205,19 +214,20 @@ struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
     probe: &'a mut [[E; S]],
     sizes: &'a mut [[E; S]],
     /// The same of every equation.
-    sums: &'a mut ArrayK<M, [E; S]>,
-    terms: &'a mut ArrayK<M, [E; S]>,
+    sums: &'a mut M::K<[E; S]>,
+    terms: &'a mut M::K<[E; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { start_sums, stage_sums, a, h, jacobian, probe, sizes, sums, terms } = self;
-        let (nx, zero) = (M::Shape::NX, E::from_f64(0.0));
+        let Self { plan, start_sums, stage_sums, a, h, jacobian, probe, sizes, sums, terms } = self;
+        let (nx, zero) = (plan.nx(), E::from_f64(0.0));
         // Lengths that the optimiser knows need no looking at.
-        let (nk, nv) = (M::Shape::NK, M::Shape::NV);
+        let (nk, nv) = (plan.nk(), plan.nv());
+        let (jacobian, sums, terms) = (jacobian.as_ref(), sums.as_mut(), terms.as_mut());
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
             return E::lt(zero, zero);
         }
@@ -239,12 +249,12 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
                 (probe[nx + unknown], sizes[nx + unknown]) = (sum, size);
             }
         }
-        sums.as_mut().fill([zero; S]);
-        terms.as_mut().fill([zero; S]);
-        let mut total = Total::<M, E, S> { jacobian, probe, sizes, sums, terms };
+        sums.fill([zero; S]);
+        terms.fill([zero; S]);
+        let mut total = Total { plan, jacobian, probe, sizes, sums, terms };
         each_row::<A, _>(&mut total);
         let mut good = E::le(zero, zero);
-        for (sums, terms) in total.sums.as_ref().iter().zip(total.terms.as_ref()) {
+        for (sums, terms) in total.sums.iter().zip(&*total.terms) {
             for (&sum, &size) in sums.iter().zip(terms) {
                 good = E::and(good, is_small(sum, size));
             }
@@ -254,24 +264,29 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
 }
 
 /// For each equation the sum over all variables, and that of the sizes of its terms.
-struct Total<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
+struct Total<'a, M, E, const S: usize> {
+    plan: M,
+    jacobian: &'a [[E; S]],
     probe: &'a [[E; S]],
     sizes: &'a [[E; S]],
-    sums: &'a mut ArrayK<M, [E; S]>,
-    terms: &'a mut ArrayK<M, [E; S]>,
+    sums: &'a mut [[E; S]],
+    terms: &'a mut [[E; S]],
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+impl<M: Plan, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::JACOBIAN.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::JACOBIAN.of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 6 * if size_of::<E>() > 8 { S } else { 1 };
     const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Some((r, c, values)) = self.plan.entry(self.jacobian, row) else { return };
         let Self { probe, sizes, sums, terms, .. } = self;
         let (Some(sums), Some(terms), Some(probe), Some(sizes)) =
-            (sums.as_mut().get_mut(r), terms.as_mut().get_mut(r), probe.get(c), sizes.get(c))
+            (sums.get_mut(r), terms.get_mut(r), probe.get(c), sizes.get(c))
         else {
             return;
         };
@@ -286,7 +301,8 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
     }
 }
 
-struct VerifyAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+struct VerifyAdjoint<'a, M: Plan, E: Plain, const S: usize, const C: usize> {
+    plan: M,
     lambda: &'a [[E; C]],
     mu: &'a [[[E; C]; S]],
     /// Right-hand sides of an integrand, the same for all seeds.
@@ -295,29 +311,33 @@ struct VerifyAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
     b: &'a [E; S],
     h: E,
     jacobian: &'a M::Jacobian<[E; S]>,
-    sums: &'a mut ArrayV<M, [E; S]>,
-    sizes: &'a mut ArrayV<M, [E; S]>,
+    sums: &'a mut M::V<[E; S]>,
+    sizes: &'a mut M::V<[E; S]>,
 }
 
 /// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sizes of the terms.
-struct TotalAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
+struct TotalAdjoint<'a, M, E, const S: usize, const C: usize> {
+    plan: M,
+    jacobian: &'a [[E; S]],
     mu: &'a [[[E; C]; S]],
-    sums: &'a mut ArrayV<M, [E; S]>,
-    sizes: &'a mut ArrayV<M, [E; S]>,
+    sums: &'a mut [[E; S]],
+    sizes: &'a mut [[E; S]],
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_, M, E, S, C> {
     /// The entries of `f_ẋ`, `f_x` and `f_z`.
-    const ROWS: usize = M::STRUCTURE.blocks[3];
+    const ROWS: Option<usize> = Table::Entries(0, 3).known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Entries(0, 3).of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = (6 + C) * if size_of::<E>() > 8 { S } else { 1 };
     const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
-        let Self { mu, sums, sizes, .. } = self;
-        let (Some(sums), Some(sizes), Some(mu)) =
-            (sums.as_mut().get_mut(c), sizes.as_mut().get_mut(c), mu.get(slot::<M>(r)))
+        let Some((r, c, values)) = self.plan.entry(self.jacobian, row) else { return };
+        let Self { plan, mu, sums, sizes, .. } = self;
+        let (Some(sums), Some(sizes), Some(mu)) = (sums.get_mut(c), sizes.get_mut(c), mu.get(plan.slot(r)))
         else {
             return;
         };
@@ -332,21 +352,22 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
     type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { lambda, mu, source, a, b, h, jacobian, sums, sizes } = self;
-        let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
+        let Self { plan, lambda, mu, source, a, b, h, jacobian, sums, sizes } = self;
+        let (nx, nk, zero) = (plan.nx(), plan.nk(), E::from_f64(0.0));
+        let (jacobian, sums, sizes) = (jacobian.as_ref(), sums.as_mut(), sizes.as_mut());
         if mu.len() != nk {
             return E::lt(zero, zero);
         }
-        sums.as_mut().fill([zero; S]);
-        sizes.as_mut().fill([zero; S]);
-        let mut total = TotalAdjoint::<M, E, S, C> { jacobian, mu, sums, sizes };
+        sums.fill([zero; S]);
+        sizes.fill([zero; S]);
+        let mut total = TotalAdjoint { plan, jacobian, mu, sums, sizes };
         each_row::<A, _>(&mut total);
-        let (sums, sizes) = (total.sums.as_ref(), total.sizes.as_ref());
+        let (sums, sizes) = (&*total.sums, &*total.sizes);
         let mut good = E::le(zero, zero);
         for unknown in 0..nk {
             // Of `k` what multiplies it at its own stage, and through `ξ` at all.

@@ -10,6 +10,7 @@ use super::workspace::{Inputs, Step};
 use crate::error::{Argument, Error};
 use crate::finite::check_output;
 use crate::irk::coefficients::dot;
+use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::result::Dense;
 use crate::scalar::Real;
@@ -85,12 +86,12 @@ impl<T: Real, const S: usize> Point<T, S> {
 
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn differentiate<M: Dae>(
+    pub(crate) fn differentiate<M: Dae, F: Fallback>(
         &self,
         h: T,
         memory: &mut ForwardMemory<M, T, S>,
     ) -> Result<(), Error> {
-        memory.interpolate(&self.weights.map(|weight| h * weight), &self.lagrange);
+        memory.interpolate::<F>(&self.weights.map(|weight| h * weight), &self.lagrange);
         let dense = &memory.dense;
         for values in [
             dense.dx_dx0.as_slice(),

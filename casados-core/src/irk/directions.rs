@@ -4,24 +4,15 @@
 //! fit registers. Panels lie one after the other, so that all that is done to one happens in the
 //! nearest cache.
 
+use crate::memory::Fallback;
 use crate::model::{Dae, NO_COLUMN};
+use crate::plan::Plan;
 use crate::scalar::lanes::REGISTERS;
 use crate::scalar::{Field, Lanes};
 use crate::shape::Shape;
-use core::marker::PhantomData;
 
 /// So many bytes are in the nearest cache, beside others.
 pub(super) const L1_CACHE_BYTES: usize = 1 << 15;
-
-/// How many of some numbers, in their order, come before one: of directions that have any
-/// influence, of curved variables.
-pub(super) const fn before(numbers: &[u32], number: usize) -> usize {
-    let mut count = 0;
-    while count < numbers.len() && (numbers[count] as usize) < number {
-        count += 1;
-    }
-    count
-}
 
 /// How many columns the widest panels have: eight; of numbers that are registers themselves four,
 /// or the panel row of all stages would not fit beside what it is multiplied by. Of two stages
@@ -52,41 +43,74 @@ pub type ArrayC<M, T> = <<M as Dae>::Shape as Shape>::ArrayC<T>;
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")))]
 pub type ArrayC<M, T> = crate::model::ArrayW<M, T>;
 
-/// How many columns panels of all directions have together.
-pub(super) const fn all_columns<M: Dae, E>() -> usize {
-    padded::<E>(M::STRUCTURE.directions.len(), M::Shape::NC)
+/// How many columns panels of all directions have together: whole panels, where kernels are not
+/// compiled for one model and there is memory for them.
+pub(super) const fn all_columns<M: Dae, E, F: Fallback>() -> usize {
+    let (directions, most) = (M::STRUCTURE.directions.len(), M::Shape::NC);
+    let whole = directions.next_multiple_of(8);
+    match <F::Plan<M> as Plan>::KNOWN {
+        Some(_) => padded::<E>(directions, most),
+        None if whole <= most => whole,
+        None => directions,
+    }
+}
+
+/// The same, if it is known when kernels are compiled.
+pub(super) const fn known_columns<P: Plan, E>() -> Option<usize> {
+    match P::KNOWN {
+        Some(structure) => Some(padded::<E>(structure.directions.len(), P::NC)),
+        None => None,
+    }
+}
+
+/// Whether some panels of so many columns have this width. Of any number of columns they have the
+/// width of most, or one.
+pub(super) const fn have_panels<E>(count: Option<usize>, stages: usize, columns: usize) -> bool {
+    match (count, columns) {
+        (None, 8) => size_of::<E>() <= 8,
+        (None, 4) => size_of::<E>() > 8,
+        (None, columns) => columns == 1,
+        (Some(count), 8) => count >= 8 && width::<E>(stages, count) == 8,
+        (Some(count), 4) => count >= 4 && (count % 8 >= 4 || width::<E>(stages, count) == 4),
+        (Some(count), columns) => count % (2 * columns) >= columns,
+    }
 }
 
 /// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many
-/// as [`width`] says, four, two or one. It may begin with a later panel.
+/// as [`width`] says, four, two or one, of `$count` columns, which are `$known` when kernels are
+/// compiled or not. It may begin with a later panel.
 macro_rules! panels {
-    ($count:expr, $E:ty, $S:expr, $column:ident, $W:ident => $panel:expr) => {
-        panels!($count, $E, $S, $column from 0, $W => $panel)
+    ([$known:expr, $count:expr], $E:ty, $S:expr, $column:ident, $W:ident => $panel:expr) => {
+        panels!([$known, $count], $E, $S, $column from 0, $W => $panel)
     };
-    ($count:expr, $E:ty, $S:expr, $column:ident from $start:expr, $W:ident => $panel:expr) => {{
-        let mut $column = $start;
-        if const { $count >= 8 && $crate::irk::directions::width::<$E>($S, $count) == 8 } {
-            while $column + 8 <= const { $count } {
+    ([$known:expr, $count:expr], $E:ty, $S:expr, $column:ident from $start:expr, $W:ident => $panel:expr) => {{
+        use $crate::irk::directions::have_panels;
+        let (mut $column, count) = ($start, $count);
+        if const { have_panels::<$E>($known, $S, 8) } {
+            while $column + 8 <= count {
                 const $W: usize = 8;
                 $panel;
                 $column += 8;
             }
         }
-        if const { $count >= 4 && ($count % 8 >= 4 || $crate::irk::directions::width::<$E>($S, $count) == 4) } {
-            while $column + 4 <= const { $count } {
+        if const { have_panels::<$E>($known, $S, 4) } {
+            while $column + 4 <= count {
                 const $W: usize = 4;
                 $panel;
                 $column += 4;
             }
         }
-        if const { $count % 4 >= 2 } {
+        if const { have_panels::<$E>($known, $S, 2) } {
             const $W: usize = 2;
             $panel;
             $column += 2;
         }
-        if const { $count % 2 == 1 } {
-            const $W: usize = 1;
-            $panel;
+        if const { have_panels::<$E>($known, $S, 1) } {
+            while $column < count {
+                const $W: usize = 1;
+                $panel;
+                $column += 1;
+            }
         }
     }};
 }
@@ -94,14 +118,17 @@ pub(super) use panels;
 
 /// Where the panel of a column begins, and how many columns it has.
 #[inline(always)]
-pub(super) const fn panel_of<E>(column: usize, count: usize, stages: usize) -> (usize, usize) {
+pub(super) const fn panel_of<E>(known: bool, column: usize, count: usize, stages: usize) -> (usize, usize) {
     let (mut begin, mut width) = (0, width::<E>(stages, count));
+    if !known && size_of::<E>() > 8 {
+        width = 4;
+    }
     loop {
         let whole = begin + (count - begin) / width * width;
         if column < whole || width == 1 {
             return (begin + (column - begin) / width * width, width);
         }
-        (begin, width) = (whole, width / 2);
+        (begin, width) = (whole, if known { width / 2 } else { 1 });
     }
 }
 
@@ -118,70 +145,95 @@ pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows
 }
 
 /// How the directions depend on `w`.
-pub(crate) trait Directions<E> {
-    /// How many columns their panels have.
-    const COLUMNS: usize;
+pub(crate) trait Directions<E>: Copy {
+    /// How many columns their panels have, if that is known when kernels are compiled.
+    const COLUMNS: Option<usize>;
     /// Whether each is an element of `w`.
     const SPARSE: bool = false;
+    /// How many columns their panels have.
+    fn columns(self) -> usize;
     /// The column of an element of `w`, if that is a direction.
-    fn column(_index: usize) -> Option<usize> {
+    fn column(self, _index: usize) -> Option<usize> {
         None
     }
     /// `row += factor · dw_index`, in the columns from `column` on.
-    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]);
+    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]);
     /// `Σ_c weight_c dw_index,c` over all columns, with the weights of the first sum or the second.
-    fn total(&self, index: usize, second: bool) -> E;
+    fn total(self, index: usize, second: bool) -> E;
 }
 
 /// One direction for each element of `w` that has any influence.
-pub(crate) struct Identity<M>(PhantomData<M>);
-
-impl<M> Identity<M> {
-    pub(crate) const ALL: Self = Self(PhantomData);
+#[derive(Clone, Copy)]
+pub(crate) struct Identity<P> {
+    plan: P,
+    columns: usize,
 }
 
-impl<M: Dae> Identity<M> {
-    /// The column of a direction.
+/// That of the plan which an integrator has for its model.
+pub(crate) type IdentityOf<M, F> = Identity<<F as Fallback>::Plan<M>>;
+
+impl<P: Plan> Identity<P> {
+    /// Of numbers `E`.
     #[inline(always)]
-    pub(crate) fn column(index: usize) -> Option<usize> {
-        match M::STRUCTURE.column_of_direction.get(index) {
-            Some(&NO_COLUMN) | None => None,
-            Some(&column) => Some(column as usize),
-        }
+    pub(crate) fn of<M: Dae, E, F: Fallback<Plan<M> = P>>() -> Self {
+        Self { plan: F::plan::<M>(), columns: const { all_columns::<M, E, F>() } }
     }
 }
 
-impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
-    const COLUMNS: usize = all_columns::<M, E>();
+/// The column of a direction.
+#[inline(always)]
+pub(crate) fn column_of<P: Plan>(plan: P, index: usize) -> Option<usize> {
+    match plan.structure().column_of_direction.get(index) {
+        Some(&NO_COLUMN) | None => None,
+        Some(&column) => Some(column as usize),
+    }
+}
+
+impl<P: Plan, E: Lanes> Directions<E> for Identity<P> {
+    const COLUMNS: Option<usize> = known_columns::<P, E>();
     const SPARSE: bool = true;
 
     #[inline(always)]
-    fn column(index: usize) -> Option<usize> {
-        Self::column(index)
+    fn columns(self) -> usize {
+        match const { known_columns::<P, E>() } {
+            Some(columns) => columns,
+            None => self.columns,
+        }
+    }
+
+    #[inline(always)]
+    fn column(self, index: usize) -> Option<usize> {
+        column_of(self.plan, index)
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
-        let Some(of_index) = Self::column(index) else { return };
+    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+        let Some(of_index) = column_of(self.plan, index) else { return };
         if let Some(element) = row.get_mut(of_index.wrapping_sub(column)) {
             *element = *element + factor;
         }
     }
 
     #[inline(always)]
-    fn total(&self, index: usize, second: bool) -> E {
-        Self::column(index).map_or(E::from_f64(0.0), |column| weight(column, second))
+    fn total(self, index: usize, second: bool) -> E {
+        column_of(self.plan, index).map_or(E::from_f64(0.0), |column| weight(column, second))
     }
 }
 
 /// The rows of a matrix: each direction is a column.
+#[derive(Clone, Copy)]
 pub(crate) struct Seeded<'a, E, const C: usize>(pub &'a [[E; C]]);
 
 impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
-    const COLUMNS: usize = C;
+    const COLUMNS: Option<usize> = Some(C);
+
+    #[inline(always)]
+    fn columns(self) -> usize {
+        C
+    }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
         let seeds = self.0.get(index).and_then(|row| row.get(column..)).unwrap_or_default();
         for (element, &seed) in row.iter_mut().zip(seeds) {
             *element = *element + factor * seed;
@@ -189,7 +241,7 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
     }
 
     #[inline(always)]
-    fn total(&self, index: usize, second: bool) -> E {
+    fn total(self, index: usize, second: bool) -> E {
         let mut total = E::from_f64(0.0);
         for (column, &seed) in self.0.get(index).into_iter().flatten().enumerate() {
             total = total + weight::<E>(column, second) * seed;
@@ -216,9 +268,11 @@ mod tests {
     fn widths<E>(columns: usize, stages: usize) -> Vec<usize> {
         let (mut widths, mut column) = (Vec::new(), 0);
         while column < columns {
-            let (begin, width) = panel_of::<E>(column, columns, stages);
+            let (begin, width) = panel_of::<E>(true, column, columns, stages);
             assert_eq!(begin, column);
-            assert!((begin..begin + width).all(|of| panel_of::<E>(of, columns, stages) == (begin, width)));
+            assert!(
+                (begin..begin + width).all(|of| panel_of::<E>(true, of, columns, stages) == (begin, width))
+            );
             widths.push(width);
             column += width;
         }

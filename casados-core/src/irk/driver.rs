@@ -273,13 +273,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
 }
 
 #[cfg(feature = "alloc")]
-impl<M: Dae, T: Real, const S: usize> Run<M, T, S, Heap> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Run<M, T, S, Heap<F>> {
     /// The same settings with memory of its own. Parameters and start values for which there is no
     /// memory are as if they had never been set.
     pub fn fresh(&self) -> Self {
         let mut run = Self::empty(self.options, self.coefficients.clone(), self.time);
         let set = self.work.get().filter(|_| self.parameters || self.given);
-        if let (Some(from), Ok(to)) = (set, <Heap>::nominal(&mut run.work)) {
+        if let (Some(from), Ok(to)) = (set, <Heap<F>>::nominal(&mut run.work)) {
             (to.parameters, to.given) = (from.parameters, from.given);
             (run.parameters, run.given) = (self.parameters, self.given);
         }

@@ -116,7 +116,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
             let integrand = work.point_of(stage, integrand);
             let variables = integrand.variables();
             let (_, d) = integrand.point();
-            sweep.write_rows(coefficients, h, stage, variables, d);
+            sweep.write_rows::<F>(coefficients, h, stage, variables, d);
             integrand.forward(h * *b, second, Place { step: n, stage, iteration: 0 })?;
         }
         Ok(())

@@ -123,7 +123,7 @@ where
 /// An integrator with the same options, parameters, time and start values: its memory is its own,
 /// and empty until the first call.
 #[cfg(feature = "alloc")]
-impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
+impl<M: Dae, B, const S: usize, T: Real, F: Fallback> Clone for Integrator<M, B, S, T, Heap<F>> {
     fn clone(&self) -> Self {
         Self::empty(self.run.fresh())
     }

@@ -10,29 +10,21 @@ use super::sparse_lu::solve;
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::memory::{Fallback, OptionalPlace, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
+use crate::plan::{self, Known, Plan, PlanOf, Table};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Aligned, Array, Plain, Shape, assign};
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
 
 /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
 #[inline(always)]
 pub fn slot<M: Dae>(equation: usize) -> usize {
-    match M::STRUCTURE.elimination.slot_of_equation.get(equation) {
-        Some(&slot) => slot as usize,
-        None => equation,
-    }
+    Known::<M>::PLAN.slot(equation)
 }
 
 /// What is known of the state of a slot, if it is [kinematic](Kinematic).
 #[inline(always)]
 pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
-    let kinematic = M::STRUCTURE.elimination.kinematic;
-    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE {
-        Some(&kinematic[slot])
-    } else {
-        None
-    }
+    plan::kinematic(&M::STRUCTURE, slot)
 }
 
 /// The factors, by the plan or dense.
@@ -56,8 +48,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let blocks = &mut self.blocks;
-        dispatch(Assemble::<M, E, S> { jacobian, a, h, blocks });
-        factor::factor::<M, E, S>(blocks.as_mut());
+        let plan = F::plan::<M>();
+        let (jacobian, to) = (F::Plan::<M>::jacobian(jacobian), F::Plan::<M>::factors_mut(&mut *blocks));
+        dispatch(Assemble { plan, jacobian, a, h, blocks: to });
+        factor::factor(plan, blocks.as_mut());
     }
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of
@@ -79,8 +73,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 
     /// The factors by the plan.
-    pub fn planned(&self) -> Planned<'_, M, E, S> {
-        Planned { model: PhantomData, blocks: self.blocks.as_ref() }
+    pub fn planned(&self) -> Planned<'_, F::Plan<M>, E, S> {
+        Planned { plan: F::plan::<M>(), blocks: self.blocks.as_ref() }
     }
 
     /// Whether the factors that are there are those of the plan.
@@ -106,47 +100,57 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 }
 
 /// All blocks of the Newton matrix, each written once.
-struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
+struct Assemble<'a, M: Plan, E: Plain, const S: usize> {
+    plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
+impl<M: Plan, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { jacobian, a, h, blocks } = self;
+        let Self { plan, jacobian, a, h, blocks } = self;
+        let (jacobian, blocks) = (jacobian.as_ref(), blocks.as_mut());
         let minus_ha = minus_ha(a, h);
         let mut square = [[E::from_f64(0.0); S]; S];
-        if const { !M::STRUCTURE.elimination.dependents.is_empty() } {
+        if const { Table::Dependents.may_have::<M>() } {
             A::subtract_blocks(&mut square, &minus_ha, &minus_ha);
         }
-        each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, minus_ha, square, blocks });
+        each_row::<A, _>(&mut Rows { plan, jacobian, minus_ha, square, blocks });
     }
 }
 
 /// See [`Assemble`].
-struct Rows<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
+struct Rows<'a, M, E, const S: usize> {
+    plan: M,
+    jacobian: &'a [[E; S]],
     /// `−hA`
     minus_ha: Block<E, S>,
     /// `−(hA)²`
     square: Block<E, S>,
-    blocks: &'a mut M::Factors<Block<E, S>>,
+    blocks: &'a mut [Block<E, S>],
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
-    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+impl<M: Plan, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::Assembly.known::<M>();
+    const SIMPLE: Option<usize> = Table::Fill.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Assembly.of(self.plan.structure())
+    }
+    #[inline(always)]
+    fn simple_rows(&self) -> usize {
+        self.plan.facts().fill
+    }
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let plan = &M::STRUCTURE.elimination;
-        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some(of) = plan.assembly.get(row) else { return };
+        let Self { plan, jacobian, blocks, .. } = self;
+        let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
         if const { factor::begins_with_update::<M, E>() } && of.is_fill() {
             return;
         }
@@ -175,7 +179,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        factor::clear_fill::<M, E, _>(self.blocks.as_mut(), row, [[E::from_f64(0.0); S]; S]);
+        factor::clear_fill::<M, E, _>(self.plan, self.blocks, row, [[E::from_f64(0.0); S]; S]);
     }
 }
 

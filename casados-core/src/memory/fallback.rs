@@ -1,6 +1,10 @@
 //! What an implicit integrator does where the planned elimination is not good enough.
 
 use super::{Absent, Inside, Stored, sealed};
+use crate::model::Dae;
+#[cfg(feature = "alloc")]
+use crate::plan::ModelTable;
+use crate::plan::{Known, PlanOf};
 
 /// It pivots the whole matrix. With three stages or more it has memory for the shared Jacobian of
 /// the stages too, which Newton's method takes where iterations are not fixed.
@@ -39,12 +43,22 @@ pub struct Refusing;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OneStep;
 
-/// [`Pivoting`] or [`Refusing`].
+/// [`Pivoting`], by kernels whose plans are bound when they run: they are compiled once for all
+/// models ([`Shared`](super::Shared)).
+#[cfg(feature = "alloc")]
+#[derive(Clone, Copy, Debug)]
+pub struct RunTime;
+
+/// [`Pivoting`], [`Refusing`] or `RunTime`.
 pub trait Fallback: sealed::Sealed + 'static {
     /// A place for what only the fallback needs.
     type Place<V: Stored>: OptionalPlace<V>;
     /// Whether there is one.
     const HAS_MEMORY: bool;
+    /// What kernels know of a model.
+    type Plan<M: Dae>: PlanOf<M>;
+    /// The plan of a model.
+    fn plan<M: Dae>() -> Self::Plan<M>;
     /// Whether intervals may have several steps, and any options.
     #[doc(hidden)]
     const INTERVALS: bool = true;
@@ -58,15 +72,28 @@ pub trait OptionalPlace<V>: Stored {
     fn get_mut(&mut self) -> Option<&mut V>;
 }
 
+/// Plans that are known when kernels are compiled.
+macro_rules! known {
+    () => {
+        type Plan<M: Dae> = Known<M>;
+        #[inline(always)]
+        fn plan<M: Dae>() -> Known<M> {
+            Known::PLAN
+        }
+    };
+}
+
 impl sealed::Sealed for Pivoting {}
 impl Fallback for Pivoting {
     type Place<V: Stored> = Inside<V>;
     const HAS_MEMORY: bool = true;
+    known!();
 }
 impl sealed::Sealed for Refusing {}
 impl Fallback for Refusing {
     type Place<V: Stored> = Absent;
     const HAS_MEMORY: bool = false;
+    known!();
 }
 
 #[cfg(feature = "alloc")]
@@ -75,7 +102,21 @@ impl sealed::Sealed for OneStep {}
 impl Fallback for OneStep {
     type Place<V: Stored> = Inside<V>;
     const HAS_MEMORY: bool = true;
+    known!();
     const INTERVALS: bool = false;
+}
+
+#[cfg(feature = "alloc")]
+impl sealed::Sealed for RunTime {}
+#[cfg(feature = "alloc")]
+impl Fallback for RunTime {
+    type Place<V: Stored> = Inside<V>;
+    const HAS_MEMORY: bool = true;
+    type Plan<M: Dae> = &'static ModelTable;
+    #[inline(always)]
+    fn plan<M: Dae>() -> &'static ModelTable {
+        const { &ModelTable::of(&M::STRUCTURE) }
+    }
 }
 
 impl<V: Stored> OptionalPlace<V> for Inside<V> {

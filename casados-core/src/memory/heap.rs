@@ -35,6 +35,30 @@ use core::marker::PhantomData;
 #[derive(Clone, Copy, Debug)]
 pub struct Heap<F = fallback::Pivoting>(PhantomData<fn() -> F>);
 
+/// Memory on the heap for an integrator whose kernels are shared by all models: they take the
+/// structure of the model when they run. A program compiles them once for each method and number
+/// type, and not once more for each model; loops over the structure are not unrolled, so that a
+/// call takes longer. Results are those of [`Heap`] but for rounding errors, and so are errors.
+///
+/// It is meant for debug builds and tests, and for programs with many models; see the chapter on
+/// performance of the guide.
+///
+/// ```
+/// # use casados::prelude::*;
+/// # use nalgebra::vector;
+/// # /// A cart on a rail: position m, velocity m/s; acceleration m/s².
+/// # #[ode]
+/// # fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// use casados::memory::Shared;
+/// let mut irk = Irk::<Cart, Gauss<2>, f64, Shared>::new(Options::default())?;
+/// let step = irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// // Of polynomials the method is exact: x₊ = (x + v h + u h²/2, v + u h).
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// assert!((step.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub type Shared = Heap<fallback::RunTime>;
+
 /// A value on the heap.
 #[derive(Debug)]
 pub struct Allocated<V>(Option<Box<V>>);

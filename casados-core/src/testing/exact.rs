@@ -7,7 +7,7 @@ use super::report::{Entry, Report};
 use super::sensitivities::warn;
 use crate::error::Error;
 use crate::integrator::Integrator;
-use crate::memory::Heap;
+use crate::memory::{WithAdjoint, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::shape::Shape;
 use core::any::type_name;
@@ -72,7 +72,7 @@ pub struct Exact {
 /// report.assert();
 /// # Ok::<(), casados::Error>(())
 /// ```
-pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
+pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>>(
     coarse: &mut I,
     fine: &mut I,
     x0: &VectorX<M, f64>,

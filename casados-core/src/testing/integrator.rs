@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::integrator::Integrator;
-use crate::memory::Heap;
+use crate::memory::{WithAdjoint, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::result::{Forward, Nominal};
 use crate::shape::{Matrix, Shape};
@@ -26,7 +26,7 @@ impl Interval {
     #[allow(clippy::type_complexity)]
     fn prepare<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     ) -> Result<(VectorX<M, f64>, VectorU<M, f64>), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         if M::Shape::NP > 0 {
@@ -39,7 +39,7 @@ impl Interval {
     /// `(x, z, z0)`
     pub fn solve<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     ) -> Result<Vec<f64>, Error> {
         let (x0, u) = self.prepare(integrator)?;
         Ok(states(integrator.solve(&x0, &u, self.h)?))
@@ -48,7 +48,7 @@ impl Interval {
     /// `(x, z, z0)` and its derivatives by `w`.
     pub fn forward<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     ) -> Result<(Vec<f64>, DMatrix<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
         let forward = integrator.forward(&x0, &u, self.h)?;
@@ -58,7 +58,7 @@ impl Interval {
     /// `(x, z, z0)` and the gradient by `w`.
     pub fn adjoint<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
         lambda: &[f64],
     ) -> Result<(Vec<f64>, Vec<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
@@ -70,7 +70,7 @@ impl Interval {
     /// Everything in one call.
     pub fn hessian<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
         lambda: &[f64],
     ) -> Result<Answer, Error> {
         let (x0, u) = self.prepare(integrator)?;

@@ -11,7 +11,7 @@ use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
 use crate::integrator::Integrator;
-use crate::memory::Heap;
+use crate::memory::{WithAdjoint, WithHessian};
 use crate::model::Dae;
 use std::string::String;
 use std::vec::Vec;
@@ -26,7 +26,7 @@ pub(super) const DEVIATIONS: f64 = 32.0;
 
 /// The largest deviation of each entry over samples.
 pub(super) fn noise<M: Dae>(
-    integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+    integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     interval: &Interval,
     lambda: &[f64],
     center: &Answer,

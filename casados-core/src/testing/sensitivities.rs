@@ -9,7 +9,7 @@ use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
 use crate::integrator::Integrator;
-use crate::memory::Heap;
+use crate::memory::{WithAdjoint, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::shape::Shape;
 use core::any::type_name;
@@ -44,7 +44,10 @@ use std::vec::Vec;
 /// check_sensitivities(&mut irk, &vector![0.3, 0.0], &vector![0.5], &Default::default(), 0.1)?.assert();
 /// # Ok::<(), casados::Error>(())
 /// ```
-pub fn check_sensitivities<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
+pub fn check_sensitivities<
+    M: Dae,
+    I: Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
+>(
     integrator: &mut I,
     x0: &VectorX<M, f64>,
     u: &VectorU<M, f64>,
@@ -123,7 +126,7 @@ impl Calls<'_> {
     fn repeat<M: Dae>(
         &self,
         report: &mut Report,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
         interval: &Interval,
         lambda: &[f64],
     ) -> Result<(), Error> {
@@ -154,7 +157,7 @@ impl Calls<'_> {
     fn against_differences<M: Dae>(
         &self,
         report: &mut Report,
-        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
         interval: &Interval,
         (lambda, noise): (&[f64], &Answer),
     ) {

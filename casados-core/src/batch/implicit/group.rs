@@ -12,7 +12,7 @@ use crate::irk::{
     Linearization, StageEquations, Step, StepOf, Work, multiply,
 };
 use crate::linalg::dispatch;
-use crate::memory::{Heap, Memory, WithForward, WithHessian};
+use crate::memory::{Heap, Memory, WithForward, WithHessian, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayX, Dae, VectorZ};
 use crate::options::{Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
@@ -97,7 +97,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
                 &mut result.forward,
             )
         });
-        let good = E::and(good, forward.end(&pass.work.result, &mut result.forward).is_finite());
+        let good = E::and(good, forward.end::<Pivoting>(&pass.work.result, &mut result.forward).is_finite());
         if adjoint {
             multiply(result, <Heap>::nominal(&mut self.lambda)?.as_ref());
         }
@@ -245,7 +245,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             let to = &mut result.first.forward;
             forward.advance(pass.work, kept, pass.coefficients, at, Some(curved), to)
         });
-        let finite = forward.end(&pass.work.result, &mut result.first.forward);
+        let finite = forward.end::<Pivoting>(&pass.work.result, &mut result.first.forward);
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
@@ -258,7 +258,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             hessian.curvature(work, coefficients, n, step);
             hessian.subtract(work, kept, coefficients, record, [n, count], &[]);
         }
-        let finite = hessian.collect(None, result) + finite;
+        let finite = hessian.collect::<Pivoting>(None, result) + finite;
         Ok((E::and(good, finite.is_finite()), result))
     }
 }

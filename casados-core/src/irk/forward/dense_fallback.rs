@@ -10,10 +10,14 @@ use crate::shape::{Array, Shape};
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// Solves by the factors of the whole matrix, column by column.
-    pub(super) fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
+    pub(super) fn solve_columns<D: Directions<E>, F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        directions: D,
+    ) {
         let Work { increment, linear, .. } = work;
         let dy = R::flat_mut(self.dy_mut());
-        panels!(D::COLUMNS, E, S, column, W => {
+        panels!([D::COLUMNS, directions.columns()], E, S, column, W => {
             let rows = panel_mut::<E, W>(dy, column, M::Shape::NK * S);
             for c in 0..W {
                 take(rows, c, increment.as_mut().as_flattened_mut().as_flattened_mut());

@@ -59,7 +59,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     ) -> Result<(), Error> {
         let Parts { work, coefficients, statistics, .. } = parts;
         let Self { result, sweep, seeds } = self;
-        let of = Linearized { kept: None, coefficients, directions: &Seeded(seeds.as_ref()), first: n == 0 };
+        let of = Linearized { kept: None, coefficients, directions: Seeded(seeds.as_ref()), first: n == 0 };
         if n == 0 {
             sweep.start(of.directions);
         }
@@ -73,11 +73,11 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         let nz = M::Shape::NZ;
         if n == 0 {
             let to = &mut Single { matrix: result.dz0.as_mut_slice(), rows: nz };
-            sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.start, to);
+            sweep.write_algebraic((F::plan::<M>(), of.directions), &coefficients.start, to);
         }
         if n + 1 == count {
             let to = &mut Single { matrix: result.dz.as_mut_slice(), rows: nz };
-            sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.end, to);
+            sweep.write_algebraic((F::plan::<M>(), of.directions), &coefficients.end, to);
         }
         Ok(())
     }

@@ -1,29 +1,34 @@
 //! The matrices that derivatives are written to.
 
 use super::output::Target;
-use crate::model::{Dae, NO_COLUMN};
+use crate::model::NO_COLUMN;
+use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::shape::{Matrix, Shape};
-use core::marker::PhantomData;
+use crate::shape::Matrix;
 use core::mem::take;
 
 /// Three matrices of derivatives with respect to `x₀`, `u` and `p`, column after column.
 pub(super) struct Split<'a, M, T> {
+    plan: M,
     matrices: [&'a mut [T]; 3],
     rows: usize,
-    model: PhantomData<M>,
 }
 
-impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
-    pub fn new<X: Matrix<T>>(x: &'a mut X, u: &'a mut impl Matrix<T>, p: &'a mut impl Matrix<T>) -> Self {
+impl<'a, M: Plan, T: Lanes> Split<'a, M, T> {
+    pub fn new<X: Matrix<T>>(
+        plan: M,
+        x: &'a mut X,
+        u: &'a mut impl Matrix<T>,
+        p: &'a mut impl Matrix<T>,
+    ) -> Self {
         let matrices = [x.as_mut_slice(), u.as_mut_slice(), p.as_mut_slice()];
-        Self { matrices, rows: X::ROWS, model: PhantomData }
+        Self { plan, matrices, rows: X::ROWS }
     }
 
     /// To which matrix `dw_index` belongs, and its column there.
     #[inline(always)]
-    fn place(index: usize) -> (usize, usize) {
-        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    fn place(plan: M, index: usize) -> (usize, usize) {
+        let (nx, nu) = (plan.nx(), plan.nu());
         if index < nx {
             (0, index)
         } else if index < nx + nu {
@@ -35,9 +40,9 @@ impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
 
     /// The columns of `dx₊` in directions that have no influence.
     pub fn fill_others(&mut self) {
-        for (index, &column) in M::STRUCTURE.column_of_direction.iter().enumerate() {
+        for (index, &column) in self.plan.structure().column_of_direction.iter().enumerate() {
             if column == NO_COLUMN {
-                let ((part, column), rows) = (Self::place(index), self.rows);
+                let ((part, column), rows) = (Self::place(self.plan, index), self.rows);
                 let matrix = self.matrices.get_mut(part);
                 let column = matrix.and_then(|matrix| matrix.get_mut(column * rows..(column + 1) * rows));
                 let column = column.unwrap_or_default();
@@ -50,16 +55,16 @@ impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
     }
 }
 
-impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
+impl<M: Plan, T: Lanes> Target<T> for Split<'_, M, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
         // What is behind the last column of each: directions ascend.
         let [x, u, p] = &mut self.matrices;
         let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
-        let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
+        let directions = self.plan.structure().directions.get(column..).unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
-            let (part, own) = Self::place(direction as usize);
+            let (part, own) = Self::place(self.plan, direction as usize);
             let Some((next, rest)) = rest.get_mut(part) else { continue };
             let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
             (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
@@ -70,8 +75,8 @@ impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn following<const W: usize>(&self, column: usize) -> &[T] {
-        let Some(&first) = M::STRUCTURE.directions.get(column + W) else { return &[] };
-        let (part, own) = Self::place(first as usize);
+        let Some(&first) = self.plan.structure().directions.get(column + W) else { return &[] };
+        let (part, own) = Self::place(self.plan, first as usize);
         let from = self.matrices.get(part).and_then(|matrix| matrix.get(own * self.rows..));
         let from = from.unwrap_or_default();
         from.get(..W * self.rows).unwrap_or(from)

@@ -4,7 +4,7 @@ use super::matrices::Split;
 use super::sweep::{Linearized, Outputs, Sweep};
 use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{ArrayC, Identity};
+use crate::irk::directions::{ArrayC, Identity, IdentityOf};
 use crate::irk::driver::Parts;
 use crate::irk::workspace::{Linearization, Work};
 use crate::memory::Fallback;
@@ -48,29 +48,35 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         if at.n == 0 {
             self.sweep.start(of.directions);
         }
-        let good = self.sweep.step(work, of, &mut at.outputs(curved, to));
-        self.collect(coefficients, at, to);
+        let good = self.sweep.step(work, of, &mut at.outputs::<M, _, F>(curved, to));
+        self.collect::<F>(coefficients, at, to);
         good
     }
 
     /// What a step contributes to derivatives of `z`.
-    fn collect(&mut self, coefficients: &Coefficients<E, S>, at: StepOf, to: &mut Forward<M, E>) {
+    fn collect<F: Fallback>(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        at: StepOf,
+        to: &mut Forward<M, E>,
+    ) {
         let Self { sweep, finite: [finite] } = self;
+        let (plan, all) = (F::plan::<M>(), Identity::of::<M, E, F>());
         if at.n == 0 {
-            let to = &mut Split::<M, _>::new(&mut to.dz0_dx0, &mut to.dz0_du, &mut to.dz0_dp);
-            *finite = sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
+            let to = &mut Split::new(plan, &mut to.dz0_dx0, &mut to.dz0_du, &mut to.dz0_dp);
+            *finite = sweep.write_algebraic((plan, all), &coefficients.start, to);
         }
         if at.is_last() {
-            let to = &mut Split::<M, _>::new(&mut to.dz_dx0, &mut to.dz_du, &mut to.dz_dp);
-            *finite = *finite + sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
+            let to = &mut Split::new(plan, &mut to.dz_dx0, &mut to.dz_du, &mut to.dz_dp);
+            *finite = *finite + sweep.write_algebraic((plan, all), &coefficients.end, to);
         }
     }
 
     /// What is left to be written after the last step. Zero if all derivatives are finite, else
     /// NaN.
-    pub(crate) fn end(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
+    pub(crate) fn end<F: Fallback>(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
         to.nominal = *nominal;
-        Split::<M, _>::new(&mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp).fill_others();
+        Split::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp).fill_others();
         let ([of_x], [of_z]) = (self.sweep.finite, self.finite);
         of_x + of_z
     }
@@ -95,17 +101,18 @@ impl StepOf {
         self,
         kept: Option<&'a Linearization<M, E, S, F>>,
         coefficients: &'a Coefficients<E, S>,
-    ) -> Linearized<'a, M, E, Identity<M>, S, F> {
-        Linearized { kept, coefficients, directions: &Identity::ALL, first: self.n == 0 }
+    ) -> Linearized<'a, M, E, IdentityOf<M, F>, S, F> {
+        Linearized { kept, coefficients, directions: Identity::of::<M, E, F>(), first: self.n == 0 }
     }
 
     /// What the step writes.
-    fn outputs<'a, M: Dae, E: Lanes>(
+    fn outputs<'a, M: Dae, E: Lanes, F: Fallback>(
         self,
         curved: Option<&'a mut [E]>,
         to: &'a mut Forward<M, E>,
-    ) -> Outputs<'a, E, Split<'a, M, E>> {
-        let end = self.is_last().then(|| Split::new(&mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp));
+    ) -> Outputs<'a, E, Split<'a, F::Plan<M>, E>> {
+        let end =
+            self.is_last().then(|| Split::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp));
         Outputs { curved, end, distant: self.distant }
     }
 }
@@ -131,12 +138,12 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         let of = at.linearized(None, coefficients);
         if !good && work.linear.factors.is_planned() {
             work.factor_dense(coefficients, at.n, 0, statistics)?;
-            self.sweep.repeat(work, of, &mut at.outputs(curved, to));
+            self.sweep.repeat(work, of, &mut at.outputs::<M, _, F>(curved, to));
         }
         if const { REFINED } {
-            self.sweep.refine(work, of, &mut at.outputs(None, to));
+            self.sweep.refine(work, of, &mut at.outputs::<M, _, F>(None, to));
         }
-        self.collect(coefficients, at, to);
+        self.collect::<F>(coefficients, at, to);
         Ok(())
     }
 
@@ -144,25 +151,26 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
     ///
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(
+    pub(crate) fn finish<F: Fallback>(
         &self,
         nominal: &Nominal<M, T>,
         step: usize,
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
         // Only where one is not finite it is looked for.
-        if self.end(nominal, to).is_finite() { Ok(()) } else { crate::finite::check_forward(to, step) }
+        if self.end::<F>(nominal, to).is_finite() { Ok(()) } else { crate::finite::check_forward(to, step) }
     }
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     /// Derivatives at a point of the last step.
-    pub(crate) fn interpolate(&mut self, weights: &[T; S], lagrange: &[T; S]) {
+    pub(crate) fn interpolate<F: Fallback>(&mut self, weights: &[T; S], lagrange: &[T; S]) {
         let Self { dense, pass: ForwardPass { sweep, .. }, .. } = self;
-        let to = &mut Split::<M, _>::new(&mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
+        let (plan, all) = (F::plan::<M>(), Identity::of::<M, T, F>());
+        let to = &mut Split::new(plan, &mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
         to.fill_others();
-        sweep.write_differential::<Identity<M>>(weights, to);
-        let to = &mut Split::<M, _>::new(&mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
-        sweep.write_algebraic::<Identity<M>>(lagrange, to);
+        sweep.write_differential((plan, all), weights, to);
+        let to = &mut Split::new(plan, &mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
+        sweep.write_algebraic((plan, all), lagrange, to);
     }
 }

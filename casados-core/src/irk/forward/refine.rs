@@ -96,10 +96,10 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         &mut self,
         work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
-        directions: &D,
+        directions: D,
     ) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
-        panels!(D::COLUMNS, T, S, column, W => {
+        panels!([D::COLUMNS, directions.columns()], T, S, column, W => {
             let mut right = ArrayK::<M, PanelRow<T, S, W>>::zeroed();
             for c in 0..W {
                 let inputs = work.probe[0].as_mut().get_mut(nx + nk..).unwrap_or_default();

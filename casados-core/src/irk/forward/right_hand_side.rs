@@ -6,24 +6,23 @@
 //! ```
 
 use crate::irk::directions::{Directions, panel_of};
-use crate::irk::jacobian_entries::entry;
 use crate::irk::kinematic::{KinematicPanel, dependence, minus_c};
-use crate::linalg::{Arithmetic, AtRow, PanelRow, each_row, is_short, kinematic, slot};
-use crate::model::{Dae, Dependent};
+use crate::linalg::{Arithmetic, AtRow, PanelRow, each_row, is_short};
+use crate::model::Dependent;
+use crate::plan::{Plan, Table};
 use crate::scalar::{Lanes, each};
-use crate::shape::{Plain, Shape};
-use core::marker::PhantomData;
 
 /// Right-hand sides where every direction is an element of `w` and `V_n` the unit matrix: entries
 /// of the Jacobian go to their places in all panels.
-pub(in crate::irk) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
+pub(in crate::irk) struct Scatter<'a, M, E, D, const S: usize> {
+    pub plan: M,
+    pub jacobian: &'a [[E; S]],
     pub nodes: &'a [E; S],
     pub dy: &'a mut [E],
-    pub directions: PhantomData<D>,
+    pub directions: D,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
     /// Places all of them.
     #[inline(always)]
     pub fn all<A: Arithmetic>(&mut self) {
@@ -34,8 +33,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
     /// Subtracts from one column of an equation.
     #[inline(always)]
     fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
-        let nk = M::Shape::NK;
-        let (begin, width) = panel_of::<E>(column, D::COLUMNS, S);
+        let nk = self.plan.nk();
+        let (begin, width) = panel_of::<E>(true, column, self.directions.columns(), S);
         let place = begin * nk * S + (column - begin);
         each!(i < S => {
             if let Some(to) = self.dy.get_mut(place + (slot * S + i) * width) {
@@ -45,16 +44,21 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
     }
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
     /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
+    const ROWS: Option<usize> = Table::Entries(1, 5).known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Entries(1, 5).of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let slot = slot::<M>(r);
-        if kinematic::<M>(slot).is_none()
-            && let Some(column) = direction::<M, E, D>(c)
+        let (plan, first) = (self.plan, self.plan.structure().blocks[1]);
+        let Some((r, c, values)) = plan.entry(self.jacobian, first + row) else { return };
+        let slot = plan.slot(r);
+        if plan.kinematic(slot).is_none()
+            && let Some(column) = direction::<M, E, D>(plan, self.directions, c)
         {
             self.subtract(slot, column, values);
         }
@@ -62,17 +66,21 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
 }
 
 /// The entries by which other equations depend on kinematic states.
-struct ScatterDependents<'a, 'b, M: Dae, E: Plain, D, const S: usize>(&'a mut Scatter<'b, M, E, D, S>);
+struct ScatterDependents<'a, 'b, M, E, D, const S: usize>(&'a mut Scatter<'b, M, E, D, S>);
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDependents<'_, '_, M, E, D, S> {
-    const ROWS: usize = M::STRUCTURE.elimination.dependents.len();
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDependents<'_, '_, M, E, D, S> {
+    const ROWS: Option<usize> = Table::Dependents.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Dependents.of(self.0.plan.structure())
+    }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some(dependent) = M::STRUCTURE.elimination.dependents.get(row) else { return };
-        let through = through::<M, E, S>(self.0.jacobian, self.0.nodes, dependent);
-        let Some((slot, velocity, products)) = through else { return };
-        if let Some(column) = direction::<M, E, D>(velocity) {
+        let Scatter { plan, jacobian, nodes, directions, .. } = &*self.0;
+        let Some(dependent) = plan.structure().elimination.dependents.get(row) else { return };
+        let Some((slot, velocity, products)) = through(*plan, jacobian, nodes, dependent) else { return };
+        if let Some(column) = direction::<M, E, D>(*plan, *directions, velocity) {
             self.0.subtract(slot, column, &products);
         }
     }
@@ -81,14 +89,15 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDepend
 /// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`,
 /// with its slot and the variable.
 #[inline(always)]
-fn through<M: Dae, E: Lanes, const S: usize>(
-    jacobian: &M::Jacobian<[E; S]>,
+fn through<M: Plan, E: Lanes, const S: usize>(
+    plan: M,
+    jacobian: &[[E; S]],
     nodes: &[E; S],
     of: &Dependent,
 ) -> Option<(usize, usize, [E; S])> {
-    let kinematic = kinematic::<M>(of.state as usize)?;
-    let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
-    let (slot, &(mut products), derivative) = dependence::<M, E, S>(of, jacobian)?;
+    let kinematic = plan.kinematic(of.state as usize)?;
+    let minus_c = minus_c(kinematic, jacobian)?;
+    let (slot, &(mut products), derivative) = dependence(plan, of, jacobian)?;
     each!(i < S => {
         let factor = if derivative { minus_c } else { nodes[i] * minus_c };
         products[i] = -(products[i] * factor);
@@ -98,8 +107,8 @@ fn through<M: Dae, E: Lanes, const S: usize>(
 
 /// An entry of the Jacobian, by columns.
 #[inline(always)]
-fn by_column<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Option<(usize, usize, &V)> {
-    entry::<M, V>(jacobian, *M::STRUCTURE.by_column.get(index)? as usize)
+fn by_column<M: Plan, V>(plan: M, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
+    plan.entry(jacobian, *plan.structure().by_column.get(index)? as usize)
 }
 
 /// Entries of the Jacobian that are in their panels.
@@ -114,22 +123,22 @@ pub(in crate::irk) struct Placed {
 /// The same of a panel that begins with a column: entries column by column, those that follow the
 /// ones of the panel before.
 #[inline(always)]
-pub(in crate::irk) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
-    jacobian: &M::Jacobian<[E; S]>,
+pub(in crate::irk) fn place<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
+    (plan, directions): (M, D),
+    jacobian: &[[E; S]],
     nodes: &[E; S],
     placed: &mut Placed,
     dy: &mut [PanelRow<E, S, W>],
     begin: usize,
 ) {
     for (slot, panel_row) in dy.iter_mut().enumerate() {
-        if kinematic::<M>(slot).is_none() {
+        if plan.kinematic(slot).is_none() {
             *panel_row = [[E::from_f64(0.0); W]; S];
         }
     }
-    while let Some(dependent) = M::STRUCTURE.elimination.dependents.get(placed.dependents) {
-        let through = through::<M, E, S>(jacobian, nodes, dependent);
-        if let Some((slot, velocity, products)) = through
-            && let Some(column) = direction::<M, E, D>(velocity)
+    while let Some(dependent) = plan.structure().elimination.dependents.get(placed.dependents) {
+        if let Some((slot, velocity, products)) = through(plan, jacobian, nodes, dependent)
+            && let Some(column) = direction::<M, E, D>(plan, directions, velocity)
         {
             if column >= begin + W {
                 break;
@@ -138,13 +147,13 @@ pub(in crate::irk) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, 
         }
         placed.dependents += 1;
     }
-    while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed.entries) {
-        if let Some(column) = direction::<M, E, D>(c) {
+    while let Some((r, c, values)) = by_column(plan, jacobian, placed.entries) {
+        if let Some(column) = direction::<M, E, D>(plan, directions, c) {
             if column >= begin + W {
                 break;
             }
-            if kinematic::<M>(slot::<M>(r)).is_none() {
-                subtract_at(dy, slot::<M>(r), column - begin, values);
+            if plan.kinematic(plan.slot(r)).is_none() {
+                subtract_at(dy, plan.slot(r), column - begin, values);
             }
         }
         placed.entries += 1;
@@ -169,24 +178,22 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
 
 /// The direction that a variable other than `ẋ` is, if it is one.
 #[inline(always)]
-fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
-    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+fn direction<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variable: usize) -> Option<usize> {
+    let (nx, nz) = (plan.nx(), plan.nz());
     if variable >= 2 * nx && variable < 2 * nx + nz {
         return None;
     }
-    D::column(if variable < 2 * nx { variable - nx } else { variable - nx - nz })
+    directions.column(if variable < 2 * nx { variable - nx } else { variable - nx - nz })
 }
 
 /// The same of a panel, whatever `V_n` is.
-pub(in crate::irk) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+pub(in crate::irk) struct Later<'a, M, E, D, const S: usize, const W: usize> {
     pub kinematic: KinematicPanel<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
     pub dy: &'a mut [PanelRow<E, S, W>],
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
-    /// The first entry of `f_x`.
-    const FIRST: usize = M::STRUCTURE.blocks[1];
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// Whether an unrolled loop begins with zeros everywhere: of plain numbers that is less than a
     /// row that begins with its first entry.
     const AT_ONCE: bool = size_of::<E>() <= 8;
@@ -196,43 +203,43 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         if const { Self::AT_ONCE && is_short::<A, Self>() } {
             self.dy.fill([[E::from_f64(0.0); W]; S]);
         }
+        let plan = self.kinematic.plan;
         self.kinematic.place::<A>(self.nodes, self.dy);
         if const { is_short::<A, Self>() } {
             each_row::<A, _>(&mut self);
             if const { !Self::AT_ONCE } {
-                self.clear(const { Self::after(Self::ROWS) }, M::Shape::NK);
+                self.clear(const { Self::after_all() }, plan.nk());
             }
         } else {
             self.row_by_row::<A>();
         }
         self.kinematic.subtract_derivatives::<A>(self.dy);
         let KinematicPanel { jacobian, directions, column, .. } = self.kinematic;
-        each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy: &mut *self.dy, column });
+        each_row::<A, _>(&mut Inputs { plan, jacobian, directions, dy: &mut *self.dy, column });
     }
 
     /// Each row in registers, and written once; zeros where equations have no states.
     #[inline(always)]
     fn row_by_row<A: Arithmetic>(&mut self) {
         let (mut panel_row, mut last) = ([[E::from_f64(0.0); W]; S], 0);
-        for row in 0..Self::ROWS {
-            let Some((r, c, values)) = entry::<M, _>(self.kinematic.jacobian, Self::FIRST + row) else {
-                return;
-            };
+        let (plan, blocks) = (self.kinematic.plan, &self.kinematic.plan.structure().blocks);
+        for index in blocks[1]..blocks[2] {
+            let Some((r, c, values)) = plan.entry(self.kinematic.jacobian, index) else { return };
             if last != r {
                 self.put(last, &panel_row);
                 self.clear(last + 1, r);
                 (panel_row, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            self.subtract::<A>(&mut panel_row, c - M::Shape::NX, values);
+            self.subtract::<A>(&mut panel_row, c - plan.nx(), values);
         }
         self.put(last, &panel_row);
-        self.clear(last + 1, M::Shape::NK);
+        self.clear(last + 1, plan.nk());
     }
 
     /// `panel_row − f_x,i V`, of one state.
     #[inline(always)]
     fn subtract<A: Arithmetic>(&self, panel_row: &mut PanelRow<E, S, W>, state: usize, values: &[E; S]) {
-        if kinematic::<M>(state).is_some() {
+        if self.kinematic.plan.kinematic(state).is_some() {
             let Some(x) = self.dy.get(state) else { return };
             each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], &x[i]); });
             return;
@@ -242,15 +249,27 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     }
 
     /// The equation that follows that of the entry before this one.
-    const fn after(row: usize) -> usize {
-        if row == 0 { 0 } else { M::STRUCTURE.jacobian.at(Self::FIRST + row - 1).0 + 1 }
+    #[inline(always)]
+    fn after(&self, row: usize) -> usize {
+        let structure = self.kinematic.plan.structure();
+        match structure.jacobian.rows.get((structure.blocks[1] + row).wrapping_sub(1)) {
+            Some(&equation) if row > 0 => equation as usize + 1,
+            _ => 0,
+        }
+    }
+
+    /// The equation that follows that of the last entry, where kernels are compiled for one model.
+    const fn after_all() -> usize {
+        let Some(structure) = M::KNOWN else { return 0 };
+        let [_, begin, end, ..] = structure.blocks;
+        if begin == end { 0 } else { structure.jacobian.at(end - 1).0 + 1 }
     }
 
     /// The row of an equation.
     #[inline(always)]
     fn put(&mut self, equation: usize, panel_row: &PanelRow<E, S, W>) {
-        let slot = slot::<M>(equation);
-        if kinematic::<M>(slot).is_some() {
+        let slot = self.kinematic.plan.slot(equation);
+        if self.kinematic.plan.kinematic(slot).is_some() {
             return;
         }
         if let Some(to) = self.dy.get_mut(slot) {
@@ -267,14 +286,19 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     }
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Later<'_, M, E, D, S, W> {
-    const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Later<'_, M, E, D, S, W> {
+    const ROWS: Option<usize> = Table::Entries(1, 2).known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Entries(1, 2).of(self.kinematic.plan.structure())
+    }
     const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.kinematic.jacobian, Self::FIRST + row) else { return };
-        let slot = slot::<M>(r);
-        let next = Self::after(row);
+        let (plan, first) = (self.kinematic.plan, self.kinematic.plan.structure().blocks[1]);
+        let Some((r, c, values)) = plan.entry(self.kinematic.jacobian, first + row) else { return };
+        let slot = plan.slot(r);
+        let next = self.after(row);
         // The first entry of an equation has nothing to add to.
         let mut panel_row = [[E::from_f64(0.0); W]; S];
         if Self::AT_ONCE || r < next {
@@ -282,10 +306,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         } else {
             self.clear(next, r);
         }
-        if kinematic::<M>(slot).is_some() {
+        if plan.kinematic(slot).is_some() {
             return;
         }
-        self.subtract::<A>(&mut panel_row, c - M::Shape::NX, values);
+        self.subtract::<A>(&mut panel_row, c - plan.nx(), values);
         if let Some(to) = self.dy.get_mut(slot) {
             *to = panel_row;
         }
@@ -293,22 +317,29 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
 }
 
 /// `−f_w,i` of a panel, of controls and parameters.
-struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    directions: &'a D,
+struct Inputs<'a, M, E, D, const S: usize, const W: usize> {
+    plan: M,
+    jacobian: &'a [[E; S]],
+    directions: D,
     dy: &'a mut [PanelRow<E, S, W>],
     column: usize,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Inputs<'_, M, E, D, S, W> {
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[3];
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow
+    for Inputs<'_, M, E, D, S, W>
+{
+    const ROWS: Option<usize> = Table::Entries(3, 5).known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Entries(3, 5).of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 4 + 2 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let shift = M::Shape::NX + M::Shape::NZ;
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
-        let slot = slot::<M>(r);
-        let (None, Some(panel_row)) = (kinematic::<M>(slot), self.dy.get_mut(slot)) else { return };
+        let (plan, shift, first) = (self.plan, self.plan.nk(), self.plan.structure().blocks[3]);
+        let Some((r, c, values)) = plan.entry(self.jacobian, first + row) else { return };
+        let slot = plan.slot(r);
+        let (None, Some(panel_row)) = (plan.kinematic(slot), self.dy.get_mut(slot)) else { return };
         for (row, &value) in panel_row.iter_mut().zip(values) {
             self.directions.add(c - shift, -value, self.column, row);
         }

@@ -3,6 +3,7 @@
 use super::memory::ForwardPass;
 use super::output::Target;
 use crate::irk::directions::Identity;
+use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
 use crate::shape::Plain;
@@ -14,7 +15,8 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         for direction in to.as_mut() {
             direction.as_mut().fill(T::ZERO);
         }
-        self.sweep.write_slopes::<Identity<M>>(weights, &mut Rows::<M, T> { rows: to });
+        let all = (Pivoting::plan::<M>(), Identity::of::<M, T, Pivoting>());
+        self.sweep.write_slopes(all, weights, &mut Rows::<M, T> { rows: to });
     }
 }
 

@@ -16,6 +16,7 @@ use crate::linalg::{
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
+use crate::plan::{Plan, PlanOf, Table};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Array, Plain, Shape, copy};
 use bytemuck::Zeroable;
@@ -45,11 +46,11 @@ pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F:
     /// Where its factors are, if they are not where they are made.
     pub kept: Option<&'a Linearization<M, E, S, F>>,
     pub coefficients: &'a Coefficients<E, S>,
-    pub directions: &'a D,
+    pub directions: D,
     /// Whether it is the first of the interval.
     pub first: bool,
 }
-copy!(['a, M: Dae, E: Lanes, D, const S: usize, F: Fallback] Linearized<'a, M, E, D, S, F>);
+copy!(['a, M: Dae, E: Lanes, D: Copy, const S: usize, F: Fallback] Linearized<'a, M, E, D, S, F>);
 
 /// What a step writes beside its own memory.
 pub(in crate::irk) struct Outputs<'a, E, G> {
@@ -74,7 +75,7 @@ pub(in crate::irk) enum Phase {
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// `V_0`
-    pub(crate) fn start<D: Directions<E>>(&mut self, directions: &D) {
+    pub(crate) fn start<D: Directions<E>>(&mut self, directions: D) {
         self.end = false;
         // Without an operating system every call takes the same time, the first one too.
         if !(cfg!(feature = "std") && D::SPARSE && self.begun) {
@@ -107,7 +108,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             self.run(work, of, outputs, Phase::Whole, false);
         } else {
             self.run(work, of, outputs, Phase::Before, false);
-            self.solve_columns::<D, F>(work);
+            self.solve_columns(work, of.directions);
             self.run(work, of, outputs, Phase::After, false);
         }
         let good = work.verify_forward(self, of.coefficients, of.directions, false);
@@ -131,9 +132,10 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         let Self { v, end, dy, sums, start_sums, finite, .. } = self;
         let [start, other] = v;
         let (v, next) = if *end { (start, other) } else { (other, start) };
-        *finite = [dispatch(Step::<M, E, D, G, F, S> {
+        *finite = [dispatch(Step::<_, E, D, G, F, S> {
+            plan: F::plan::<M>(),
             phase,
-            jacobian: &work.linear.jacobian,
+            jacobian: F::Plan::<M>::jacobian(&work.linear.jacobian),
             factors: work.linear(kept).factors.planned(),
             coefficients,
             h: work.inputs.time.step,
@@ -186,10 +188,10 @@ kernels! {
     fn unit_or_seeds [E: Lanes, D: Directions<E>, const S: usize] [E, D, S] <A>(
         v: &'k mut [E],
         rows: usize,
-        directions: &'k D,
+        directions: D,
     ) {
         v.fill(E::from_f64(0.0));
-        panels!(D::COLUMNS, E, S, column, W => {
+        panels!([D::COLUMNS, directions.columns()], E, S, column, W => {
             for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {
                 directions.add(index, E::from_f64(1.0), column, row);
             }
@@ -198,13 +200,14 @@ kernels! {
 }
 
 /// See [`Sweep::step`].
-struct Step<'a, M: Dae, E: Plain, D, G, F, const S: usize> {
+struct Step<'a, M: Plan, E: Plain, D, G, F, const S: usize> {
+    plan: M,
     phase: Phase,
     jacobian: &'a M::Jacobian<[E; S]>,
     factors: Planned<'a, M, E, S>,
     coefficients: &'a Coefficients<E, S>,
     h: E,
-    directions: &'a D,
+    directions: D,
     first: bool,
     v: &'a [E],
     next: &'a mut [E],
@@ -218,7 +221,7 @@ struct Step<'a, M: Dae, E: Plain, D, G, F, const S: usize> {
     sum: E,
     second: bool,
     placed: Placed,
-    of: PhantomData<(M, F)>,
+    of: PhantomData<F>,
 }
 
 /// What all panels share.
@@ -231,12 +234,12 @@ struct Shared<E, const S: usize> {
     minus_weights: [E; S],
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize> Kernel
+impl<M: Plan, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize> Kernel
     for Step<'_, M, E, D, G, F, S>
 {
     type Number = E;
     type Output = E;
-    const WIDE: bool = is_long::<M, S>() && D::COLUMNS >= 8;
+    const WIDE: bool = is_long::<M, S>() && matches!(D::COLUMNS, Some(8..));
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) -> E {
         let nodes = nodes(&self.coefficients.a, self.h);
@@ -252,8 +255,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         }
         if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
-            let (jacobian, dy) = (self.jacobian, &mut *self.dy);
-            Scatter::<M, E, D, S> { jacobian, nodes: &nodes, dy, directions: PhantomData }.all::<A>();
+            let Self { plan, directions, .. } = self;
+            let jacobian = self.jacobian.as_ref();
+            Scatter { plan, jacobian, nodes: &nodes, dy: &mut *self.dy, directions }.all::<A>();
         }
         let Self { coefficients, h, .. } = self;
         let mut minus_weights = coefficients.b;
@@ -261,13 +265,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
             *weight = -(h * *weight);
         }
         let shared = &Shared { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
-        panels!(D::COLUMNS, E, S, column, W => self.panel::<A, W>(column, shared));
+        let columns = self.directions.columns();
+        panels!([D::COLUMNS, columns], E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum
     }
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize>
+impl<M: Plan, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize>
     Step<'_, M, E, D, G, F, S>
 {
     /// Whether `V_n` is always the unit matrix.
@@ -276,7 +281,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
     /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
-        let bytes = D::COLUMNS * M::Shape::NK * S * size_of::<E>();
+        let (Some(columns), Some(nk)) = (D::COLUMNS, Table::Unknowns.known::<M>()) else { return false };
+        let bytes = columns * nk * S * size_of::<E>();
         bytes <= L1_CACHE_BYTES && is_short::<A, Scatter<'_, M, E, D, S>>()
     }
 
@@ -289,7 +295,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
     #[inline(always)]
     fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<E, S>) {
         self.before::<A, W>(column, &shared.nodes);
-        let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, self.plan.nk() * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole {
             if const { Self::sums_late::<A>() } {
@@ -310,19 +316,19 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
     /// The right-hand side of a panel, with `h c_i`.
     #[inline(always)]
     fn before<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
-        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let (plan, nx, nk) = (self.plan, self.plan.nx(), self.plan.nk());
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
         // Lengths that the optimiser knows need no looking at.
         if self.phase == Phase::After || v.len() != nx || dy.len() != nk {
             return;
         }
-        let (jacobian, directions) = (self.jacobian, self.directions);
+        let (jacobian, directions) = (self.jacobian.as_ref(), self.directions);
         if const { !Self::UNIT } && !(self.first && D::SPARSE) {
-            let kinematic = KinematicPanel { jacobian, v, directions, column };
-            Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
+            let kinematic = KinematicPanel { plan, jacobian, v, directions, column };
+            Later { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
-            place::<M, E, D, S, W>(jacobian, nodes, &mut self.placed, dy, column);
+            place::<M, E, D, S, W>((plan, directions), jacobian, nodes, &mut self.placed, dy, column);
         }
     }
 
@@ -334,14 +340,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         minus_weights: &[E; W],
         shared: &Shared<E, S>,
     ) {
-        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let (plan, nx, nk) = (self.plan, self.plan.nx(), self.plan.nk());
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
         if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
             return;
         }
-        let (jacobian, directions) = (self.jacobian, self.directions);
-        let kinematic = KinematicPanel::<M, E, D, S, W> { jacobian, v, directions, column };
+        let (jacobian, directions) = (self.jacobian.as_ref(), self.directions);
+        let kinematic = KinematicPanel { plan, jacobian, v, directions, column };
         let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
         if const { !Self::sums_late::<A>() } && self.phase != Phase::After {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
@@ -357,7 +363,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
         }
         // The unit matrix need not be read.
         let from = if unit { None } else { Some(v) };
-        let ones = if unit { M::STRUCTURE.directions.get(column..).unwrap_or_default() } else { &[] };
+        let ones = if unit { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
             let end =
                 Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
@@ -378,10 +384,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usi
             }
         }
         if let Some(curved) = &mut self.curved {
-            let count = M::STRUCTURE.curved.len();
+            let count = plan.structure().curved.len();
             let d = panel_mut::<E, W>(curved, column, count * S);
-            CurvedRows::<M, E, D, S> { minus_ha: shared.minus_ha, directions, model: PhantomData }
-                .panel::<A, W>(v, dy, d, column);
+            CurvedRows { plan, minus_ha: shared.minus_ha, directions }.panel::<A, W>(v, dy, d, column);
         }
     }
 }

@@ -8,28 +8,12 @@
 //! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
 //! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
 
+use super::products::Square;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::before;
-use crate::irk::forward::stage_rows::row_of;
-use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, PanelRow, slot};
-use crate::model::Dae;
+use crate::irk::forward::stage_rows::Rows;
+use crate::linalg::{Arithmetic, PanelRow};
+use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::shape::{Array, Plain, Shape};
-
-/// Whether each equation that has a derivative has that of one state, in their order: the entries
-/// of `f_ẋ` then are those of the states.
-pub(in crate::irk) const fn is_direct<M: Dae>() -> bool {
-    let (count, pattern) = (M::STRUCTURE.blocks[1], &M::STRUCTURE.jacobian);
-    let mut entry = 0;
-    while entry < count {
-        if pattern.at(entry).1 != entry {
-            return false;
-        }
-        entry += 1;
-    }
-    count == M::Shape::NX
-}
 
 /// `−ω`, and `1 − bᵀ A⁻¹ 1`.
 pub(in crate::irk) struct Inverse<E, const S: usize> {
@@ -85,12 +69,14 @@ fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
 }
 
 /// Of a panel.
-pub(in crate::irk) struct Advance<'a, M: Dae, E: Plain, R, const S: usize, const W: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
+pub(in crate::irk) struct Advance<'a, 'b, M, E, const S: usize, const W: usize> {
+    pub plan: M,
+    pub rows: Rows,
+    pub jacobian: &'a [[E; S]],
     pub g: &'a [[E; W]],
     pub m: &'a [PanelRow<E, S, W>],
     /// `(Λ, Λ_w)`
-    pub sum: &'a mut [R],
+    pub sum: &'a mut Square<'b, E>,
     pub column: usize,
     /// Only the lower triangle is wanted.
     pub first: bool,
@@ -101,16 +87,16 @@ pub(in crate::irk) struct Advance<'a, M: Dae, E: Plain, R, const S: usize, const
     pub placed: &'a mut usize,
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, M, E, R, S, W> {
+impl<M: Plan, E: Lanes, const S: usize, const W: usize> Advance<'_, '_, M, E, S, W> {
     #[inline(always)]
     pub fn all<A: Arithmetic>(mut self) {
         let mut row = if self.first { self.column } else { 0 };
-        if const { is_direct::<M>() }
+        if self.plan.facts().direct
             && let Some(inverse) = self.inverse
         {
             let mut derivative = 0;
-            while let Some(&direction) = M::STRUCTURE.directions.get(row)
-                && (direction as usize) < M::Shape::NX
+            while let Some(&direction) = self.plan.structure().directions.get(row)
+                && (direction as usize) < self.plan.nx()
             {
                 self.direct::<A>(inverse, row, direction as usize, &mut derivative);
                 row += 1;
@@ -130,23 +116,23 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
     ) {
         let mut panel_row = [E::from_f64(0.0); W];
         if !self.last
-            && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
+            && let Some(lambda) = columns::<E, W>(self.sum, row, self.column)
         {
             A::subtract_row(&mut panel_row, -inverse.keep, lambda);
         }
-        if let Some((equation, _, values)) = entry::<M, _>(self.jacobian, state)
-            && let Some(m) = self.m.get(slot::<M>(equation))
+        if let Some((equation, _, values)) = self.plan.entry(self.jacobian, state)
+            && let Some(m) = self.m.get(self.plan.slot(equation))
         {
             for ((&weight, &value), m) in inverse.minus_weights.iter().zip(values).zip(m) {
                 A::subtract_row(&mut panel_row, weight * value, m);
             }
         }
-        while let Some(&of) = M::STRUCTURE.curved.get(*derivative)
+        while let Some(&of) = self.plan.structure().curved.get(*derivative)
             && of as usize <= state
         {
             for (stage, &weight) in inverse.minus_weights.iter().enumerate() {
                 if of as usize == state
-                    && let Some(g) = self.g.get(row_of::<M, E, S>(*derivative, stage))
+                    && let Some(g) = self.g.get(self.rows.at::<S>(*derivative, stage))
                 {
                     A::subtract_row(&mut panel_row, -weight, g);
                 }
@@ -159,43 +145,44 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
     /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
     #[inline(always)]
     fn by_entries<A: Arithmetic>(&mut self, begin: usize) {
-        let (mut place, mut c, mut row) =
-            (*self.placed, const { before(M::STRUCTURE.curved, M::Shape::NX) }, begin);
-        while let Some(&direction) = M::STRUCTURE.directions.get(row) {
-            let variable = variable_of::<M>(direction as usize);
+        let plan = self.plan;
+        let (mut place, mut row) = (*self.placed, begin);
+        let mut c = plan.facts().curved[0];
+        while let Some(&direction) = plan.structure().directions.get(row) {
+            let variable = variable_of(plan, direction as usize);
             // One sum for each stage: an addition to one does not wait for that to another.
             let mut sums = [[E::from_f64(0.0); W]; S];
             if !self.last
-                && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
+                && let Some(lambda) = columns::<E, W>(self.sum, row, self.column)
             {
                 sums[0] = *lambda;
             }
             // Entries of algebraic states, and of rows that are not wanted, are passed by.
-            while let Some(of) = variable_at::<M>(place)
+            while let Some(of) = variable_at(plan, place)
                 && of < variable
             {
                 place += 1;
             }
             // Those are not wanted in later panels either.
-            if row == begin && (self.first || const { is_direct::<M>() } && self.inverse.is_some()) {
+            if row == begin && (self.first || plan.facts().direct && self.inverse.is_some()) {
                 *self.placed = place;
             }
-            while let Some(&index) = M::STRUCTURE.by_column.get(place)
-                && let Some((equation, of, values)) = entry::<M, _>(self.jacobian, index as usize)
+            while let Some(&index) = plan.structure().by_column.get(place)
+                && let Some((equation, of, values)) = plan.entry(self.jacobian, index as usize)
                 && of == variable
             {
                 place += 1;
-                if let Some(m) = self.m.get(slot::<M>(equation)) {
+                if let Some(m) = self.m.get(self.plan.slot(equation)) {
                     for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
                         A::subtract_row(sum, value, m);
                     }
                 }
             }
-            while let Some(&of) = M::STRUCTURE.curved.get(c)
+            while let Some(&of) = self.plan.structure().curved.get(c)
                 && of as usize <= variable
             {
                 if of as usize == variable {
-                    add_stages::<A, M, E, S, W>(&mut sums, self.g, c);
+                    add_stages::<A, E, S, W>(self.rows, &mut sums, self.g, c);
                 }
                 c += 1;
             }
@@ -211,8 +198,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
 
     #[inline(always)]
     fn put(&mut self, row: usize, panel_row: &[E; W]) {
-        let to = self.sum.get_mut(row).and_then(|row| row.as_mut().get_mut(self.column..));
-        if let Some(to) = to.and_then(|to| to.first_chunk_mut()) {
+        if let Some(to) = self.sum.row_mut(row, self.column).and_then(|to| to.first_chunk_mut()) {
             *to = *panel_row;
         }
     }
@@ -220,40 +206,38 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
 
 /// The variable that an entry belongs to, in their order by columns.
 #[inline(always)]
-fn variable_at<M: Dae>(place: usize) -> Option<usize> {
-    let &entry = M::STRUCTURE.by_column.get(place)?;
-    Some(*M::STRUCTURE.jacobian.columns.get(entry as usize)? as usize)
+fn variable_at<M: Plan>(plan: M, place: usize) -> Option<usize> {
+    let &entry = plan.structure().by_column.get(place)?;
+    Some(*plan.structure().jacobian.columns.get(entry as usize)? as usize)
 }
 
 /// The variable that a direction is.
 #[inline(always)]
-const fn variable_of<M: Dae>(direction: usize) -> usize {
-    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+fn variable_of<M: Plan>(plan: M, direction: usize) -> usize {
+    let (nx, nz) = (plan.nx(), plan.nz());
     nx + direction + if direction < nx { 0 } else { nz }
 }
 
 /// A few columns of a row.
 #[inline(always)]
-pub(in crate::irk) fn columns<E: Plain, R: Array<E>, const W: usize>(
-    rows: &[R],
+pub(in crate::irk) fn columns<'a, E, const W: usize>(
+    of: &'a Square<'_, E>,
     row: usize,
     column: usize,
-) -> Option<&[E; W]> {
-    match rows.get(row) {
-        Some(row) => row.as_ref().get(column..)?.first_chunk(),
-        None => None,
-    }
+) -> Option<&'a [E; W]> {
+    of.row(row, column)?.first_chunk()
 }
 
 /// `panel_row += G` of a curved variable.
 #[inline(always)]
-pub(in crate::irk) fn add_stages<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+pub(in crate::irk) fn add_stages<A: Arithmetic, E: Lanes, const S: usize, const W: usize>(
+    rows: Rows,
     panel_row: &mut PanelRow<E, S, W>,
     g: &[[E; W]],
     curved: usize,
 ) {
     for (stage, row) in panel_row.iter_mut().enumerate() {
-        if let Some(g) = g.get(row_of::<M, E, S>(curved, stage)) {
+        if let Some(g) = g.get(rows.at::<S>(curved, stage)) {
             A::subtract_row(row, E::from_f64(-1.0), g);
         }
     }

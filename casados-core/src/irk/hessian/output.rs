@@ -2,42 +2,44 @@
 //! have any influence, to the matrices of results: those over one part of `w = (x₀, u, p)` have
 //! both triangles, those over two parts lie whole in the one that was found.
 
-use crate::irk::directions::{ArrayC, Identity, before};
+use super::products::Square;
+use crate::irk::directions::column_of;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::model::{ArrayW, Dae};
+use crate::model::Dae;
+use crate::plan::{Plan, before};
 use crate::result::Hessian;
 use crate::scalar::Lanes;
-use crate::shape::{Matrix, Plain, Shape};
-use core::marker::PhantomData;
+use crate::shape::Matrix;
+use crate::structure::Structure;
 
 /// A lower triangle.
-pub(in crate::irk) struct Triangle<'a, M: Dae, E: Plain> {
-    pub rows: &'a [ArrayC<M, E>],
+pub(in crate::irk) struct Triangle<'a, M, E> {
+    pub plan: M,
+    pub rows: Square<'a, E>,
     /// What an integrand adds, over all directions: a lower triangle, too.
-    pub more: Option<&'a [ArrayW<M, E>]>,
+    pub more: Option<&'a [E]>,
 }
 
-impl<M: Dae, E: Lanes> Triangle<'_, M, E> {
+impl<M: Plan, E: Lanes> Triangle<'_, M, E> {
     /// Writes the matrices of a result. Zero if all of them are finite, else NaN.
-    pub fn write(&self, to: &mut Hessian<M, E>) -> E {
-        let total = self.part::<_, X, X>(&mut to.h_xx)
-            + self.part::<_, U, U>(&mut to.h_uu)
-            + self.part::<_, P, P>(&mut to.h_pp)
-            + self.part::<_, X, U>(&mut to.h_xu)
-            + self.part::<_, X, P>(&mut to.h_xp)
-            + self.part::<_, U, P>(&mut to.h_up);
+    pub fn write<D: Dae>(&self, to: &mut Hessian<D, E>) -> E {
+        let total = self.part::<X, X>(to.h_xx.as_mut_slice())
+            + self.part::<U, U>(to.h_uu.as_mut_slice())
+            + self.part::<P, P>(to.h_pp.as_mut_slice())
+            + self.part::<X, U>(to.h_xu.as_mut_slice())
+            + self.part::<X, P>(to.h_xp.as_mut_slice())
+            + self.part::<U, P>(to.h_up.as_mut_slice());
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * total
     }
 
     /// Its part over the directions of one part of `w` and those of another, which is not before
     /// it; the sum, which is finite only if all of it is.
-    fn part<B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, to: &mut B) -> E {
-        let columns = to.as_mut_slice();
+    fn part<const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, columns: &mut [E]) -> E {
         if columns.is_empty() {
             return E::from_f64(0.0);
         }
-        dispatch(Part::<M, E, B, OF_ROWS, OF_COLUMNS> { of: self, columns, model: PhantomData })
+        dispatch(Part::<_, E, OF_ROWS, OF_COLUMNS> { of: self, columns })
     }
 }
 
@@ -47,45 +49,54 @@ const U: usize = 1;
 const P: usize = 2;
 
 /// Where a part of `w` begins.
-const fn begin<M: Dae>(part: usize) -> usize {
+const fn begin(structure: &Structure, part: usize) -> usize {
     match part {
         X => 0,
-        U => M::Shape::NX,
-        _ => M::Shape::NX + M::Shape::NU,
+        U => structure.x.len(),
+        P => structure.x.len() + structure.u.len(),
+        _ => structure.column_of_direction.len(),
     }
 }
 
-/// See [`Triangle::part`].
-struct Part<'a, M: Dae, E: Plain, B, const OF_ROWS: usize, const OF_COLUMNS: usize> {
-    of: &'a Triangle<'a, M, E>,
-    columns: &'a mut [E],
-    model: PhantomData<B>,
+/// The directions of a part that have any influence, as columns of the triangle.
+const fn columns_of(structure: &Structure, part: usize) -> [usize; 2] {
+    let directions = structure.directions;
+    [before(directions, begin(structure, part)), before(directions, begin(structure, part + 1))]
 }
 
-impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
-    for Part<'_, M, E, B, OF_ROWS, OF_COLUMNS>
+/// See [`Triangle::part`].
+struct Part<'a, M, E, const OF_ROWS: usize, const OF_COLUMNS: usize> {
+    of: &'a Triangle<'a, M, E>,
+    columns: &'a mut [E],
+}
+
+impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
+    for Part<'_, M, E, OF_ROWS, OF_COLUMNS>
 {
     type Number = E;
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { of: Triangle { rows, more }, columns, .. } = self;
-        let zero = E::from_f64(0.0);
-        let (row, column) = const { (begin::<M>(OF_ROWS), begin::<M>(OF_COLUMNS)) };
-        let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
+        let Self { of: Triangle { plan, rows, more }, columns } = self;
+        let (zero, structure, nw) = (E::from_f64(0.0), plan.structure(), plan.nw());
+        let (row, column) = (begin(structure, OF_ROWS), begin(structure, OF_COLUMNS));
+        let count_of_rows = begin(structure, OF_ROWS + 1) - row;
+        let all = structure.directions.len() == structure.column_of_direction.len();
         // The directions of these rows that have any influence.
-        let range = const {
-            let (directions, begin) = (M::STRUCTURE.directions, begin::<M>(OF_ROWS));
-            before(directions, begin)..before(directions, begin + B::ROWS)
+        let known = const {
+            match M::KNOWN {
+                Some(structure) => Some(columns_of(structure, OF_ROWS)),
+                None => None,
+            }
         };
-        let directions = M::STRUCTURE.directions.get(range.clone()).unwrap_or_default();
+        let [first, end] = known.unwrap_or_else(|| columns_of(structure, OF_ROWS));
+        let directions = structure.directions.get(first..end).unwrap_or_default();
         let mut total = zero;
-        for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
-            let of_c =
-                Identity::<M>::column(column + c).and_then(|c| rows.get(c)?.as_ref().get(range.clone()));
+        for (c, to) in columns.chunks_exact_mut(count_of_rows.max(1)).enumerate() {
+            let of_c = column_of(*plan, column + c).and_then(|c| rows.row(c, first)?.get(..end - first));
             let of_c = of_c.unwrap_or_default();
             // What is in the triangle.
-            let count = if const { OF_ROWS == OF_COLUMNS } { c + 1 } else { B::ROWS };
+            let count = if const { OF_ROWS == OF_COLUMNS } { c + 1 } else { count_of_rows };
             let Some(to) = to.get_mut(..count) else { continue };
             match of_c.get(..count) {
                 Some(of_c) if all => to.copy_from_slice(of_c),
@@ -98,7 +109,8 @@ impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usi
                     }
                 }
             }
-            if let Some(more) = more.and_then(|more| more.get(column + c)?.as_ref().get(row..)) {
+            let of_more = (column + c) * nw + row..(column + c + 1) * nw;
+            if let Some(more) = more.and_then(|more| more.get(of_more)) {
                 for (to, &more) in to.iter_mut().zip(more) {
                     *to = *to + more;
                 }
@@ -109,7 +121,7 @@ impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usi
                 }
             }
         }
-        if const { OF_ROWS == OF_COLUMNS } { mirror::<A, E>(columns, B::ROWS) } else { total }
+        if const { OF_ROWS == OF_COLUMNS } { mirror::<A, E>(columns, count_of_rows) } else { total }
     }
 }
 

@@ -11,12 +11,12 @@
 use super::diagonal::Diagonal;
 use super::matrix_adjoint::{MatrixAdjoint, is_worth};
 use super::output::Triangle;
-use super::products::{COLUMNS, Subtract};
+use super::products::{COLUMNS, Square, Subtract};
 use crate::error::{Error, Place, Quantity};
 use crate::finite::{check_gradient, check_second, not_finite};
 use crate::irk::adjoint::Backward;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::ArrayC;
+use crate::irk::directions::{ArrayC, all_columns};
 use crate::irk::driver::Parts;
 use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Linearization, Step, Work};
@@ -28,7 +28,6 @@ use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
 use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
 
 /// Memory of second-order sensitivities.
 #[derive(Zeroable)]
@@ -170,15 +169,17 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     ) {
         let last = n + 1 == count;
         let Self { g, sum, entries, .. } = self;
-        let (entries, d, sum) =
-            (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
+        let (entries, d) = (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()));
+        let (plan, columns, stride) =
+            (F::plan::<M>(), const { all_columns::<M, E, F>() }, ArrayC::<M, E>::LEN);
+        let elements = ArrayC::<M, E>::flat_mut(sum.as_mut());
         if const { is_worth::<M, E, S>() } {
-            MatrixAdjoint::<M, E, ArrayC<M, E>, S> {
+            MatrixAdjoint::<M, E, S> {
                 coefficients,
                 entries,
                 d,
                 g,
-                sum: &mut *sum,
+                sum: Square { elements: &mut *elements, stride },
                 first: n == 0,
                 last,
                 ahead: if n == 0 { ahead } else { &[] },
@@ -186,17 +187,18 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
             .run(work, kept);
         } else {
             let g = g.as_mut();
-            dispatch(Subtract::<M, E, ArrayC<M, E>, S> {
+            dispatch(Subtract {
+                plan,
+                columns,
                 entries,
                 d,
                 g,
-                sum: &mut *sum,
+                sum: Square { elements: &mut *elements, stride },
                 fresh: last,
-                model: PhantomData,
             });
         }
         if const { !M::STRUCTURE.diagonal_controls.is_empty() } {
-            dispatch(Diagonal::<M, E, ArrayC<M, E>, S> { entries, sum, model: PhantomData });
+            dispatch(Diagonal { plan, entries, sum: Square { elements, stride } });
         }
     }
 }
@@ -218,7 +220,11 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
 impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if
     /// all of these are finite, else NaN.
-    pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>, result: &mut Hessian<M, E>) -> E {
+    pub(crate) fn collect<F: Fallback>(
+        &mut self,
+        more: Option<&[ArrayW<M, E>]>,
+        result: &mut Hessian<M, E>,
+    ) -> E {
         let nx = M::Shape::NX;
         let Self { backward, sum, .. } = self;
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
@@ -231,7 +237,8 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
             *to = *from;
         }
-        Triangle::<M, E> { rows: sum.as_ref(), more }.write(result)
+        let rows = Square { elements: ArrayC::<M, E>::flat_mut(sum.as_mut()), stride: ArrayC::<M, E>::LEN };
+        Triangle { plan: F::plan::<M>(), rows, more: more.map(ArrayW::<M, E>::flat) }.write(result)
     }
 }
 
@@ -240,12 +247,12 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     ///
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(
+    pub(crate) fn finish<F: Fallback>(
         &mut self,
         more: Option<&[ArrayW<M, T>]>,
         result: &mut Hessian<M, T>,
     ) -> Result<(), Error> {
-        let finite = self.collect(more, result).is_finite();
+        let finite = self.collect::<F>(more, result).is_finite();
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         check_gradient(grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice())?;
         // Only where one is not finite it is looked for.

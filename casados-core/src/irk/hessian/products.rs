@@ -5,48 +5,76 @@
 //! variables of a stage do: what is multiplied is then in the nearest cache.
 
 use super::sparse_product::multiply;
-use crate::irk::directions::{all_columns, panel, panels};
+use crate::irk::directions::{known_columns, panel, panels};
 use crate::irk::forward::stage_rows::together;
 use crate::linalg::{Arithmetic, Kernel, is_long};
-use crate::model::Dae;
+use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::shape::Array;
-use core::marker::PhantomData;
 
 /// So many columns of `G` are there at a time: two panels, where registers are enough for their
 /// products, or one and what the adjoint makes of it (`matrix_adjoint`). In firmware memory is
 /// dearer than time.
 pub const COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
 
+/// A matrix over all directions, row after row, whose rows are so far apart.
+pub struct Square<'a, E> {
+    pub elements: &'a mut [E],
+    pub stride: usize,
+}
+
+impl<E> Square<'_, E> {
+    /// A row, from a column on.
+    #[inline(always)]
+    pub fn row(&self, row: usize, column: usize) -> Option<&[E]> {
+        self.elements.get(row * self.stride + column..(row + 1) * self.stride)
+    }
+
+    /// A row, from a column on.
+    #[inline(always)]
+    pub fn row_mut(&mut self, row: usize, column: usize) -> Option<&mut [E]> {
+        self.elements.get_mut(row * self.stride + column..(row + 1) * self.stride)
+    }
+}
+
 /// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
 /// with zero.
-pub struct Subtract<'a, M, E, R, const S: usize> {
+pub struct Subtract<'a, M, E, const S: usize> {
+    pub plan: M,
+    /// Of all directions.
+    pub columns: usize,
     pub entries: &'a [[E; S]],
     pub d: &'a [E],
     pub g: &'a mut [[[E; COLUMNS]; S]],
-    pub sum: &'a mut [R],
+    pub sum: Square<'a, E>,
     pub fresh: bool,
-    pub model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for Subtract<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>() && all_columns::<M, E>() >= 8;
+    const WIDE: bool = is_long::<M, S>() && matches!(known_columns::<M, E>(), Some(8..));
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         let mut start = 0;
+        let columns = match const { known_columns::<M, E>() } {
+            Some(columns) => columns,
+            None => self.columns,
+        };
+        self.columns = columns;
+        if M::KNOWN.is_some() {
+            self.sum.stride = M::NC;
+        }
         if const { A::WIDE && size_of::<E>() <= 8 && COLUMNS == 16 } {
-            while start + 16 <= const { all_columns::<M, E>() } {
+            while start + 16 <= columns {
                 self.panels::<A, 8, 2>(start);
                 start += 16;
             }
         }
-        panels!(all_columns::<M, E>(), E, S, column from start, W => self.panels::<A, W, 1>(column));
+        panels!([known_columns::<M, E>(), columns], E, S, column from start, W => self.panels::<A, W, 1>(column));
     }
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
+impl<M: Plan, E: Lanes, const S: usize> Subtract<'_, M, E, S> {
     /// `P` panels of `W` columns: all stages at a time, or pairs of them.
     #[inline(always)]
     fn panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
@@ -74,11 +102,18 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         stage: usize,
         column: usize,
     ) {
-        let curved = M::STRUCTURE.curved.len();
+        let curved = self.plan.structure().curved.len();
         let rows = curved * L;
         let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * N * P * W).unwrap_or_default();
         let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
-        multiply::<A, M, E, S, L, N, W, P>(self.entries, self.d, g.as_chunks_mut().0, stage, column);
+        multiply::<A, M, E, S, L, N, W, P>(
+            self.plan,
+            self.entries,
+            self.d,
+            g.as_chunks_mut().0,
+            stage,
+            column,
+        );
         for group in 0..N {
             self.tiles::<A, W, P>(group * rows, rows, (stage + group * L) * curved, column);
         }
@@ -94,27 +129,27 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         of_d: usize,
         column: usize,
     ) {
-        let all = M::STRUCTURE.curved.len() * S;
+        let (all, columns) = (self.plan.structure().curved.len() * S, self.columns);
         let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
-        panels!(all_columns::<M, E>(), E, S, row, V => {
+        panels!([known_columns::<M, E>(), columns], E, S, row, V => {
             if row >= column {
                 let g = g.get(of_g..of_g + count).unwrap_or_default();
                 let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
-                let (sum, fresh) = (&mut *self.sum, self.fresh && of_d == 0);
+                let (sum, fresh) = (&mut self.sum, self.fresh && of_d == 0);
                 if const { size_of::<E>() > 8 && V > 2 && W <= 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 2 } {
-                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
                 } else {
-                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
+                    tiles::<A, E, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
                 }
             }
         });
@@ -128,7 +163,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
 fn tiles<
     A: Arithmetic,
     E: Lanes,
-    R: Array<E>,
     const V: usize,
     const ROWS: usize,
     const ACCUMULATORS: usize,
@@ -137,7 +171,7 @@ fn tiles<
 >(
     d: &[[E; V]],
     g: &[[[E; W]; P]],
-    sum: &mut [R],
+    sum: &mut Square<'_, E>,
     fresh: bool,
     [row, column]: [usize; 2],
 ) {
@@ -160,8 +194,9 @@ fn tiles<
             }
         }
         for (r, tile) in tile.iter().enumerate() {
-            let row = sum.get_mut(row + t * ROWS + r).and_then(|sum| sum.as_mut().get_mut(column..));
-            let columns = row.and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
+            let columns = sum
+                .row_mut(row + t * ROWS + r, column)
+                .and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
             let Some(columns) = columns else { continue };
             // In registers: of loops over single elements the compiler makes one over rows, which
             // lie far apart.

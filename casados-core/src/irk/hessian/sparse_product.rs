@@ -4,14 +4,16 @@
 use crate::irk::directions::panel;
 use crate::irk::forward::stage_rows::together;
 use crate::linalg::Arithmetic;
-use crate::model::{Dae, Term};
+use crate::model::Term;
+use crate::plan::Plan;
 use crate::scalar::Lanes;
 use crate::structure::MOST_ROWS;
 
 /// `G = −H D` at all stages in the panel that begins with a column; its rows lie as those of the
 /// panel do.
 #[inline(always)]
-pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Plan, E: Lanes, const S: usize, const W: usize>(
+    plan: M,
     entries: &[[E; S]],
     d: &[E],
     g: &mut [[E; W]],
@@ -19,12 +21,12 @@ pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Dae, E: Lanes, const S: u
 ) {
     let g = g.as_chunks_mut::<1>().0;
     if const { together::<M, E, S>() } {
-        multiply::<A, M, E, S, S, 1, W, 1>(entries, d, g.as_chunks_mut().0, 0, column);
+        multiply::<A, M, E, S, S, 1, W, 1>(plan, entries, d, g.as_chunks_mut().0, 0, column);
         return;
     }
     for stage in 0..S {
-        let g = g.get_mut(stage * M::STRUCTURE.curved.len()..).unwrap_or_default();
-        multiply::<A, M, E, S, 1, 1, W, 1>(entries, d, g.as_chunks_mut().0, stage, column);
+        let g = g.get_mut(stage * plan.structure().curved.len()..).unwrap_or_default();
+        multiply::<A, M, E, S, 1, 1, W, 1>(plan, entries, d, g.as_chunks_mut().0, stage, column);
     }
 }
 
@@ -32,7 +34,7 @@ pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Dae, E: Lanes, const S: u
 #[inline(always)]
 pub(in crate::irk) fn multiply<
     A: Arithmetic,
-    M: Dae,
+    M: Plan,
     E: Lanes,
     const S: usize,
     const L: usize,
@@ -40,13 +42,14 @@ pub(in crate::irk) fn multiply<
     const W: usize,
     const P: usize,
 >(
+    plan: M,
     entries: &[[E; S]],
     d: &[E],
     g: &mut [[[[E; W]; P]; L]],
     stage: usize,
     column: usize,
 ) {
-    let curved = M::STRUCTURE.curved.len();
+    let curved = plan.structure().curved.len();
     let mut of_d: [[&[[[E; W]; L]]; P]; N] = [[&[]; P]; N];
     for (group, of_d) in of_d.iter_mut().enumerate() {
         let first = stage + group * L;
@@ -55,13 +58,13 @@ pub(in crate::irk) fn multiply<
             *of_d = panel.get(first * curved..(first + L) * curved).unwrap_or_default().as_chunks().0;
         }
     }
-    let mut terms = M::STRUCTURE.symmetric;
+    let mut terms = plan.structure().symmetric;
     while let Some(first) = terms.first() {
         let of = Multiply { entries, d: &of_d, stage };
         terms = match first.rows {
-            3 if const { MOST_ROWS >= 3 } => of.rows::<A, M, 3>(terms, g),
-            2 if const { MOST_ROWS >= 2 } => of.rows::<A, M, 2>(terms, g),
-            _ => of.row::<A, M, 1>(terms, g, 0),
+            3 if const { MOST_ROWS >= 3 } => of.rows::<A, 3>(curved, terms, g),
+            2 if const { MOST_ROWS >= 2 } => of.rows::<A, 2>(curved, terms, g),
+            _ => of.row::<A, 1>(curved, terms, g, 0),
         };
     }
 }
@@ -80,33 +83,35 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     /// with is fetched once for all of them, so many columns and stages at a time that it fits
     /// registers beside them; of sixteen registers it seldom does.
     #[inline(always)]
-    fn rows<A: Arithmetic, M: Dae, const R: usize>(
+    fn rows<A: Arithmetic, const R: usize>(
         &self,
+        curved: usize,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
         if const { !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
             let mut others = terms;
             for row in 0..R {
-                others = self.row::<A, M, R>(terms, g, row);
+                others = self.row::<A, R>(curved, terms, g, row);
             }
             return others;
         }
         if const { size_of::<E>() > 8 && W > 4 } {
-            self.in_parts::<A, M, R, 1, 4>(terms, g)
+            self.in_parts::<A, R, 1, 4>(curved, terms, g)
         } else if const { size_of::<E>() > 8 || A::WIDE && L % 2 == 1 } {
-            self.in_parts::<A, M, R, 1, W>(terms, g)
+            self.in_parts::<A, R, 1, W>(curved, terms, g)
         } else if const { A::WIDE } {
-            self.in_parts::<A, M, R, 2, W>(terms, g)
+            self.in_parts::<A, R, 2, W>(curved, terms, g)
         } else {
-            self.in_parts::<A, M, R, L, W>(terms, g)
+            self.in_parts::<A, R, L, W>(curved, terms, g)
         }
     }
 
     /// One of `R` rows, at all stages.
     #[inline(always)]
-    fn row<A: Arithmetic, M: Dae, const R: usize>(
+    fn row<A: Arithmetic, const R: usize>(
         &self,
+        curved: usize,
         mut terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
         row: usize,
@@ -133,7 +138,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
             terms = rest;
         }
         for (group, panel_row) in panel_rows.iter().enumerate() {
-            if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + first.row as usize) {
+            if let Some(to) = g.get_mut(group * curved + first.row as usize) {
                 *to = *panel_row;
             }
         }
@@ -142,14 +147,15 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
 
     /// `R` rows, `K` stages and `C` columns at a time.
     #[inline(always)]
-    fn in_parts<A: Arithmetic, M: Dae, const R: usize, const K: usize, const C: usize>(
+    fn in_parts<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
         &self,
+        curved: usize,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
         let mut others = terms;
         for (group, of_d) in self.d.iter().enumerate() {
-            let g = g.get_mut(group * M::STRUCTURE.curved.len()..).unwrap_or_default();
+            let g = g.get_mut(group * curved..).unwrap_or_default();
             for stage in 0..L / K {
                 for part in 0..W / C {
                     let values = self.stage + group * L + stage * K;

@@ -17,42 +17,26 @@ pub(super) use stages::derivative;
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::Directions;
-use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, PanelRow, Visitor, dispatch, each_row, kinematic, minus_ha, slot,
-    subtract, subtract_diagonal, subtract_transposed,
+    Arithmetic, AtRow, Block, Kernel, PanelRow, Visitor, dispatch, each_row, minus_ha, subtract,
+    subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae, Dependent, Kinematic};
+use crate::plan::{self, Facts, Plan, PlanOf, Table};
 use crate::scalar::{Lanes, each};
-use crate::shape::{Plain, Shape};
-
-/// How many rows the table of kinematic states has.
-pub(super) const fn count<M: Dae>() -> usize {
-    M::STRUCTURE.elimination.kinematic.len()
-}
+use crate::shape::Plain;
 
 /// Whether any state is kinematic.
 pub(super) const fn is_any<M: Dae>() -> bool {
-    count::<M>() > 0
-}
-
-/// The state that is the velocity of a kinematic one, if it is a state.
-#[inline(always)]
-pub(super) fn velocity<M: Dae>(of: &Kinematic) -> Option<usize> {
-    let nx = M::Shape::NX;
-    let velocity = of.velocity as usize;
-    if velocity < 2 * nx { velocity.checked_sub(nx) } else { None }
+    !M::STRUCTURE.elimination.kinematic.is_empty()
 }
 
 /// `−c`
 #[inline(always)]
-pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
-    of: &Kinematic,
-    jacobian: &M::Jacobian<[E; S]>,
-) -> Option<E> {
-    match jacobian.as_ref().get(of.entry as usize) {
+pub(super) fn minus_c<E: Copy, const S: usize>(of: &Kinematic, jacobian: &[[E; S]]) -> Option<E> {
+    match jacobian.get(of.entry as usize) {
         Some(entry) => entry.first().copied(),
         None => None,
     }
@@ -61,32 +45,22 @@ pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
 /// An entry by which an equation depends on a kinematic state: its slot, its values, whether it
 /// multiplies the derivative.
 #[inline(always)]
-pub(super) fn dependence<'a, M: Dae, E: Plain, const S: usize>(
+pub(super) fn dependence<'a, M: Plan, E, const S: usize>(
+    plan: M,
     of: &Dependent,
-    jacobian: &'a M::Jacobian<[E; S]>,
+    jacobian: &'a [[E; S]],
 ) -> Option<(usize, &'a [E; S], bool)> {
     let index = of.entry as usize;
-    let (row, _, values) = entry::<M, _>(jacobian, index)?;
-    Some((slot::<M>(row), values, index < M::STRUCTURE.blocks[1]))
+    let (row, _, values) = plan.entry(jacobian, index)?;
+    Some((plan.slot(row), values, index < plan.structure().blocks[1]))
 }
 
-/// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
-pub(super) const fn unknowns<M: Dae>() -> (usize, usize) {
-    let (mut first, mut end) = (0, M::Shape::NK);
-    while first < end && kinematic::<M>(first).is_some() {
-        first += 1;
-    }
-    while end > first && kinematic::<M>(end - 1).is_some() {
-        end -= 1;
-    }
-    (first, end)
-}
-
-/// Whether none of [these](unknowns) is kinematic.
-pub(super) const fn are_together<M: Dae>() -> bool {
-    let (mut index, end) = unknowns::<M>();
+/// Whether no [unknown](crate::plan::Facts::unknowns) is known to be kinematic.
+pub(super) const fn are_together<M: Plan>() -> bool {
+    let Some(structure) = M::KNOWN else { return false };
+    let (mut index, end) = Facts::of(structure).unknowns;
     while index < end {
-        if kinematic::<M>(index).is_some() {
+        if plan::kinematic(structure, index).is_some() {
             return false;
         }
         index += 1;
@@ -104,10 +78,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
         if const { !is_any::<M>() } {
             return self.factors.solve(b);
         }
-        let (jacobian, a) = (&self.jacobian, &coefficients.a);
-        dispatch(Around::<M, E, S, W, ELIMINATE> { jacobian, a, h, rows: b.as_mut() });
+        let (plan, a) = (F::plan::<M>(), &coefficients.a);
+        let jacobian = F::Plan::<M>::jacobian(&self.jacobian);
+        dispatch(Around::<_, E, S, W, ELIMINATE> { plan, jacobian, a, h, rows: b.as_mut() });
         self.factors.solve(b);
-        dispatch(Around::<M, E, S, W, RECONSTRUCT> { jacobian, a, h, rows: b.as_mut() });
+        dispatch(Around::<_, E, S, W, RECONSTRUCT> { plan, jacobian, a, h, rows: b.as_mut() });
     }
 
     /// Solves `Jᵀ X = B` for all equations in place; the solution has them in their slots.
@@ -119,10 +94,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
         if const { !is_any::<M>() } {
             return self.factors.solve_transposed(b);
         }
-        let (jacobian, a) = (&self.jacobian, &coefficients.a);
-        dispatch(Around::<M, E, S, W, CONDENSE_TRANSPOSED> { jacobian, a, h, rows: b.as_mut() });
+        let (plan, a) = (F::plan::<M>(), &coefficients.a);
+        let jacobian = F::Plan::<M>::jacobian(&self.jacobian);
+        dispatch(Around::<_, E, S, W, CONDENSE_TRANSPOSED> { plan, jacobian, a, h, rows: b.as_mut() });
         self.factors.solve_transposed(b);
-        dispatch(Around::<M, E, S, W, RECONSTRUCT_TRANSPOSED> { jacobian, a, h, rows: b.as_mut() });
+        dispatch(Around::<_, E, S, W, RECONSTRUCT_TRANSPOSED> { plan, jacobian, a, h, rows: b.as_mut() });
     }
 }
 
@@ -133,37 +109,39 @@ const RECONSTRUCT: u8 = 1;
 pub(super) const CONDENSE_TRANSPOSED: u8 = 2;
 pub(super) const RECONSTRUCT_TRANSPOSED: u8 = 3;
 
-struct Around<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
+struct Around<'a, M: Plan, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
+    plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
     rows: &'a mut [PanelRow<E, S, W>],
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
+impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
     for Around<'_, M, E, S, W, WHAT>
 {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { jacobian, a, h, rows } = self;
-        around::<A, M, E, S, W, WHAT>(jacobian, &minus_ha(a, h), rows);
+        let Self { plan, jacobian, a, h, rows } = self;
+        around::<A, M, E, S, W, WHAT>(plan, jacobian.as_ref(), &minus_ha(a, h), rows);
     }
 }
 
 /// The same inside of a kernel.
 #[inline(always)]
-pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8>(
-    jacobian: &M::Jacobian<[E; S]>,
+pub(super) fn around<A: Arithmetic, M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8>(
+    plan: M,
+    jacobian: &[[E; S]],
     minus_ha: &Block<E, S>,
     rows: &mut [PanelRow<E, S, W>],
 ) {
-    if rows.len() != M::Shape::NK {
+    if rows.len() != plan.nk() {
         return;
     }
-    let mut rows =
-        Rows::<M, E, S, W, WHAT> { jacobian, minus_ha: *minus_ha, rows, sum: [[E::from_f64(0.0); W]; S] };
+    let (minus_ha, sum) = (*minus_ha, [[E::from_f64(0.0); W]; S]);
+    let mut rows = Rows::<M, E, S, W, WHAT> { plan, jacobian, minus_ha, rows, sum };
     if const { WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED } {
         each_row::<A, _>(&mut AtDependent(rows));
     } else {
@@ -171,8 +149,9 @@ pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: u
     }
 }
 
-struct Rows<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
-    jacobian: &'a M::Jacobian<[E; S]>,
+struct Rows<'a, M, E, const S: usize, const W: usize, const WHAT: u8> {
+    plan: M,
+    jacobian: &'a [[E; S]],
     minus_ha: Block<E, S>,
     rows: &'a mut [PanelRow<E, S, W>],
     /// What is known of a state between the first and the last entry by which others depend on it.
@@ -185,16 +164,18 @@ const fn product<E>(stages: usize, width: usize) -> usize {
 }
 
 /// Between a kinematic state and its velocity.
-impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for Rows<'_, M, E, S, W, WHAT> {
-    const ROWS: usize = count::<M>();
+impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for Rows<'_, M, E, S, W, WHAT> {
+    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Kinematic.of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Self { jacobian, minus_ha, rows, .. } = self;
-        let Some(of) = kinematic::<M>(state) else { return };
-        let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
-            return;
-        };
+        let Self { plan, jacobian, minus_ha, rows, .. } = self;
+        let Some(of) = plan.kinematic(state) else { return };
+        let (Some(velocity), Some(minus_c)) = (plan.velocity(of), minus_c(of, jacobian)) else { return };
         let (from, to) = if const { WHAT == RECONSTRUCT } { (velocity, state) } else { (state, velocity) };
         let Some(from) = rows.get(from) else { return };
         let mut moved = [[E::from_f64(0.0); W]; S];
@@ -210,20 +191,22 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for
 }
 
 /// Between a kinematic state and the equations that depend on it.
-struct AtDependent<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8>(
-    Rows<'a, M, E, S, W, WHAT>,
-);
+struct AtDependent<'a, M, E, const S: usize, const W: usize, const WHAT: u8>(Rows<'a, M, E, S, W, WHAT>);
 
-impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
+impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
     for AtDependent<'_, M, E, S, W, WHAT>
 {
-    const ROWS: usize = M::STRUCTURE.elimination.dependents.len();
+    const ROWS: Option<usize> = Table::Dependents.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Dependents.of(self.0.plan.structure())
+    }
     const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, index: usize) {
-        let Rows { jacobian, minus_ha, rows, sum } = &mut self.0;
-        let Some(of) = M::STRUCTURE.elimination.dependents.get(index) else { return };
-        let Some((slot, values, derivative)) = dependence::<M, E, S>(of, jacobian) else { return };
+        let Rows { plan, jacobian, minus_ha, rows, sum } = &mut self.0;
+        let Some(of) = plan.structure().elimination.dependents.get(index) else { return };
+        let Some((slot, values, derivative)) = dependence(*plan, of, jacobian) else { return };
         let (Some(&own), Some(&row)) = (rows.get(of.state as usize), rows.get(slot)) else { return };
         let (mut own, mut row) = (own, row);
         if of.first {
@@ -255,29 +238,30 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
 }
 
 /// A panel of forward sensitivities.
-pub(super) struct KinematicPanel<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
+pub(super) struct KinematicPanel<'a, M, E, D, const S: usize, const W: usize> {
+    pub plan: M,
+    pub jacobian: &'a [[E; S]],
     /// `V` at the start of the step.
     pub v: &'a [[E; W]],
-    pub directions: &'a D,
+    pub directions: D,
     /// The first column.
     pub column: usize,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> KinematicPanel<'_, M, E, D, S, W> {
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> KinematicPanel<'_, M, E, D, S, W> {
     /// `c V_v`
     #[inline(always)]
     pub fn own<A: Arithmetic>(&self, of: &Kinematic) -> [E; W] {
         let mut row = [E::from_f64(0.0); W];
-        let Some(minus_c) = minus_c::<M, E, S>(of, self.jacobian) else { return row };
-        match velocity::<M>(of) {
+        let Some(minus_c) = minus_c(of, self.jacobian) else { return row };
+        match self.plan.velocity(of) {
             Some(velocity) => {
                 if let Some(v) = self.v.get(velocity) {
                     A::subtract_row(&mut row, minus_c, v);
                 }
             }
             None => {
-                let input = of.velocity as usize - M::Shape::NX - M::Shape::NZ;
+                let input = of.velocity as usize - self.plan.nk();
                 self.directions.add(input, -minus_c, self.column, &mut row);
             }
         }
@@ -287,8 +271,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
     /// Writes `V_q + h c_i c V_v`, what entries of `f_q` multiply, to the rows of the states.
     #[inline(always)]
     pub fn place<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [PanelRow<E, S, W>]) {
-        for state in 0..count::<M>() {
-            let Some(of) = kinematic::<M>(state) else { continue };
+        for state in 0..Table::Kinematic.of(self.plan.structure()) {
+            let Some(of) = self.plan.kinematic(state) else { continue };
             let (own, Some(v), Some(to)) = (self.own::<A>(of), self.v.get(state), rows.get_mut(state)) else {
                 continue;
             };
@@ -306,10 +290,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
         if const { !depend_on_derivatives::<M>() } {
             return;
         }
-        for dependent in M::STRUCTURE.elimination.dependents {
-            let of = kinematic::<M>(dependent.state as usize);
+        for dependent in self.plan.structure().elimination.dependents {
+            let of = self.plan.kinematic(dependent.state as usize);
             if let (Some(of), Some((slot, values, true))) =
-                (of, dependence::<M, E, S>(dependent, self.jacobian))
+                (of, dependence(self.plan, dependent, self.jacobian))
                 && let Some(row) = rows.get_mut(slot)
             {
                 let own = self.own::<A>(of);
@@ -331,24 +315,28 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinemat
 }
 
 /// See [`KinematicPanel::reconstruct`].
-struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
+struct Reconstruct<'a, 'b, M, E, D, V, const S: usize, const W: usize> {
     of: &'b KinematicPanel<'a, M, E, D, S, W>,
     minus_ha: &'b Block<E, S>,
     rows: &'b mut [PanelRow<E, S, W>],
     visitor: &'b mut V,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, const W: usize> AtRow
+impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, const W: usize> AtRow
     for Reconstruct<'_, '_, M, E, D, V, S, W>
 {
-    const ROWS: usize = count::<M>();
+    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Kinematic.of(self.of.plan.structure())
+    }
     const INSTRUCTIONS: usize = 4 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Self { of: forward, minus_ha, rows, visitor } = self;
-        let Some(of) = kinematic::<M>(state) else { return };
+        let Some(of) = forward.plan.kinematic(state) else { return };
         let mut panel_row = [[E::from_f64(0.0); W]; S];
-        match (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian)) {
+        match (forward.plan.velocity(of), minus_c(of, forward.jacobian)) {
             (Some(velocity), Some(minus_c)) => {
                 if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity)) {
                     panel_row = [*v; S];
@@ -367,11 +355,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, co
     }
 }
 
-/// Whether an equation depends on the derivative of a kinematic state that is not its own.
-const fn depend_on_derivatives<M: Dae>() -> bool {
-    let (dependents, mut index) = (M::STRUCTURE.elimination.dependents, 0);
+/// Whether an equation may depend on the derivative of a kinematic state that is not its own.
+const fn depend_on_derivatives<M: Plan>() -> bool {
+    let Some(structure) = M::KNOWN else { return true };
+    let (dependents, mut index) = (structure.elimination.dependents, 0);
     while index < dependents.len() {
-        if (dependents[index].entry as usize) < M::STRUCTURE.blocks[1] {
+        if (dependents[index].entry as usize) < structure.blocks[1] {
             return true;
         }
         index += 1;

@@ -1,16 +1,15 @@
 //! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
 
-use super::{count, is_any, minus_c, velocity};
+use super::{is_any, minus_c};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::coefficients::stage_values;
-use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Work;
-use crate::linalg::{kernels, kinematic, minus_ha};
+use crate::linalg::{kernels, minus_ha};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::plan::{Plan, PlanOf, Table};
 use crate::scalar::Lanes;
-use crate::shape::Shape;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes `k_q`.
@@ -24,8 +23,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             return;
         }
         let Self { linear, points, compensation, inputs, .. } = self;
-        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        reconstruct_stages::<M, E, S>(jacobian, points, x, compensation, y, a, h);
+        let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
+        let (points, y) = (F::Plan::<M>::v_mut(points), F::Plan::<M>::k_mut(y));
+        let x = [F::Plan::<M>::x(x), F::Plan::<M>::x(compensation)];
+        reconstruct_stages(F::plan::<M>(), jacobian, points, x, y, a, h);
     }
 
     /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is
@@ -46,8 +47,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             return;
         }
         let Self { f, points, linear, inputs, .. } = self;
-        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        eliminate_missing::<M, E, S>(jacobian, points, f, a, h);
+        let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
+        let (points, f) = (F::Plan::<M>::v_mut(points), F::Plan::<M>::k_mut(f));
+        eliminate_missing(F::plan::<M>(), jacobian, points, f, a, h);
     }
 
     /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
@@ -56,7 +58,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        reconstruct_compensated::<M, E, S>(&self.linear.jacobian, &mut self.points, y);
+        let jacobian = F::Plan::<M>::jacobian(&self.linear.jacobian);
+        let (points, y) = (F::Plan::<M>::v_mut(&mut self.points), F::Plan::<M>::k_mut(y));
+        reconstruct_compensated(F::plan::<M>(), jacobian, points, y);
     }
 
     /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
@@ -65,20 +69,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             return;
         }
         let Self { f, linear, inputs, .. } = self;
-        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        eliminate_rounded::<M, E, S>(jacobian, f, a, h);
+        let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
+        eliminate_rounded(F::plan::<M>(), jacobian, F::Plan::<M>::k_mut(f), a, h);
     }
 }
 
 /// `k_q` at the stages, from `v` at these points.
 #[inline(always)]
-pub(in crate::irk) fn derivative<M: Dae, E: Lanes, const S: usize>(
+pub(in crate::irk) fn derivative<M: Plan, E: Lanes, const S: usize>(
+    plan: M,
     state: usize,
-    jacobian: &M::Jacobian<[E; S]>,
+    jacobian: &[[E; S]],
     points: &[[E; S]],
 ) -> Option<[E; S]> {
-    let of = kinematic::<M>(state)?;
-    let (mut k, minus_c) = (*points.get(of.velocity as usize)?, minus_c::<M, E, S>(of, jacobian)?);
+    let of = plan.kinematic(state)?;
+    let (mut k, minus_c) = (*points.get(of.velocity as usize)?, minus_c(of, jacobian)?);
     for k in &mut k {
         *k = -(minus_c * *k);
     }
@@ -86,80 +91,84 @@ pub(in crate::irk) fn derivative<M: Dae, E: Lanes, const S: usize>(
 }
 
 kernels! {
-    /// See [`Work::reconstruct`]; `compensation` is what `x` has beyond its digits.
-    fn reconstruct_stages [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+    /// See [`Work::reconstruct`]; the second of `x` is what that has beyond its digits.
+    fn reconstruct_stages [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
+        plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
-        points: &'k mut ArrayV<M, [E; S]>,
-        x: &'k ArrayX<M, E>,
-        compensation: &'k ArrayX<M, E>,
-        y: &'k mut ArrayK<M, [E; S]>,
+        points: &'k mut M::V<[E; S]>,
+        x: [&'k M::X<E>; 2],
+        y: &'k mut M::K<[E; S]>,
         a: &'k [[E; S]; S],
         h: E,
     ) {
-        let (points, y) = (points.as_mut(), y.as_mut());
+        let ([x, rest], y, points) = (x.map(|x| x.as_ref()), y.as_mut(), points.as_mut());
+        let jacobian = jacobian.as_ref();
         let minus_ha = minus_ha(a, h);
-        for state in 0..count::<M>() {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            if let Some(v) = velocity::<M>(of)
+        for state in 0..Table::Kinematic.of(plan.structure()) {
+            let Some(of) = plan.kinematic(state) else { continue };
+            if let Some(v) = plan.velocity(of)
                 && let (Some(&x), Some(&rest), Some(k)) =
-                    (x.as_ref().get(v), compensation.as_ref().get(v), y.get(v))
-                && let Some(xi) = points.get_mut(M::Shape::NX + v)
+                    (x.get(v), rest.get(v), y.get(v))
+                && let Some(xi) = points.get_mut(plan.nx() + v)
             {
                 *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
                 for xi in xi {
                     *xi = *xi + x;
                 }
             }
-            if let (Some(y), Some(k)) = (y.get_mut(state), derivative::<M, E, S>(state, jacobian, points)) {
+            if let (Some(y), Some(k)) = (y.get_mut(state), derivative(plan, state, jacobian, points)) {
                 *y = k;
             }
         }
     }
 
     /// See [`Work::eliminate_missing`].
-    fn eliminate_missing [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+    fn eliminate_missing [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
+        plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
-        points: &'k mut ArrayV<M, [E; S]>,
-        f: &'k mut ArrayK<M, [E; S]>,
+        points: &'k mut M::V<[E; S]>,
+        f: &'k mut M::K<[E; S]>,
         a: &'k [[E; S]; S],
         h: E,
     ) {
-        let nodes = nodes(a, h);
-        for dependent in M::STRUCTURE.elimination.dependents {
-            let of = kinematic::<M>(dependent.state as usize);
-            let missing = of.and_then(|of| f.as_ref().get(of.equation as usize)).map(|own| own[0]);
+        let (nodes, points, f, jacobian) = (nodes(a, h), points.as_mut(), f.as_mut(), jacobian.as_ref());
+        for dependent in plan.structure().elimination.dependents {
+            let of = plan.kinematic(dependent.state as usize);
+            let missing = of.and_then(|of| f.get(of.equation as usize)).map(|own| own[0]);
             let (Some(missing), Some((row, _, values))) =
-                (missing, entry::<M, _>(jacobian, dependent.entry as usize))
+                (missing, plan.entry(jacobian, dependent.entry as usize))
             else {
                 continue;
             };
-            let Some(f) = f.as_mut().get_mut(row) else { continue };
+            let Some(f) = f.get_mut(row) else { continue };
             let share = values[0] * missing;
             for (f, &node) in f.iter_mut().zip(&nodes) {
-                let derivative = (dependent.entry as usize) < M::STRUCTURE.blocks[1];
+                let derivative = (dependent.entry as usize) < plan.structure().blocks[1];
                 *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
             }
         }
-        for state in 0..count::<M>() {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            let Some(own) = f.as_mut().get_mut(of.equation as usize) else { continue };
+        for state in 0..Table::Kinematic.of(plan.structure()) {
+            let Some(of) = plan.kinematic(state) else { continue };
+            let Some(own) = f.get_mut(of.equation as usize) else { continue };
             let missing = core::mem::replace(own, [E::from_f64(0.0); S])[0];
-            for k in points.as_mut().get_mut(state).into_iter().flatten() {
+            for k in points.get_mut(state).into_iter().flatten() {
                 *k = *k - missing;
             }
         }
     }
 
     /// See [`Work::reconstruct_compensated`].
-    fn reconstruct_compensated [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+    fn reconstruct_compensated [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
+        plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
-        points: &'k mut ArrayV<M, [E; S]>,
-        y: &'k mut ArrayK<M, [E; S]>,
+        points: &'k mut M::V<[E; S]>,
+        y: &'k mut M::K<[E; S]>,
     ) {
-        for state in 0..count::<M>() {
-            let k = derivative::<M, E, S>(state, jacobian, points.as_ref());
+        let (points, y, jacobian) = (points.as_mut(), y.as_mut(), jacobian.as_ref());
+        for state in 0..Table::Kinematic.of(plan.structure()) {
+            let k = derivative(plan, state, jacobian, points);
             if let (Some(k), Some(point), Some(y)) =
-                (k, points.as_mut().get_mut(state), y.as_mut().get_mut(state))
+                (k, points.get_mut(state), y.get_mut(state))
             {
                 (*point, *y) = (k, k);
             }
@@ -167,25 +176,26 @@ kernels! {
     }
 
     /// See [`Work::eliminate_rounded`].
-    fn eliminate_rounded [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+    fn eliminate_rounded [M: Plan, E: Lanes, const S: usize] [M, E, S] <A>(
+        plan: M,
         jacobian: &'k M::Jacobian<[E; S]>,
-        f: &'k mut ArrayK<M, [E; S]>,
+        f: &'k mut M::K<[E; S]>,
         a: &'k [[E; S]; S],
         h: E,
     ) {
-        let minus_ha = minus_ha(a, h);
-        for dependent in M::STRUCTURE.elimination.dependents {
-            let of = kinematic::<M>(dependent.state as usize);
-            let residual = of.and_then(|of| f.as_ref().get(of.equation as usize)).copied();
+        let (minus_ha, f, jacobian) = (minus_ha(a, h), f.as_mut(), jacobian.as_ref());
+        for dependent in plan.structure().elimination.dependents {
+            let of = plan.kinematic(dependent.state as usize);
+            let residual = of.and_then(|of| f.get(of.equation as usize)).copied();
             let (Some(mut residual), Some((row, _, values))) =
-                (residual, entry::<M, _>(jacobian, dependent.entry as usize))
+                (residual, plan.entry(jacobian, dependent.entry as usize))
             else {
                 continue;
             };
-            if dependent.entry as usize >= M::STRUCTURE.blocks[1] {
+            if dependent.entry as usize >= plan.structure().blocks[1] {
                 residual = stage_values::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
             }
-            if let Some(f) = f.as_mut().get_mut(row) {
+            if let Some(f) = f.get_mut(row) {
                 A::subtract_products(f, values, &residual);
             }
         }

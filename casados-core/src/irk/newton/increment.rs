@@ -1,18 +1,19 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
 use super::norm::{KinematicScales, Measure, larger_strand, part, part_mut};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kernels, kinematic, slot};
-use crate::model::{ArrayK, ArrayX, Dae};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kernels};
+use crate::plan::{Plan, Table};
 use crate::scalar::Lanes;
-use crate::shape::{Plain, Shape};
+use crate::shape::Plain;
 
 /// The residual in the slots of the equations; that of kinematic states is zero.
-pub(in crate::irk) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
-    pub f: &'a ArrayK<M, [E; S]>,
-    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+pub(in crate::irk) struct PlaceResidual<'a, M: Plan, E: Plain, const S: usize> {
+    pub plan: M,
+    pub f: &'a M::K<[E; S]>,
+    pub increment: &'a mut M::K<[[E; 1]; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -21,13 +22,17 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
-    const ROWS: usize = M::Shape::NK;
+impl<M: Plan, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::Unknowns.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        self.plan.nk()
+    }
     const INSTRUCTIONS: usize = 2 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
-        let slot = slot::<M>(equation);
-        if kinematic::<M>(slot).is_some() {
+        let slot = self.plan.slot(equation);
+        if self.plan.kinematic(slot).is_some() {
             return;
         }
         if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
@@ -70,13 +75,14 @@ kernels! {
 
 /// `y ← y − Δ`; the size of the increment, that of the one that is expected next, and by how much
 /// that of an unknown is larger than its last one.
-pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
+pub(in crate::irk) struct Update<'a, M: Plan, E: Lanes, const S: usize> {
+    pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
-    pub x: &'a ArrayX<M, E>,
-    pub y: &'a mut ArrayK<M, [E; S]>,
-    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
-    pub weights: &'a mut ArrayK<M, E>,
-    pub sizes: &'a mut ArrayK<M, E>,
+    pub x: &'a M::X<E>,
+    pub y: &'a mut M::K<[E; S]>,
+    pub increment: &'a mut M::K<[[E; 1]; S]>,
+    pub weights: &'a mut M::K<E>,
+    pub sizes: &'a mut M::K<E>,
     pub active: E::Mask,
     pub h: E,
     pub floor: E,
@@ -86,27 +92,40 @@ pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
     pub measure: bool,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Number = E;
     type Output = [E; 3];
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> [E; 3] {
-        let Self { scales, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
-            self;
+        let Self {
+            plan,
+            scales,
+            x,
+            y,
+            increment,
+            weights,
+            sizes,
+            active,
+            h,
+            floor,
+            tolerance,
+            full,
+            measure,
+        } = self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
         if measure {
-            let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
+            let (own_y, own) = (part_mut(plan, y.as_mut()), part_mut(plan, increment.as_mut()));
             for (y, increment) in own_y.iter_mut().zip(own) {
                 subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
-            let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
+            let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
             return [measure.run::<A>(), infinite, zero];
         }
         // Four unknowns side by side, and the rest one by one.
-        let (y, last_y) = part_mut::<M, _>(y.as_mut()).as_chunks_mut::<4>();
-        let (increments, last) = part_mut::<M, _>(increment.as_mut()).as_chunks_mut::<4>();
-        let (weights, last_weights) = part::<M, _>(weights.as_ref()).as_chunks::<4>();
-        let (sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
+        let (y, last_y) = part_mut(plan, y.as_mut()).as_chunks_mut::<4>();
+        let (increments, last) = part_mut(plan, increment.as_mut()).as_chunks_mut::<4>();
+        let (weights, last_weights) = part(plan, weights.as_ref()).as_chunks::<4>();
+        let (sizes, last_sizes) = part_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
         let mut some = Increments::none(tolerance, full);
         for (((y, increments), weights), sizes) in y.iter_mut().zip(increments).zip(weights).zip(sizes) {
             subtract(y, increments, active);

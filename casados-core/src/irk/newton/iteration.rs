@@ -40,6 +40,7 @@ use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, OptionalPlace};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
+use crate::plan::PlanOf;
 use crate::scalar::Lanes;
 use crate::shape::copy;
 use crate::statistics::Statistics;
@@ -297,14 +298,19 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let h = self.inputs.time.step;
         let floor = E::from_f64(rounding / tolerance);
         let Self { linear, points, increment, weights, sizes, .. } = self;
-        let scales = &KinematicScales::<M, E, S> { jacobian: &linear.jacobian, points, a: &coefficients.a };
-        let [size, next, growth] = dispatch(Update::<M, E, S> {
+        let (jacobian, points) = (F::Plan::<M>::jacobian(&linear.jacobian), F::Plan::<M>::v(points));
+        let scales = &KinematicScales::<F::Plan<M>, E, S> { jacobian, points, a: &coefficients.a };
+        let (plan, x, y) = (F::plan::<M>(), F::Plan::<M>::x(x), F::Plan::<M>::k_mut(y));
+        let increment = F::Plan::<M>::k_mut(increment);
+        let (weights, sizes) = (F::Plan::<M>::k_mut(weights), F::Plan::<M>::k_mut(sizes));
+        let [size, next, growth] = dispatch(Update {
+            plan,
             scales,
             x,
-            y,
-            increment,
-            weights,
-            sizes,
+            y: &mut *y,
+            increment: &mut *increment,
+            weights: &mut *weights,
+            sizes: &mut *sizes,
             active: test.active,
             h,
             floor,
@@ -315,7 +321,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let kind = if anew { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
         let status = test.take(kind, size, next);
         if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
-            let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
+            let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
             return (test.take(IncrementKind::Again, again, again), growth);
         }
@@ -373,7 +379,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { Self::SHARES }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
-            factors.factor(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
+            factors.factor::<F>(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
             return true;
         }
         false
@@ -385,7 +391,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { Self::SHARES }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
-            factors.solve(basis, &self.f, &mut self.increment);
+            factors.solve::<F>(basis, &self.f, &mut self.increment);
             return true;
         }
         false
@@ -399,7 +405,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// The residual in the slots of the equations.
     pub(in crate::irk) fn place_residual(&mut self) {
-        dispatch(PlaceResidual::<M, E, S> { f: &self.f, increment: &mut self.increment });
+        let (plan, f) = (F::plan::<M>(), F::Plan::<M>::k(&self.f));
+        dispatch(PlaceResidual { plan, f, increment: F::Plan::<M>::k_mut(&mut self.increment) });
     }
 
     /// After the last iteration: no lane is active any more.

@@ -1,39 +1,40 @@
 //! How large an increment of Newton's method is, relative to the unknowns, and what that means for
 //! kinematic states.
 
-use crate::irk::kinematic::{count, is_any, minus_c, unknowns, velocity};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic};
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::irk::kinematic::minus_c;
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row};
+use crate::plan::{Plan, Table};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::Plain;
 
 /// The size of an increment relative to the unknowns as they are now.
-pub(in crate::irk) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
+pub(in crate::irk) struct Measure<'a, M: Plan, E: Plain, const S: usize> {
+    pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
-    pub x: &'a ArrayX<M, E>,
-    pub y: &'a ArrayK<M, [E; S]>,
-    pub increment: &'a ArrayK<M, [[E; 1]; S]>,
-    pub weights: &'a mut ArrayK<M, E>,
-    pub sizes: &'a mut ArrayK<M, E>,
+    pub x: &'a M::X<E>,
+    pub y: &'a M::K<[E; S]>,
+    pub increment: &'a M::K<[[E; 1]; S]>,
+    pub weights: &'a mut M::K<E>,
+    pub sizes: &'a mut M::K<E>,
     pub h: E,
     pub floor: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     type Number = E;
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { scales, x, y, increment, weights, sizes, h, floor } = self;
+        let Self { plan, scales, x, y, increment, weights, sizes, h, floor } = self;
         let zero = E::from_f64(0.0);
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
         // Four unknowns side by side, and the rest one by one.
-        let (ys, last_ys) = part::<M, _>(y.as_ref()).as_chunks::<4>();
-        let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
-        let (own_weights, last_weights) = part_mut::<M, _>(weights.as_mut()).as_chunks_mut::<4>();
-        let (own_sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
-        let mut states = x.as_ref().get(const { unknowns::<M>().0 }..).unwrap_or_default();
+        let (ys, last_ys) = part(plan, y.as_ref()).as_chunks::<4>();
+        let (increments, last) = part(plan, increment.as_ref()).as_chunks::<4>();
+        let (own_weights, last_weights) = part_mut(plan, weights.as_mut()).as_chunks_mut::<4>();
+        let (own_sizes, last_sizes) = part_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
+        let mut states = x.as_ref().get(plan.facts().unknowns.0..).unwrap_or_default();
         let mut some = Relative { largest: [zero; 4], sum: [zero; 4], per_step };
         for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
             some.take(&mut states, y, increments, weights, sizes);
@@ -45,7 +46,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             others.take(&mut states, y, increment, weight, size);
         }
         let most = larger_strand([some.total(), others.total()]);
-        if const { !is_any::<M>() } {
+        if const { !Table::Kinematic.may_have::<M>() } {
             return most;
         }
         let mut norm = zero;
@@ -57,8 +58,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             norm = sum.max(norm);
         }
         let norm = E::from_f64(TYPICAL) * norm * h.abs();
-        let mut velocities =
-            Velocities::<M, E, S> { scales, x, increment, weights, sizes, per_step, norm, most };
+        let mut velocities = Velocities { plan, scales, x, increment, weights, sizes, per_step, norm, most };
         each_row::<A, _>(&mut velocities);
         velocities.most
     }
@@ -126,12 +126,13 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
 
 /// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
 /// change within the step.
-struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
+struct Velocities<'a, M: Plan, E: Plain, const S: usize> {
+    plan: M,
     scales: &'a KinematicScales<'a, M, E, S>,
-    x: &'a ArrayX<M, E>,
-    increment: &'a ArrayK<M, [[E; 1]; S]>,
-    weights: &'a mut ArrayK<M, E>,
-    sizes: &'a mut ArrayK<M, E>,
+    x: &'a M::X<E>,
+    increment: &'a M::K<[[E; 1]; S]>,
+    weights: &'a mut M::K<E>,
+    sizes: &'a mut M::K<E>,
     per_step: E,
     /// `h ‖A‖`
     norm: E,
@@ -139,14 +140,18 @@ struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
     most: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
-    const ROWS: usize = count::<M>();
+impl<M: Plan, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Kinematic.of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 8;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let KinematicScales { jacobian, points, .. } = self.scales;
-        let Some(of) = kinematic::<M>(state) else { return };
-        let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+        let Some(of) = self.plan.kinematic(state) else { return };
+        let (Some(own), Some(minus_c)) = (self.plan.velocity(of), minus_c(of, jacobian.as_ref())) else {
             return;
         };
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
@@ -182,22 +187,24 @@ const TYPICAL: f64 = 0.25;
 
 /// What increments of velocities are measured by too: `k_q` of [kinematic](crate::irk::kinematic)
 /// states.
-pub(in crate::irk) struct KinematicScales<'a, M: Dae, E: Plain, const S: usize> {
+pub(in crate::irk) struct KinematicScales<'a, M: Plan, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` are.
-    pub points: &'a ArrayV<M, [E; S]>,
+    pub points: &'a M::V<[E; S]>,
     pub a: &'a [[E; S]; S],
 }
 
 /// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
 #[inline(always)]
-pub(in crate::irk) fn part<M: Dae, T>(of: &[T]) -> &[T] {
-    of.get(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
+pub(in crate::irk) fn part<M: Plan, T>(plan: M, of: &[T]) -> &[T] {
+    let (first, end) = plan.facts().unknowns;
+    of.get(first..end).unwrap_or_default()
 }
 
 #[inline(always)]
-pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
-    of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
+pub(in crate::irk) fn part_mut<M: Plan, T>(plan: M, of: &mut [T]) -> &mut [T] {
+    let (first, end) = plan.facts().unknowns;
+    of.get_mut(first..end).unwrap_or_default()
 }
 
 /// The largest of two accumulators, or what is not a number.

@@ -137,7 +137,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
                 None => Ok(()),
             }
         })?;
-        pass.finish(&parts.work.result, count - 1, to)?;
+        pass.finish::<W::Fallback>(&parts.work.result, count - 1, to)?;
         finish(&mut along)
     }
 
@@ -205,7 +205,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         if let Some(step) = parts.steps.get(point.step) {
             point.evaluate(step, h, &mut forward.dense.dense)?;
         }
-        point.differentiate(h, forward)?;
+        point.differentiate::<_, W::Fallback>(h, forward)?;
         Ok(&forward.dense)
     }
 }

@@ -132,11 +132,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
             Ok(())
         })?;
-        forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
+        forward.finish::<W::Fallback>(&parts.work.result, count - 1, &mut to.first.forward)?;
         finish(&mut along)?;
         let ahead = if distant { to.h_xx.as_slice() } else { &[] };
         pass.run(parts, kept, [lambda, nu], ahead, reborrow(&mut along))?;
-        pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
+        pass.finish::<W::Fallback>(along.as_ref().and_then(|integrand| integrand.second()), to)?;
         self.keep_forward().map(|_| ())
     }
 }

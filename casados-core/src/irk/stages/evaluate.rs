@@ -5,12 +5,13 @@
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::stage_values;
-use crate::irk::kinematic::{self, are_together, derivative, unknowns};
+use crate::irk::kinematic::{self, are_together, derivative};
 use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Times, Work};
-use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, dispatch, each_row, kernels, minus_ha};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::plan::{Plan, PlanOf, Table};
 use crate::scalar::{Lanes, SideBySide, Strided};
 use crate::shape::{Matrix, Plain, Shape};
 
@@ -33,9 +34,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        let Coefficients { a, c, .. } = coefficients;
-        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
-        dispatch(Place::<M, E, S, false> { points: &mut self.points, jacobian, x, y, a, c, time, step });
+        self.place_at::<false>(coefficients, step, x, y);
     }
 
     /// The same, with the `k_i` of [kinematic](crate::irk::kinematic) states as they follow from
@@ -51,9 +50,28 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !kinematic::is_any::<M>() } {
             return self.place(coefficients, step, x, y);
         }
-        let Coefficients { a, c, .. } = coefficients;
-        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
-        dispatch(Place::<M, E, S, true> { points: &mut self.points, jacobian, x, y, a, c, time, step });
+        self.place_at::<true>(coefficients, step, x, y);
+    }
+
+    #[inline(always)]
+    fn place_at<const UNKNOWNS: bool>(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+    ) {
+        dispatch(Place::<_, E, S, UNKNOWNS> {
+            plan: F::plan::<M>(),
+            points: F::Plan::<M>::v_mut(&mut self.points),
+            jacobian: F::Plan::<M>::jacobian(&self.linear.jacobian),
+            x: F::Plan::<M>::x(x),
+            y: F::Plan::<M>::k(y),
+            a: &coefficients.a,
+            c: &coefficients.c,
+            time: self.inputs.time,
+            step,
+        });
     }
 
     /// The residual at all stages.
@@ -85,7 +103,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             return;
         }
-        to_middle::<M, E, S>(&mut self.points);
+        to_middle(self.points.as_mut(), 2 * M::Shape::NX + M::Shape::NZ);
         self.at_stage::<true>(0);
         self.first_only = true;
         self.place_unknowns(coefficients, step, x, y);
@@ -137,12 +155,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 }
 
 kernels! {
-    /// The mean of the stages in place of the first one. (Inputs are the same at all of them.)
-    fn to_middle [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
-        points: &'k mut ArrayV<M, [E; S]>,
-    ) {
-        let points = points.as_mut();
-        let (own, rest) = points.split_at_mut((2 * M::Shape::NX + M::Shape::NZ).min(points.len()));
+    /// The mean of the stages in place of the first one. (Inputs, which follow so many variables,
+    /// are the same at all of them.)
+    fn to_middle [E: Lanes, const S: usize] [E, S] <A>(points: &'k mut [[E; S]], inputs: usize) {
+        let (own, rest) = points.split_at_mut(inputs.min(points.len()));
         let share = E::from_f64(const { 1.0 / S as f64 });
         for stages in own.iter_mut().chain(rest.last_mut()) {
             let mut total = stages[0];
@@ -184,24 +200,25 @@ impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
 }
 
 /// See [`Work::place`] and [`Work::place_unknowns`].
-struct Place<'a, M: Dae, E: Plain, const S: usize, const UNKNOWNS: bool> {
-    points: &'a mut ArrayV<M, [E; S]>,
+struct Place<'a, M: Plan, E: Plain, const S: usize, const UNKNOWNS: bool> {
+    plan: M,
+    points: &'a mut M::V<[E; S]>,
     jacobian: &'a M::Jacobian<[E; S]>,
-    x: &'a ArrayX<M, E>,
-    y: &'a ArrayK<M, [E; S]>,
+    x: &'a M::X<E>,
+    y: &'a M::K<[E; S]>,
     a: &'a [[E; S]; S],
     c: &'a [E; S],
     time: Times<E>,
     step: usize,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_, M, E, S, UNKNOWNS> {
+impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_, M, E, S, UNKNOWNS> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { points, jacobian, x, y, a, c, time, step } = self;
-        let (points, x, y) = (points.as_mut(), x.as_ref(), y.as_ref());
+        let Self { plan, points, jacobian, x, y, a, c, time, step } = self;
+        let (points, x, y, jacobian) = (points.as_mut(), x.as_ref(), y.as_ref(), jacobian.as_ref());
         let (h, nx) = (time.step, x.len());
         if let Some(t) = points.last_mut() {
             let start = E::from_whole(step);
@@ -215,7 +232,7 @@ impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_
         let minus_ha = minus_ha(a, h);
         // Of kinematic states, which are most often the first or the last, there is nothing to
         // copy.
-        let (first, end) = if UNKNOWNS { const { unknowns::<M>() } } else { (0, y.len()) };
+        let (first, end) = if UNKNOWNS { plan.facts().unknowns } else { (0, y.len()) };
         let k = first..nx.min(end).max(first);
         let (xdot, rest) = points.split_at_mut(nx);
         let (xi, rest) = rest.split_at_mut(nx);
@@ -225,33 +242,38 @@ impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_
         let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
         let own_y = y.get(k.clone()).unwrap_or_default();
         for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
-            if !(UNKNOWNS && (const { !are_together::<M>() }) && linalg::kinematic::<M>(state).is_some()) {
+            if !(UNKNOWNS && (const { !are_together::<M>() }) && plan.kinematic(state).is_some()) {
                 (*xdot, *xi) = (*k, stage_values::<A, E, S>(x, &minus_ha, k));
             }
         }
         if UNKNOWNS {
-            each_row::<A, _>(&mut Reconstruct::<M, E, S> { points, jacobian, x, minus_ha });
+            each_row::<A, _>(&mut Reconstruct { plan, points, jacobian, x, minus_ha });
         }
     }
 }
 
 /// Kinematic states and their derivatives, once their velocities are there.
-struct Reconstruct<'a, M: Dae, E: Plain, const S: usize> {
+struct Reconstruct<'a, M, E, const S: usize> {
+    plan: M,
     points: &'a mut [[E; S]],
-    jacobian: &'a M::Jacobian<[E; S]>,
+    jacobian: &'a [[E; S]],
     x: &'a [E],
     minus_ha: Block<E, S>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
-    const ROWS: usize = kinematic::count::<M>();
+impl<M: Plan, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
+    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Kinematic.of(self.plan.structure())
+    }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Some(k) = derivative::<M, E, S>(state, self.jacobian, self.points) else { return };
+        let Some(k) = derivative(self.plan, state, self.jacobian, self.points) else { return };
         let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
         *xdot = k;
-        if let Some(xi) = self.points.get_mut(M::Shape::NX + state) {
+        if let Some(xi) = self.points.get_mut(self.plan.nx() + state) {
             *xi = stage_values::<A, E, S>(x, &self.minus_ha, &k);
         }
     }

@@ -5,7 +5,8 @@
 //! small block are spent on finding it.
 
 use crate::linalg::kernel::arithmetic::Arithmetic;
-use crate::model::{Dae, Pivot, Supernode, Update};
+use crate::model::{Pivot, Supernode, Update};
+use crate::plan::Plan;
 
 // Where nothing is optimised unrolled loops would only be long, and in firmware memory is dearer
 // than time.
@@ -32,16 +33,26 @@ const FEW: usize = 8;
 
 /// What is done with each row of a table.
 pub trait AtRow {
-    /// The rows of the table.
-    const ROWS: usize;
+    /// The rows of the table, where they are known when the kernel is compiled.
+    const ROWS: Option<usize>;
     /// About how many instructions each takes.
     const INSTRUCTIONS: usize;
     /// Whether straight lines are worth their compilation.
     const UNROLLED: bool = true;
     /// To be `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, row: usize);
+    /// The rows of the table, where they are not known before.
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        0
+    }
     /// So many of the first rows need only what [`simple`](Self::simple) does.
-    const SIMPLE: usize = 0;
+    const SIMPLE: Option<usize> = Some(0);
+    /// How many these are, where that is not known before.
+    #[inline(always)]
+    fn simple_rows(&self) -> usize {
+        0
+    }
     /// What a loop does with these instead, without branches. To be `#[inline(always)]`.
     #[inline(always)]
     fn simple(&mut self, _row: usize) {}
@@ -50,7 +61,8 @@ pub trait AtRow {
 /// Whether the rows of a table are unrolled.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
     let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
-    UNROLLING && A::UNROLLED && V::UNROLLED && V::ROWS <= MOST_ROWS && V::ROWS * V::INSTRUCTIONS <= most
+    let Some(rows) = V::ROWS else { return false };
+    UNROLLING && A::UNROLLED && V::UNROLLED && rows <= MOST_ROWS && rows * V::INSTRUCTIONS <= most
 }
 
 /// All rows of a table.
@@ -60,10 +72,18 @@ pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::each_row::<A, V>(visit);
     }
-    for row in 0..V::SIMPLE {
+    let simple = match V::SIMPLE {
+        Some(rows) => rows,
+        None => visit.simple_rows(),
+    };
+    let rows = match V::ROWS {
+        Some(rows) => rows,
+        None => visit.rows(),
+    };
+    for row in 0..simple {
         visit.simple(row);
     }
-    for row in V::SIMPLE..V::ROWS {
+    for row in simple..rows {
         visit.at::<A>(row);
     }
 }
@@ -82,13 +102,13 @@ pub trait AtPivot {
 
 /// From the first pivot to the last.
 #[inline(always)]
-pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+pub fn from_first<A: Arithmetic, M: Plan, V: AtPivot>(plan: M, visit: &mut V) {
     if const { is_short_plan::<A, M>(V::UPDATES, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::from_first::<A, M, V>(visit);
     }
-    let mut updates = M::STRUCTURE.elimination.updates;
-    for pivot in M::STRUCTURE.elimination.pivots {
+    let mut updates = plan.structure().elimination.updates;
+    for pivot in plan.structure().elimination.pivots {
         let Some((own, rest)) = updates.split_at_checked(updates_of(pivot)) else { return };
         updates = rest;
         visit.at::<A>(pivot, own);
@@ -97,12 +117,12 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 
 /// From the last pivot to the first, without updates.
 #[inline(always)]
-pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+pub fn from_last<A: Arithmetic, M: Plan, V: AtPivot>(plan: M, visit: &mut V) {
     if const { is_short_plan::<A, M>(V::UPDATES, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::from_last::<A, M, V>(visit);
     }
-    let all = M::STRUCTURE.elimination.pivots;
+    let all = plan.structure().elimination.pivots;
     // The optimiser unrolls a loop over indices where a plan is short, as in firmware, but not one
     // that goes backwards through a slice, which is faster where it stays a loop.
     if const { cfg!(feature = "std") } {
@@ -134,31 +154,31 @@ pub trait AtSupernode {
 
 /// From the first supernode to the last.
 #[inline(always)]
-pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+pub fn supernodes_from_first<A: Arithmetic, M: Plan, V: AtSupernode>(plan: M, visit: &mut V) {
     if const { is_short_plan::<A, M>(false, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::supernodes_from_first::<A, M, V>(visit);
     }
     if const { !GROUPED } {
-        return from_first::<A, M, _>(&mut Single(visit));
+        return from_first::<A, M, _>(plan, &mut Single(visit));
     }
-    for supernode in M::STRUCTURE.elimination.supernodes {
-        at_supernode::<A, M, V>(visit, supernode);
+    for supernode in plan.structure().elimination.supernodes {
+        at_supernode::<A, M, V>(plan, visit, supernode);
     }
 }
 
 /// From the last supernode to the first.
 #[inline(always)]
-pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+pub fn supernodes_from_last<A: Arithmetic, M: Plan, V: AtSupernode>(plan: M, visit: &mut V) {
     if const { is_short_plan::<A, M>(false, V::INSTRUCTIONS) } {
         #[cfg(all(feature = "std", not(debug_assertions)))]
         return lines::supernodes_from_last::<A, M, V>(visit);
     }
     if const { !GROUPED } {
-        return from_last::<A, M, _>(&mut Single(visit));
+        return from_last::<A, M, _>(plan, &mut Single(visit));
     }
-    for supernode in M::STRUCTURE.elimination.supernodes.iter().rev() {
-        at_supernode::<A, M, V>(visit, supernode);
+    for supernode in plan.structure().elimination.supernodes.iter().rev() {
+        at_supernode::<A, M, V>(plan, visit, supernode);
     }
 }
 
@@ -174,8 +194,12 @@ impl<V: AtSupernode> AtPivot for Single<'_, V> {
 }
 
 #[inline(always)]
-fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode: &'static Supernode) {
-    let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..).unwrap_or_default();
+fn at_supernode<A: Arithmetic, M: Plan, V: AtSupernode>(
+    plan: M,
+    visit: &mut V,
+    supernode: &'static Supernode,
+) {
+    let pivots = plan.structure().elimination.pivots.get(supernode.first as usize..).unwrap_or_default();
     match (supernode.count, pivots) {
         (4, [a, b, c, d, ..]) if const { has_supernode::<M>(4) } => visit.at::<A, 4>([a, b, c, d]),
         (3, [a, b, c, ..]) if const { has_supernode::<M>(3) } => visit.at::<A, 3>([a, b, c]),
@@ -185,9 +209,10 @@ fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode:
     }
 }
 
-/// Whether a plan has a supernode of so many pivots.
-const fn has_supernode<M: Dae>(count: u32) -> bool {
-    let supernodes = M::STRUCTURE.elimination.supernodes;
+/// Whether a plan may have a supernode of so many pivots.
+const fn has_supernode<M: Plan>(count: u32) -> bool {
+    let Some(structure) = M::KNOWN else { return true };
+    let supernodes = structure.elimination.supernodes;
     let mut index = 0;
     while index < supernodes.len() {
         if supernodes[index].count == count {
@@ -198,16 +223,20 @@ const fn has_supernode<M: Dae>(count: u32) -> bool {
     false
 }
 
-/// Whether kernels that go through all blocks of a plan are long.
+/// Whether kernels that go through all blocks of a plan are known to be long.
 #[cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code))]
-pub const fn is_long<M: Dae, const S: usize>() -> bool {
-    M::STRUCTURE.elimination.slots.len() * S * S > 250
+pub const fn is_long<M: Plan, const S: usize>() -> bool {
+    match M::KNOWN {
+        Some(structure) => structure.elimination.slots.len() * S * S > 250,
+        None => false,
+    }
 }
 
 /// Whether the pivots of a plan are unrolled, with so many instructions for each block, or for each
 /// update of one.
-const fn is_short_plan<A: Arithmetic, M: Dae>(updates: bool, instructions: usize) -> bool {
-    let plan = &M::STRUCTURE.elimination;
+const fn is_short_plan<A: Arithmetic, M: Plan>(updates: bool, instructions: usize) -> bool {
+    let Some(structure) = M::KNOWN else { return false };
+    let plan = &structure.elimination;
     let few = updates && instructions <= FEW;
     let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };

@@ -19,46 +19,46 @@ use crate::linalg::block::{inverse, product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
-use crate::model::{Dae, Pivot, Update};
+use crate::model::{Pivot, Structure, Update};
+use crate::plan::Plan;
 use crate::scalar::Field;
 use crate::shape::copy;
-use core::marker::PhantomData;
 
 /// What a matrix is eliminated by.
 pub struct Planned<'a, M, E, const S: usize> {
-    pub model: PhantomData<M>,
+    pub plan: M,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [Block<E, S>],
 }
 
-copy!(['a, M, E, const S: usize] Planned<'a, M, E, S>);
+copy!(['a, M: Copy, E, const S: usize] Planned<'a, M, E, S>);
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it
 /// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
 /// block that is singular leaves elements that are not finite.
-pub fn factor<M: Dae, E: Field, const S: usize>(blocks: &mut [Block<E, S>]) {
-    dispatch(Factor::<M, E, S> { blocks, model: PhantomData });
+pub fn factor<M: Plan, E: Field, const S: usize>(plan: M, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor { plan, blocks });
 }
 
 /// See [`factor`].
 pub(in crate::linalg) struct Factor<'a, M, E, const S: usize> {
+    pub plan: M,
     pub blocks: &'a mut [Block<E, S>],
-    pub model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
+impl<M: Plan, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
     const WIDE: bool = S.is_multiple_of(4) && is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        if has_all::<M, _>(self.blocks) {
-            from_first::<A, M, _>(&mut self);
+        if has_all(self.plan, self.blocks) {
+            from_first::<A, M, _>(self.plan, &mut self);
         }
     }
 }
 
-impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+impl<M: Plan, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
@@ -102,7 +102,7 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
 
 /// `block − lower · upper`
 #[inline(always)]
-fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
+fn update<A: Arithmetic, M: Plan, E: Field, const S: usize>(
     block: &mut Block<E, S>,
     target: &Update,
     lower: &Block<E, S>,
@@ -119,15 +119,18 @@ fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
 
 /// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less
 /// work than to ask; and where it is little.
-pub const fn begins_with_update<M: Dae, E>() -> bool {
-    let plan = &M::STRUCTURE.elimination;
-    align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
+pub const fn begins_with_update<M: Plan, E>() -> bool {
+    let much = match M::KNOWN {
+        Some(Structure { elimination, .. }) => 8 * elimination.fill() >= elimination.slots.len(),
+        None => true,
+    };
+    align_of::<E>() > 8 && much
 }
 
 /// Fill of the matrix, a row of its assembly.
 #[inline(always)]
-pub fn clear_fill<M: Dae, E, B: Copy>(blocks: &mut [B], row: usize, zero: B) {
-    let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, zero: B) {
+    let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
     if const { begins_with_update::<M, E>() } {
         return;
     }
@@ -139,16 +142,16 @@ pub fn clear_fill<M: Dae, E, B: Copy>(blocks: &mut [B], row: usize, zero: B) {
 /// Always; but the optimiser then knows their number, and with it how often loops over constant
 /// tables go round.
 #[inline(always)]
-pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
-    blocks.len() == M::STRUCTURE.elimination.slots.len()
+pub fn has_all<M: Plan, B>(plan: M, blocks: &[B]) -> bool {
+    blocks.len() == plan.structure().elimination.slots.len()
 }
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
-pub fn blocks_with_slots<'a, M: Dae, E, const S: usize>(
+pub fn blocks_with_slots<'a, M: Plan, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
-    let slots = M::STRUCTURE.elimination.slots.get(range.clone()).unwrap_or_default();
+    let slots = factors.plan.structure().elimination.slots.get(range.clone()).unwrap_or_default();
     factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
 }

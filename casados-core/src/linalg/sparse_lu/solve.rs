@@ -12,9 +12,10 @@ use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::prefetch::Ahead;
 use crate::linalg::kernel::unroll::{AtPivot, from_first, from_last, is_long};
-use crate::model::{Dae, Pivot, Update};
+use crate::model::{Pivot, Update};
+use crate::plan::Plan;
 use crate::scalar::Field;
-use crate::shape::{Array, Plain, Shape};
+use crate::shape::{Array, Plain};
 use core::marker::PhantomData;
 
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
@@ -22,7 +23,7 @@ use core::marker::PhantomData;
 ///
 /// Columns are taken in panel rows that fit registers, each through the whole elimination: a
 /// panel row of all rows stays in the nearest cache.
-pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+pub fn solve<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
@@ -30,7 +31,7 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
 }
 
 /// Solves `Mᵀ X = R` in place.
-pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+pub fn solve_transposed<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
@@ -45,7 +46,7 @@ struct Solve<'a, M, E, R, First, Second, const S: usize> {
     systems: PhantomData<(First, Second)>,
 }
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, First: System, Second: System, const S: usize> Kernel
+impl<M: Plan, E: Field + Plain, R: Array<E>, First: System, Second: System, const S: usize> Kernel
     for Solve<'_, M, E, R, First, Second, S>
 {
     type Number = E;
@@ -103,7 +104,7 @@ impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Ahead<'_, E> {
 #[inline(always)]
 pub fn sweeps<
     A: Arithmetic,
-    M: Dae,
+    M: Plan,
     E: Field + Plain,
     R: Array<E>,
     const S: usize,
@@ -116,7 +117,7 @@ pub fn sweeps<
     column: usize,
     visitor: &mut impl Visitor<E, S, W>,
 ) {
-    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+    if !has_all(factors.plan, factors.blocks) || rows.len() != factors.plan.nk() {
         return;
     }
     let viewer_of_first = &mut ();
@@ -124,13 +125,13 @@ pub fn sweeps<
         Substitution { factors, rows, column, visitor: viewer_of_first },
         PhantomData,
     );
-    from_first::<A, M, _>(&mut first);
+    from_first::<A, M, _>(factors.plan, &mut first);
     let rows = first.0.rows;
     let mut second = Along::<Second, Substitution<'_, M, E, R, _, S, W>>(
         Substitution { factors, rows, column, visitor },
         PhantomData,
     );
-    from_last::<A, M, _>(&mut second);
+    from_last::<A, M, _>(factors.plan, &mut second);
 }
 
 /// `W` columns of right-hand sides on their way.
@@ -147,7 +148,7 @@ pub trait System {
     /// What is done at a pivot.
     fn at<
         A: Arithmetic,
-        M: Dae,
+        M: Plan,
         E: Field + Plain,
         R: Array<E>,
         V: Visitor<E, S, W>,
@@ -162,7 +163,7 @@ pub trait System {
 /// A way through a system.
 struct Along<Y, T>(T, PhantomData<Y>);
 
-impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
+impl<Y: System, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
     AtPivot for Along<Y, Substitution<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
@@ -184,7 +185,7 @@ macro_rules! system {
 
         impl System for $name {
             #[inline(always)]
-            fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
+            fn at<A: Arithmetic, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
                 substitution: &mut Substitution<'_, M, E, R, V, S, W>,
                 pivot: &'static Pivot,
             ) {
@@ -211,7 +212,7 @@ system!(
     TransposedUp: transposed_up
 );
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
+impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
     Substitution<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
@@ -262,7 +263,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
             return;
         }
         let mut panel_row = load(rows, slot, *column);
-        for left in M::STRUCTURE.elimination.left.get(pivot.left()).unwrap_or_default() {
+        for left in factors.plan.structure().elimination.left.get(pivot.left()).unwrap_or_default() {
             let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
             let (Some(block), Some(other)) = (block, other) else { continue };
             subtract_of::<A, E, R, S, W>(&mut panel_row, block, other, *column);
@@ -302,8 +303,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize,
 /// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
 /// another column. Of large blocks that the second cache holds the processor fetches some columns
 /// ahead side by side, but no more than that.
-const fn goes_by_rows<M: Dae>(block: usize) -> bool {
-    let pivots = M::STRUCTURE.elimination.pivots;
+const fn goes_by_rows<M: Plan>(block: usize) -> bool {
+    let Some(structure) = M::KNOWN else { return block <= 256 };
+    let pivots = structure.elimination.pivots;
     let (mut longest, mut index) = (0, 0);
     while index < pivots.len() {
         let left = pivots[index].left[1] - pivots[index].left[0];

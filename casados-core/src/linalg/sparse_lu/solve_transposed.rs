@@ -10,11 +10,12 @@ use super::micro_panel::{load, store};
 use super::solve::Substitution;
 use crate::linalg::block::{negate, subtract_transposed};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
-use crate::model::{Dae, Pivot};
+use crate::model::Pivot;
+use crate::plan::Plan;
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
+impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
     Substitution<'_, M, E, R, V, S, W>
 {
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -71,7 +72,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         if slot >= rows.len() || pivot.lower().is_empty() {
             return;
         }
-        let mut slots = M::STRUCTURE.elimination.slots.get(pivot.lower()).unwrap_or_default();
+        let mut slots = factors.plan.structure().elimination.slots.get(pivot.lower()).unwrap_or_default();
         let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
         let mut panel_row = load::<E, R, S, W>(rows, slot, *column);
         let mut accumulator = [[E::from_f64(0.0); W]; S];
@@ -102,10 +103,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
 
 /// One block, with the slot at its other end.
 #[inline(always)]
-fn one<'a, M: Dae, E, const S: usize>(
+fn one<'a, M: Plan, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     index: usize,
 ) -> Option<(&'a Block<E, S>, usize)> {
-    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
+    let &slot = factors.plan.structure().elimination.slots.get(index)?;
     Some((factors.blocks.get(index)?, slot as usize))
 }

@@ -9,6 +9,7 @@ use crate::linalg::newton_matrix::{each_entry, kinematic, slot};
 use crate::linalg::sparse_lu::factor::{self, Planned};
 use crate::linalg::sparse_lu::solve;
 use crate::model::{ArrayK, Dae};
+use crate::plan::Known;
 use crate::scalar::Real;
 use crate::shape::{Aligned, Plain, Shape};
 use bytemuck::Zeroable;
@@ -111,7 +112,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
             self.solve_dense(rows);
         } else {
             let blocks = self.blocks.as_ref();
-            let factors = Planned::<M, _, 1> { model: PhantomData, blocks };
+            let factors = Planned::<_, _, 1> { plan: Known::<M>::PLAN, blocks };
             solve::solve(factors, rows.as_mut());
         }
         self.reconstruct(rows);
@@ -253,7 +254,7 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
             }
             *to = element;
         }
-        factor::Factor::<M, _, 1> { blocks, model: PhantomData }.run::<A>();
+        factor::Factor::<_, _, 1> { plan: Known::<M>::PLAN, blocks: &mut *blocks }.run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())

@@ -10,7 +10,9 @@ use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtRow, each_row};
 use crate::linalg::sparse_lu::factor;
+use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
+use crate::plan::{Plan, PlanOf, Table};
 use crate::scalar::Lanes;
 use crate::shape::Aligned;
 use bytemuck::Zeroable;
@@ -27,26 +29,27 @@ pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
 impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
     /// there for the `first_only` of stages that are alike, but not of a single lane.
-    pub fn factor(
+    pub fn factor<F: Fallback>(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
         first_only: bool,
         basis: &Eigenbasis<E, S, S>,
         h: E,
     ) {
-        let blocks = &mut self.blocks;
-        let values = &basis.values;
+        let (plan, values) = (F::plan::<M>(), &basis.values);
+        let jacobian = F::Plan::<M>::jacobian(jacobian);
+        let blocks = F::Plan::<M>::factors_mut(&mut self.blocks);
         if const { E::LANES > 1 } && first_only {
-            dispatch(AssembleShared::<M, E, S, true> { jacobian, values, h, blocks });
+            dispatch(AssembleShared::<_, E, S, true> { plan, jacobian, values, h, blocks });
         } else {
-            dispatch(AssembleShared::<M, E, S, false> { jacobian, values, h, blocks });
+            dispatch(AssembleShared::<_, E, S, false> { plan, jacobian, values, h, blocks });
         }
-        factor::factor::<M, _, 1>(self.blocks.as_mut());
+        factor::factor(plan, self.blocks.as_mut());
     }
 
     /// Solves the Newton system of the stages: what is in the rows of the solution that belong to
     /// kinematic states stays there.
-    pub fn solve(
+    pub fn solve<F: Fallback>(
         &mut self,
         basis: &Eigenbasis<E, S, S>,
         f: &ArrayK<M, [E; S]>,
@@ -55,12 +58,15 @@ impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
         let Self { blocks, rows } = self;
         let (blocks, rows) =
             (blocks.as_ref().as_flattened().as_flattened(), rows.as_mut().as_flattened_mut());
-        dispatch(Solve::<M, E, S> { basis, f, blocks, rows: rows.as_flattened_mut(), solution });
+        let (f, rows) = (F::Plan::<M>::k(f), rows.as_flattened_mut());
+        let solution = F::Plan::<M>::k_mut(solution);
+        dispatch(Solve { plan: F::plan::<M>(), basis, f, blocks, rows, solution });
     }
 }
 
 /// `Σ c f (hμ)^order` of the shared Jacobian, each block written once.
-struct AssembleShared<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+struct AssembleShared<'a, M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+    plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     /// The eigenvalues `μ`.
     values: &'a Complex<E, S>,
@@ -68,37 +74,46 @@ struct AssembleShared<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bo
     blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
+impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
     for AssembleShared<'_, M, E, S, FIRST_ONLY>
 {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { jacobian, values, h, blocks } = self;
+        let Self { plan, jacobian, values, h, blocks } = self;
+        let (jacobian, blocks) = (jacobian.as_ref(), blocks.as_mut());
         let (scale, share) = (values.scaled(h), E::from_f64(Rows::<M, E, S, FIRST_ONLY>::SHARE));
         let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(demote);
-        each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { jacobian, scales, blocks });
+        each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { plan, jacobian, scales, blocks });
     }
 }
 
 /// See [`AssembleShared`].
-struct Rows<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
-    jacobian: &'a M::Jacobian<[E; S]>,
+struct Rows<'a, M, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+    plan: M,
+    jacobian: &'a [[E; S]],
     /// `hμ` and `(hμ)²` of what is added up.
     scales: [Number<E, S>; 2],
-    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
+    blocks: &'a mut [[[Number<E, S>; 1]; 1]],
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
-    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
-    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
+    const ROWS: Option<usize> = Table::Assembly.known::<M>();
+    const SIMPLE: Option<usize> = Table::Fill.known::<M>();
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        Table::Assembly.of(self.plan.structure())
+    }
+    #[inline(always)]
+    fn simple_rows(&self) -> usize {
+        self.plan.facts().fill
+    }
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let plan = &M::STRUCTURE.elimination;
-        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some(of) = plan.assembly.get(row) else { return };
+        let Self { plan, jacobian, blocks, .. } = self;
+        let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
         if const { factor::begins_with_update::<M, Number<E, S>>() } && of.is_fill() {
             return;
         }
@@ -121,11 +136,11 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        factor::clear_fill::<M, Number<E, S>, _>(self.blocks.as_mut(), row, [[Complex::zero()]]);
+        factor::clear_fill::<M, Number<E, S>, _>(self.plan, self.blocks, row, [[Complex::zero()]]);
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S, FIRST_ONLY> {
+impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S, FIRST_ONLY> {
     /// The mean is so much of what is added up.
     const SHARE: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
 

@@ -10,34 +10,38 @@ use super::number::{Number, demote};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::Kernel;
 use crate::linalg::kernel::unroll::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
-use crate::model::{ArrayK, Dae, Pivot};
+use crate::linalg::sparse_lu::factor::has_all;
+use crate::model::Pivot;
+use crate::plan::Plan;
 use crate::scalar::Lanes;
 
 /// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns.
-pub struct Solve<'a, M: Dae, E: Lanes, const S: usize> {
+pub struct Solve<'a, M: Plan, E: Lanes, const S: usize> {
+    pub plan: M,
     pub basis: &'a Eigenbasis<E, S, S>,
-    pub f: &'a ArrayK<M, [E; S]>,
+    pub f: &'a M::K<[E; S]>,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [Number<E, S>],
     /// Memory for a row of each slot.
     pub rows: &'a mut [Number<E, S>],
-    pub solution: &'a mut ArrayK<M, [[E; 1]; S]>,
+    pub solution: &'a mut M::K<[[E; 1]; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
     type Number = E;
     type Output = ();
     const WIDE: bool = S >= 8 && is_long::<M, 1>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { basis, f, blocks, rows, solution } = self;
-        if blocks.len() != M::STRUCTURE.elimination.slots.len() || rows.len() != f.as_ref().len() {
+        let Self { plan, basis, f, blocks, rows, solution } = self;
+        let (f, solution) = (f.as_ref(), solution.as_mut());
+        if !has_all(plan, blocks) || rows.len() != f.len() {
             return;
         }
-        let mut down = Down::<M, E, S> { basis: *basis, f, blocks, rows };
-        supernodes_from_first::<A, M, _>(&mut down);
-        let mut up = Up::<M, E, S> { basis: *basis, blocks, rows: down.rows, solution };
-        supernodes_from_last::<A, M, _>(&mut up);
+        let mut down = Down { plan, basis: *basis, f, blocks, rows };
+        supernodes_from_first::<A, M, _>(plan, &mut down);
+        let mut up = Up { plan, basis: *basis, blocks, rows: down.rows, solution };
+        supernodes_from_last::<A, M, _>(plan, &mut up);
     }
 }
 
@@ -45,32 +49,34 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
 const PER_BLOCK: usize = 5;
 
 /// See [`Solve`].
-struct Down<'a, M: Dae, E: Lanes, const S: usize> {
+struct Down<'a, M, E: Lanes, const S: usize> {
+    plan: M,
     basis: Eigenbasis<E, S, S>,
-    f: &'a ArrayK<M, [E; S]>,
+    f: &'a [[E; S]],
     blocks: &'a [Number<E, S>],
     rows: &'a mut [Number<E, S>],
 }
 
 /// See [`Solve`].
-struct Up<'a, M: Dae, E: Lanes, const S: usize> {
+struct Up<'a, M, E: Lanes, const S: usize> {
+    plan: M,
     basis: Eigenbasis<E, S, S>,
     blocks: &'a [Number<E, S>],
     rows: &'a mut [Number<E, S>],
-    solution: &'a mut ArrayK<M, [[E; 1]; S]>,
+    solution: &'a mut [[[E; 1]; S]],
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
     const INSTRUCTIONS: usize = PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let mut sums = [Complex::zero(); P];
         for (sum, pivot) in sums.iter_mut().zip(pivots) {
-            if let Some(f) = self.f.as_ref().get(pivot.equation as usize) {
+            if let Some(f) = self.f.get(pivot.equation as usize) {
                 *sum = demote(self.basis.split::<A>(f));
             }
         }
-        for left in M::STRUCTURE.elimination.left.get(pivots[0].left()).unwrap_or_default() {
+        for left in self.plan.structure().elimination.left.get(pivots[0].left()).unwrap_or_default() {
             // Blocks of their rows lie one after the other.
             let blocks = self.blocks.get(left.block as usize..).and_then(|blocks| blocks.first_chunk::<P>());
             let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize)) else { continue };
@@ -95,12 +101,12 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
     const INSTRUCTIONS: usize = PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let beside = pivots[P - 1].upper();
-        let slots = M::STRUCTURE.elimination.slots.get(beside).unwrap_or_default();
+        let slots = self.plan.structure().elimination.slots.get(beside).unwrap_or_default();
         let (mut sums, mut own): (_, [&[Number<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
         let mut triangle = own;
         for (index, pivot) in pivots.into_iter().enumerate() {
@@ -134,7 +140,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
             if let Some(row) = self.rows.get_mut(slot) {
                 *row = sum;
             }
-            if let Some(solution) = self.solution.as_mut().get_mut(slot) {
+            if let Some(solution) = self.solution.get_mut(slot) {
                 let sum = Complex { parts: sum.parts.map(E::promote) };
                 solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&sum));
             }

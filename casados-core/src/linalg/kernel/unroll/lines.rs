@@ -6,7 +6,8 @@
 
 use super::{AtPivot, AtRow, AtSupernode, updates_of};
 use crate::linalg::kernel::arithmetic::Arithmetic;
-use crate::model::{Dae, Elimination, Pivot, Update};
+use crate::model::{Elimination, Pivot, Update};
+use crate::plan::Plan;
 use core::marker::PhantomData;
 
 /// So many rows are left to the optimiser to unroll: as often it looks what constants simplify.
@@ -29,12 +30,20 @@ macro_rules! backwards {
 /// A chunk of rows.
 macro_rules! chunk {
     ($A:ty, $V:ty, $visit:ident: $($n:literal)*) => {
-        $(if const { $n * CHUNK < <$V>::ROWS } {
-            for row in $n * CHUNK..const { smaller(($n + 1) * CHUNK, <$V>::ROWS) } {
+        $(if const { $n * CHUNK < rows::<$V>() } {
+            for row in $n * CHUNK..const { smaller(($n + 1) * CHUNK, rows::<$V>()) } {
                 $visit.at::<$A>(row);
             }
         })*
     };
+}
+
+/// The rows of a table, which are known.
+const fn rows<V: AtRow>() -> usize {
+    match V::ROWS {
+        Some(rows) => rows,
+        None => 0,
+    }
 }
 
 const fn smaller(a: usize, b: usize) -> usize {
@@ -75,9 +84,12 @@ macro_rules! sizes {
 /// that goes through its pivots.
 struct Nth<M, const N: usize>(PhantomData<M>);
 
-impl<M: Dae, const N: usize> Nth<M, N> {
+impl<M: Plan, const N: usize> Nth<M, N> {
     const EXISTS: bool = Self::PIVOT.is_some();
-    const PIVOT: Option<(&'static Pivot, &'static [Update])> = nth(&M::STRUCTURE.elimination, N);
+    const PIVOT: Option<(&'static Pivot, &'static [Update])> = match M::KNOWN {
+        Some(structure) => nth(&structure.elimination, N),
+        None => None,
+    };
 }
 
 /// A pivot and its updates.
@@ -97,9 +109,12 @@ const fn nth(plan: &Elimination, n: usize) -> Option<(&'static Pivot, &'static [
 /// The pivots of a supernode by its number, if it has so many.
 struct NthSupernode<M, const N: usize, const SIZE: usize>(PhantomData<M>);
 
-impl<M: Dae, const N: usize, const SIZE: usize> NthSupernode<M, N, SIZE> {
+impl<M: Plan, const N: usize, const SIZE: usize> NthSupernode<M, N, SIZE> {
     const EXISTS: bool = Self::PIVOTS.is_some();
-    const PIVOTS: Option<[&'static Pivot; SIZE]> = nth_supernode(&M::STRUCTURE.elimination, N);
+    const PIVOTS: Option<[&'static Pivot; SIZE]> = match M::KNOWN {
+        Some(structure) => nth_supernode(&structure.elimination, N),
+        None => None,
+    };
 }
 
 const fn nth_supernode<const SIZE: usize>(plan: &Elimination, n: usize) -> Option<[&'static Pivot; SIZE]> {
@@ -116,22 +131,22 @@ const fn nth_supernode<const SIZE: usize>(plan: &Elimination, n: usize) -> Optio
 }
 
 #[inline(always)]
-pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+pub fn from_first<A: Arithmetic, M: Plan, V: AtPivot>(visit: &mut V) {
     forwards!(pivot!(A, M, visit));
 }
 
 #[inline(always)]
-pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+pub fn from_last<A: Arithmetic, M: Plan, V: AtPivot>(visit: &mut V) {
     backwards!(pivot!(A, M, visit));
 }
 
 #[inline(always)]
-pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+pub fn supernodes_from_first<A: Arithmetic, M: Plan, V: AtSupernode>(visit: &mut V) {
     forwards!(supernode!(A, M, visit));
 }
 
 #[inline(always)]
-pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+pub fn supernodes_from_last<A: Arithmetic, M: Plan, V: AtSupernode>(visit: &mut V) {
     backwards!(supernode!(A, M, visit));
 }
 
@@ -146,7 +161,7 @@ mod tests {
     struct Path<const ROWS: usize>(Vec<usize>);
 
     impl<const ROWS: usize> AtRow for Path<ROWS> {
-        const ROWS: usize = ROWS;
+        const ROWS: Option<usize> = Some(ROWS);
         const INSTRUCTIONS: usize = 1;
         fn at<A: Arithmetic>(&mut self, row: usize) {
             self.0.push(row);

@@ -363,9 +363,10 @@ impl<F: Function, T: Real> Kernel for Square<'_, '_, F, T> {
 }
 
 impl<F: Function, T: Real> AtRow for Square<'_, '_, F, T> {
-    const ROWS: usize = F::Outputs::NY;
+    const ROWS: Option<usize> = Some(F::Outputs::NY);
     const INSTRUCTIONS: usize = {
-        let entries = F::STRUCTURE.by_row.len() / if Self::ROWS > 0 { Self::ROWS } else { 1 } + 1;
+        let outputs = if F::Outputs::NY > 0 { F::Outputs::NY } else { 1 };
+        let entries = F::STRUCTURE.by_row.len() / outputs + 1;
         4 * entries + 3 * entries * entries
     };
     #[inline(always)]

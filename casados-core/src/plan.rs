@@ -1,0 +1,358 @@
+//! What kernels know of a model, bound when they are compiled or when they run.
+//!
+//! | | kernels are compiled | loops over tables | lengths |
+//! | --- | --- | --- | --- |
+//! | [`Known<M>`](Known) | for each model | unrolled where they are short | constants |
+//! | [`&'static ModelTable`](ModelTable) | once for all models | loops | read |
+//!
+//! A kernel is generic over its plan and has it as a value, which is nothing at all where the model
+//! is known. Decisions that need constants ask [`Plan::KNOWN`].
+
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::shape::{Plain, Shape};
+use crate::structure::{Kinematic, Structure};
+use core::marker::PhantomData;
+
+/// What has so many elements: an array where the model is known, or a slice.
+pub trait Elements<T>: AsRef<[T]> + AsMut<[T]> {}
+impl<T, A: AsRef<[T]> + AsMut<[T]> + ?Sized> Elements<T> for A {}
+
+/// The plan by which a kernel computes.
+pub trait Plan: Copy + Send + Sync + 'static {
+    /// The structure of the model, if kernels are compiled for that one.
+    const KNOWN: Option<&'static Structure>;
+    /// How many columns there is memory for where directions are computed side by side, if that is
+    /// known.
+    const NC: usize;
+
+    /// An element for each differential state.
+    type X<T: Plain>: Elements<T> + ?Sized;
+    /// An element for each unknown of a stage, or for each equation.
+    type K<T: Plain>: Elements<T> + ?Sized;
+    /// An element for each variable.
+    type V<T: Plain>: Elements<T> + ?Sized;
+    /// An element for each entry of the Jacobian.
+    type Jacobian<T: Plain>: Elements<T> + ?Sized;
+    /// An element for each block of the factors.
+    type Factors<T: Plain>: Elements<T> + ?Sized;
+
+    /// The structure of the model.
+    fn structure(self) -> &'static Structure;
+    /// What follows from it.
+    fn facts(self) -> &'static Facts;
+
+    /// The number of differential states.
+    #[inline(always)]
+    fn nx(self) -> usize {
+        self.structure().x.len()
+    }
+    /// The number of algebraic states.
+    #[inline(always)]
+    fn nz(self) -> usize {
+        self.structure().z.len()
+    }
+    /// The number of controls.
+    #[inline(always)]
+    fn nu(self) -> usize {
+        self.structure().u.len()
+    }
+    /// The number of unknowns of a stage.
+    #[inline(always)]
+    fn nk(self) -> usize {
+        self.nx() + self.nz()
+    }
+    /// The number of variables, time included.
+    #[inline(always)]
+    fn nv(self) -> usize {
+        self.nx() + self.nz() + self.nw() + 1
+    }
+    /// The number of directions `(x₀, u, p)`.
+    #[inline(always)]
+    fn nw(self) -> usize {
+        self.nx() + self.nu() + self.structure().p.len()
+    }
+
+    /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it
+    /// is.
+    #[inline(always)]
+    fn slot(self, equation: usize) -> usize {
+        match self.structure().elimination.slot_of_equation.get(equation) {
+            Some(&slot) => slot as usize,
+            None => equation,
+        }
+    }
+
+    /// What is known of the state of a slot, if it is [kinematic](Kinematic).
+    #[inline(always)]
+    fn kinematic(self, slot: usize) -> Option<&'static Kinematic> {
+        kinematic(self.structure(), slot)
+    }
+
+    /// The state that is the velocity of a kinematic one, if it is a state.
+    #[inline(always)]
+    fn velocity(self, of: &Kinematic) -> Option<usize> {
+        let (nx, velocity) = (self.nx(), of.velocity as usize);
+        if velocity < 2 * nx { velocity.checked_sub(nx) } else { None }
+    }
+
+    /// An entry of a Jacobian: row, column, value.
+    #[inline(always)]
+    fn entry<V>(self, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
+        let pattern = &self.structure().jacobian;
+        let &row = pattern.rows.get(index)?;
+        let &column = pattern.columns.get(index)?;
+        Some((row as usize, column as usize, jacobian.get(index)?))
+    }
+}
+
+/// A plan of this model, which takes the arrays that the model has.
+pub trait PlanOf<M: Dae>: Plan {
+    /// An element for each differential state.
+    fn x<T: Plain>(of: &ArrayX<M, T>) -> &Self::X<T>;
+    /// An element for each unknown of a stage, or for each equation.
+    fn k<T: Plain>(of: &ArrayK<M, T>) -> &Self::K<T>;
+    /// The same.
+    fn k_mut<T: Plain>(of: &mut ArrayK<M, T>) -> &mut Self::K<T>;
+    /// An element for each variable.
+    fn v<T: Plain>(of: &ArrayV<M, T>) -> &Self::V<T>;
+    /// The same.
+    fn v_mut<T: Plain>(of: &mut ArrayV<M, T>) -> &mut Self::V<T>;
+    /// An element for each entry of the Jacobian.
+    fn jacobian<T: Plain>(of: &M::Jacobian<T>) -> &Self::Jacobian<T>;
+    /// An element for each block of the factors.
+    fn factors_mut<T: Plain>(of: &mut M::Factors<T>) -> &mut Self::Factors<T>;
+}
+
+/// Arrays of a model as a plan has them.
+macro_rules! arrays {
+    ($M:ident: $of:ident => $as_ref:expr, $as_mut:expr) => {
+        #[inline(always)]
+        fn x<T: Plain>($of: &ArrayX<$M, T>) -> &Self::X<T> {
+            $as_ref
+        }
+        #[inline(always)]
+        fn k<T: Plain>($of: &ArrayK<$M, T>) -> &Self::K<T> {
+            $as_ref
+        }
+        #[inline(always)]
+        fn k_mut<T: Plain>($of: &mut ArrayK<$M, T>) -> &mut Self::K<T> {
+            $as_mut
+        }
+        #[inline(always)]
+        fn v<T: Plain>($of: &ArrayV<$M, T>) -> &Self::V<T> {
+            $as_ref
+        }
+        #[inline(always)]
+        fn v_mut<T: Plain>($of: &mut ArrayV<$M, T>) -> &mut Self::V<T> {
+            $as_mut
+        }
+        #[inline(always)]
+        fn jacobian<T: Plain>($of: &$M::Jacobian<T>) -> &Self::Jacobian<T> {
+            $as_ref
+        }
+        #[inline(always)]
+        fn factors_mut<T: Plain>($of: &mut $M::Factors<T>) -> &mut Self::Factors<T> {
+            $as_mut
+        }
+    };
+}
+
+/// The plan of a model that is known when kernels are compiled.
+pub struct Known<M>(PhantomData<fn() -> M>);
+
+impl<M> Known<M> {
+    /// Its only value.
+    pub const PLAN: Self = Self(PhantomData);
+}
+
+impl<M> Clone for Known<M> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M> Copy for Known<M> {}
+
+impl<M: Dae> Plan for Known<M> {
+    const KNOWN: Option<&'static Structure> = Some(&M::STRUCTURE);
+    // As many as the rows of `ArrayC` have.
+    const NC: usize = if cfg!(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
+        M::Shape::NC
+    } else {
+        M::Shape::NW
+    };
+    type X<T: Plain> = ArrayX<M, T>;
+    type K<T: Plain> = ArrayK<M, T>;
+    type V<T: Plain> = ArrayV<M, T>;
+    type Jacobian<T: Plain> = M::Jacobian<T>;
+    type Factors<T: Plain> = M::Factors<T>;
+    #[inline(always)]
+    fn structure(self) -> &'static Structure {
+        const { &M::STRUCTURE }
+    }
+    #[inline(always)]
+    fn facts(self) -> &'static Facts {
+        const { &Facts::of(&M::STRUCTURE) }
+    }
+}
+
+impl<M: Dae> PlanOf<M> for Known<M> {
+    arrays!(M: of => of, of);
+}
+
+/// The plan of any model, which kernels read when they run.
+#[derive(Debug)]
+pub struct ModelTable {
+    structure: &'static Structure,
+    facts: Facts,
+}
+
+impl ModelTable {
+    /// That of a model.
+    pub const fn of(structure: &'static Structure) -> Self {
+        Self { structure, facts: Facts::of(structure) }
+    }
+}
+
+impl Plan for &'static ModelTable {
+    const KNOWN: Option<&'static Structure> = None;
+    const NC: usize = 0;
+    type X<T: Plain> = [T];
+    type K<T: Plain> = [T];
+    type V<T: Plain> = [T];
+    type Jacobian<T: Plain> = [T];
+    type Factors<T: Plain> = [T];
+    #[inline(always)]
+    fn structure(self) -> &'static Structure {
+        self.structure
+    }
+    #[inline(always)]
+    fn facts(self) -> &'static Facts {
+        &self.facts
+    }
+}
+
+impl<M: Dae> PlanOf<M> for &'static ModelTable {
+    arrays!(M: of => of.as_ref(), of.as_mut());
+}
+
+/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+#[inline(always)]
+pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Kinematic> {
+    let kinematic = structure.elimination.kinematic;
+    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE {
+        Some(&kinematic[slot])
+    } else {
+        None
+    }
+}
+
+/// What follows from a structure, found when the model is compiled.
+#[derive(Debug)]
+pub struct Facts {
+    /// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
+    pub unknowns: (usize, usize),
+    /// Terms of the Newton matrix that are fill.
+    pub fill: usize,
+    /// How many curved variables come before the first state, and before the first algebraic state.
+    pub curved: [usize; 2],
+    /// Whether each equation that has a derivative has that of one state, in their order: the
+    /// entries of `f_ẋ` then are those of the states.
+    pub direct: bool,
+}
+
+impl Facts {
+    /// Those of a structure.
+    pub const fn of(structure: &Structure) -> Self {
+        let nx = structure.x.len();
+        Self {
+            unknowns: unknowns(structure),
+            fill: structure.elimination.fill(),
+            curved: [before(structure.curved, nx), before(structure.curved, 2 * nx)],
+            direct: is_direct(structure),
+        }
+    }
+}
+
+/// How many of some numbers, in their order, come before one: of directions that have any
+/// influence, of curved variables.
+pub const fn before(numbers: &[u32], number: usize) -> usize {
+    let mut count = 0;
+    while count < numbers.len() && (numbers[count] as usize) < number {
+        count += 1;
+    }
+    count
+}
+
+const fn unknowns(structure: &Structure) -> (usize, usize) {
+    let (mut first, mut end) = (0, Table::Unknowns.of(structure));
+    while first < end && kinematic(structure, first).is_some() {
+        first += 1;
+    }
+    while end > first && kinematic(structure, end - 1).is_some() {
+        end -= 1;
+    }
+    (first, end)
+}
+
+/// See [`Facts`].
+pub const fn is_direct(structure: &Structure) -> bool {
+    let (count, pattern) = (structure.blocks[1], &structure.jacobian);
+    let mut entry = 0;
+    while entry < count {
+        if pattern.at(entry).1 != entry {
+            return false;
+        }
+        entry += 1;
+    }
+    count == structure.x.len()
+}
+
+/// A table of the structure that kernels go through, row by row.
+#[derive(Clone, Copy)]
+pub enum Table {
+    /// The terms of the Newton matrix, fill first.
+    Assembly,
+    /// Those of them that are fill.
+    Fill,
+    /// Entries by which equations depend on kinematic states.
+    Dependents,
+    /// States up to the last that is kinematic.
+    Kinematic,
+    /// Unknowns of a stage.
+    Unknowns,
+    /// Entries of the Jacobian from the beginning of a block to that of another.
+    Entries(usize, usize),
+}
+
+impl Table {
+    /// All entries of the Jacobian.
+    pub const JACOBIAN: Self = Self::Entries(0, 5);
+
+    /// How many rows it has.
+    #[inline(always)]
+    pub const fn of(self, structure: &Structure) -> usize {
+        let Structure { elimination, blocks, x, z, .. } = structure;
+        match self {
+            Self::Assembly => elimination.assembly.len(),
+            Self::Fill => elimination.fill(),
+            Self::Dependents => elimination.dependents.len(),
+            Self::Kinematic => elimination.kinematic.len(),
+            Self::Unknowns => x.len() + z.len(),
+            Self::Entries(begin, end) => blocks[end] - blocks[begin],
+        }
+    }
+
+    /// How many it has where kernels are compiled for one model.
+    pub const fn known<P: Plan>(self) -> Option<usize> {
+        match P::KNOWN {
+            Some(structure) => Some(self.of(structure)),
+            None => None,
+        }
+    }
+
+    /// Whether it may have any.
+    pub const fn may_have<P: Plan>(self) -> bool {
+        !matches!(self.known::<P>(), Some(0))
+    }
+}
