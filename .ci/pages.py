@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Links of Markdown pages lead to files and headings, and every decision record is listed.
+"""Links of Markdown pages lead to files and headings, every decision record is listed, and pages that
+give profiles for the user's package give those of the template.
 
 Links to other sites are left out.
 """
@@ -10,6 +11,9 @@ import sys
 from pathlib import Path
 
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)", re.MULTILINE)
+# Where a user copies the profiles from.
+PROFILES = ["README.md", "docs/guide/first_model.md", "docs/guide/performance.md"]
+PROFILE = re.compile(r"^\[(profile\.dev[^\]]*)\]\n((?:[\w-]+ = .*\n)+)", re.MULTILINE)
 FENCE = re.compile(r"^ *```.*?^ *```", re.MULTILINE | re.DOTALL)
 
 
@@ -33,11 +37,21 @@ def broken(path):
             yield link
 
 
+def profiles(path):
+    """The development profiles of a manifest, or of a page that shows one: each with its options."""
+    return {name: options.split("\n") for name, options in PROFILE.findall(Path(path).read_text())}
+
+
 def main():
     listed = subprocess.run(["git", "ls-files", "*.md"], check=True, capture_output=True, text=True)
     bad = [f"{name}: {link}" for name in listed.stdout.split() for link in broken(Path(name))]
     index = Path("docs/decisions/README.md").read_text()
     bad += [f"{record} is not listed" for record in Path("docs/decisions").glob("0*.md") if record.name not in index]
+    template = profiles("template/Cargo.toml")
+    # Without it the integrator of a model, which is compiled with the user's package, is not optimised.
+    if "opt-level = 1" not in template.get("profile.dev", []):
+        bad.append("template/Cargo.toml: [profile.dev] lacks `opt-level = 1`")
+    bad += [f"{page}: profiles are not those of template/Cargo.toml" for page in PROFILES if profiles(page) != template]
     print("\n".join(bad), end="\n" if bad else "")
     return 1 if bad else 0
 
