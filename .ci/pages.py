@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Links of Markdown pages lead to files and headings; every decision record is listed and has at most
-40 lines.
+40 lines; pages that give profiles for the user's package give those of the template.
 
 Links to other sites are left out.
 """
@@ -12,6 +12,9 @@ from pathlib import Path
 
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)", re.MULTILINE)
 RECORD_LINES = 40
+# Where a user copies the profiles from.
+PROFILES = ["README.md", "docs/guide/first_model.md", "docs/guide/performance.md"]
+PROFILE = re.compile(r"^\[(profile\.dev[^\]]*)\]\n((?:[\w-]+ = .*\n)+)", re.MULTILINE)
 FENCE = re.compile(r"^ *```.*?^ *```", re.MULTILINE | re.DOTALL)
 
 
@@ -35,6 +38,11 @@ def broken(path):
             yield link
 
 
+def profiles(path):
+    """The development profiles of a manifest, or of a page that shows one: each with its options."""
+    return {name: options.split("\n") for name, options in PROFILE.findall(Path(path).read_text())}
+
+
 def main():
     listed = subprocess.run(["git", "ls-files", "*.md"], check=True, capture_output=True, text=True)
     bad = [f"{name}: {link}" for name in listed.stdout.split() for link in broken(Path(name))]
@@ -44,6 +52,11 @@ def main():
             bad.append(f"{record} is not listed")
         if len(record.read_text().splitlines()) > RECORD_LINES:
             bad.append(f"{record} has more than {RECORD_LINES} lines")
+    template = profiles("template/Cargo.toml")
+    # Without it the integrator of a model, which is compiled with the user's package, is not optimised.
+    if "opt-level = 1" not in template.get("profile.dev", []):
+        bad.append("template/Cargo.toml: [profile.dev] lacks `opt-level = 1`")
+    bad += [f"{page}: profiles are not those of template/Cargo.toml" for page in PROFILES if profiles(page) != template]
     print("\n".join(bad), end="\n" if bad else "")
     return 1 if bad else 0
 

@@ -36,6 +36,7 @@ def arguments():
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin nothing after this time")
     parser.add_argument("--again", action="store_true", help="forget what was run")
     parser.add_argument("--libraries", action="store_true", help="build the libraries alone")
+    parser.add_argument("--peers", action="store_true", help="run acados beside CasADi's integrator alone, without libraries")
     parser.add_argument("--page", action="store_true", help="write the page from what was run alone")
     return parser.parse_args()
 
@@ -104,6 +105,28 @@ def experiments(given):
                 yield f"chain_{m}_{setting}_alone", f"{features},alone", {}
 
 
+def peers(results, given):
+    """acados, which needs no library; what was run is not run again."""
+    import chain
+    import page
+
+    rounds, seconds = (2, 5.0) if given.quick else (5, 10.0)
+    part = results.all.setdefault("peers", {"runs": {}})
+    path = pathlib.Path(os.environ["ACADOS_SOURCE_DIR"].split(":")[0], "lib", "git_commit_hash")
+    version = path.read_text().strip()[:9] if path.exists() else "of an unknown version"
+    part |= {"machine": page.machine(), "date": f"{datetime.date.today():%-d %B %Y}", "version": version}
+    loads = part.setdefault("loads", [])
+    for setting in chain.SETTINGS:
+        for m in [3] if given.quick else [int(m) for m in given.masses.split(",")]:
+            if f"{m} {setting}" in part["runs"]:
+                continue
+            loads.append(os.getloadavg()[0])
+            part["runs"][f"{m} {setting}"] = chain.peers(m, setting, rounds, seconds)
+            part["load"] = f"{min(loads):.0f} to {max(loads):.0f}"
+            results.write()
+    print(page.peers(results.all))
+
+
 def main():
     given, begin = arguments(), time.monotonic()
     import common
@@ -111,7 +134,11 @@ def main():
 
     results = Results(common.FOLDER / ("quick.json" if given.quick else "results.json"), given.again)
     target = common.FOLDER / "paper.md" if given.quick else common.ROOT / "docs" / "paper.md"
-    if not given.page:
+    if given.peers:
+        peers(results, given)
+        if not results.all["chains"]:
+            return
+    elif not given.page:
         # Before the time of others is taken, what they share.
         common.cargo("nothing")
         results.all |= {"machine": page.machine(), "date": f"{datetime.date.today():%B %Y}"}

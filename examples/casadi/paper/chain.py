@@ -16,6 +16,8 @@ N, TS, TOLERANCE = 40, 0.2, 1e-6
 SETTINGS = {"s2n1": (2, 1), "s4n4": (4, 4)}
 # Where derivatives of adaptive methods are so slow that three iterations have to do.
 FEW = 3
+# What needs no library of casados.
+PEERS = ["CasADi collocation", "acados, call-backs", "acados SQP, Gauss-Newton"]
 
 
 class Problem:
@@ -149,6 +151,7 @@ def runners(masses, setting):
     stages, steps = SETTINGS[setting]
     problem, path = Problem(masses), library(f"chain_{masses}_{setting}")
     external = lambda name: ca.external(name, path)
+    horizon = lambda F: lambda x, u: F(x, u, ca.MX(0, N))
     single = lambda F: one_by_one(lambda x, u: F(x, u, ca.MX(0, 1)))
     theirs = lambda F: one_by_one(lambda x, u: F(x0=x, p=u)["xf"])
     collocation = problem.integrator(
@@ -159,10 +162,9 @@ def runners(masses, setting):
     )
     adaptive = {"abstol": 1e-8, "reltol": 1e-8}
     few = FEW if masses > 3 else None
-    chains = external("chains")
     makers = {
         "casados, whole problem": lambda: whole(path, TOLERANCE),
-        "casados, horizon": lambda: problem.shooting(lambda x, u: chains(x, u, ca.MX(0, N))),
+        "casados, horizon": lambda: problem.shooting(horizon(external("chains"))),
         "casados, intervals": lambda: problem.shooting(single(external("chain"))),
         "casados, call-backs": lambda: problem.shooting(
             one_by_one(callbacks.integrator(callbacks.Exported("chain", path), problem.nx, 3))
@@ -195,3 +197,10 @@ def run(masses, setting, rounds, seconds, leave_out=()):
     print(f"chain of {masses} masses, {setting}")
     with environment([*problem.rest, *problem.x0]):
         return race({name: make for name, make in makers.items() if name not in leave_out}, rounds, seconds)
+
+
+def peers(masses, setting, rounds, seconds):
+    """Medians of acados, and of CasADi's integrator as the common yardstick: without a library."""
+    makers = runners(masses, setting)[1]
+    print(f"peers: chain of {masses} masses, {setting}")
+    return race({name: makers[name] for name in PEERS if name in makers}, rounds, seconds)

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 
 PICTURES = ROOT / "docs" / "paper"
 WHOLE, HORIZON, INTERVALS = "casados, whole problem", "casados, horizon", "casados, intervals"
+CALLBACKS = "acados, call-backs"
 THEIRS, DIRECT, INTERIOR = "CasADi collocation", "direct collocation", "casados interior point"
 SETTINGS = {"s2n1": "two stages, one step", "s4n4": "four stages, four steps"}
 
@@ -69,24 +70,45 @@ def draw(chains, setting):
     plt.close(figure)
 
 
+def cell(run):
+    """Milliseconds of an iteration, of its functions, and iterations."""
+    if run is None:
+        return ""
+    if "error" in run:
+        return "raised"
+    mark = "" if run["complete"] else "*"
+    total, functions = (milliseconds(per_iteration(run, key)) for key in ["total", "functions"])
+    return f"{total} ({functions}) · {run['iterations']}{mark}"
+
+
 def chain(chains, setting):
     masses = sorted(int(key.split()[0]) for key in chains if key.endswith(setting))
     runs = {m: chains[f"{m} {setting}"] for m in masses}
     names = list(dict.fromkeys(name for run in runs.values() for name in run))
 
-    def cell(run):
-        if run is None:
-            return ""
-        if "error" in run:
-            return "raised"
-        mark = "" if run["complete"] else "*"
-        total, functions = (milliseconds(per_iteration(run, key)) for key in ["total", "functions"])
-        return f"{total} ({functions}) · {run['iterations']}{mark}"
-
     rows = [[name] + [cell(runs[m].get(name)) for m in masses] for name in names]
     head = ["ms of an iteration (of its functions) · iterations", *[f"{m} masses" for m in masses]]
     said = failures({f"{m} masses": run for m, run in runs.items()})
     return "\n\n".join(filter(None, [table(head, rows), said]))
+
+
+def peers(results):
+    """acados beside CasADi's integrator, all sizes and both settings in one table."""
+    runs = results["peers"]["runs"]
+    names = list(dict.fromkeys(name for run in runs.values() for name in run))
+    key = lambda key: (key.split()[1], int(key.split()[0]))
+    rows = []
+    for stamp in sorted(runs, key=key):
+        masses, setting = stamp.split()
+        row = runs[stamp]
+        both = [row[name] for name in [THEIRS, CALLBACKS] if name in row and "error" not in row[name]]
+        ratio = f"{both[0]['functions'] / both[1]['functions']:.3g}" if len(both) == 2 else ""
+        apart = f"{abs(both[0]['objective'] / both[1]['objective'] - 1.0):.1e}" if len(both) == 2 else ""
+        rows.append([f"{masses} masses, {setting}", *[cell(row.get(name)) for name in names], ratio, apart])
+    head = ["", *names, "functions: CasADi's / acados'", "objectives apart"]
+    said = failures({stamp: run for stamp, run in runs.items()})
+    words = PEERS.format(**{key: results["peers"][key] for key in ["machine", "date", "load", "version"]})
+    return "\n\n".join(filter(None, [words.strip(), table(head, rows), said]))
 
 
 def agreement(chains, setting):
@@ -163,6 +185,8 @@ def write(results, path):
         draw(chains, setting)
         words = CHAIN.format(number=number, setting=SETTINGS[setting], name=setting)
         parts += [words, chain(chains, setting), AGREE.format(agreement(chains, setting))]
+    if results.get("peers"):
+        parts.append(peers(results))
     parts += [GOALS, goals(chains, orbit, intervals)]
     if orbit:
         parts += [ORBIT, orbits(orbit)]
@@ -235,6 +259,17 @@ one of the same library, which CasADi takes as an expression.
 AGREE = """
 Whole problem, horizon, intervals and CasADi's integrator solve one discrete problem: the largest
 relative difference of their objectives is {:.1e}.
+"""
+
+PEERS = """
+## acados in IPOPT, by call-backs
+
+What the paper is about: acados' implicit integrator with its derivatives of first and second order,
+called from IPOPT through Python. CasADi's integrator of the same method ran by turns with it, and
+is what these rows have in common with the figures above. Numbers are as there: milliseconds of an
+iteration, of its functions, and iterations. `examples/casadi/paper.py --peers` writes this section,
+without a library of casados: acados {version}, {machine}, {date}, load average {load} of other
+programs. acados' own SQP is Gauss-Newton, with HPIPM after partial condensing.
 """
 
 GOALS = """

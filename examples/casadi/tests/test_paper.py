@@ -71,6 +71,15 @@ class Pages(unittest.TestCase):
         self.assertIn("- direct collocation raised `Invalid_Number_Detected`", text)
         self.assertNotIn("of the time of direct collocation", text)
 
+    def test_peers_have_a_section(self):
+        sound = {page.THEIRS: lambda: result, page.CALLBACKS: lambda: lambda: common.result(1.0, 10, 0.1, 0.025)}
+        runs = {"3 s2n1": self.results(sound), "4 s4n4": self.results(sound | {page.CALLBACKS: of_a_peer})}
+        about = {"machine": "a machine", "date": "a day", "load": "1 to 2", "version": "1"}
+        text = page.peers({"peers": {"runs": runs, **about}})
+        self.assertIn("| 3 masses, s2n1 | 10 (5) · 10 | 10 (2.5) · 10 | 2 | 0.0e+00 |", text)
+        self.assertIn("| 4 masses, s4n4 | 10 (5) · 10 | raised |  |  |", text)
+        self.assertIn("- acados, call-backs (4 s4n4) raised `mismatching dimension", text)
+
     def test_everything_raises(self):
         names = [page.WHOLE, page.INTERVALS, page.THEIRS, page.DIRECT, page.INTERIOR]
         raised = self.results(dict.fromkeys(names, at_once))
