@@ -89,9 +89,8 @@ fn a_shock_at_a_turning_point() -> Test {
     Ok(())
 }
 
-/// `λ = 10`: y(0.9) and the slopes at both ends are tabulated by S. M. Roberts and J. S. Shipman, "On
-/// the closed form solution of Troesch's problem", J. Comput. Phys. 21 (1976). Here the first
-/// integral `y′² − 2 cosh(λ y)` is constant, which holds for the exact solution alone.
+/// `λ = 10`. Along the solution `y′² − 2 cosh(λ y)` is constant (S. M. Roberts, J. S. Shipman, "On the
+/// closed form solution of Troesch's problem", J. Comput. Phys. 21, 1976).
 #[test]
 fn troeschs_problem_keeps_its_first_integral() -> Test {
     let lambda = 10.0_f64;
