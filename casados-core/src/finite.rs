@@ -12,7 +12,7 @@ use crate::shape::{Matrix, Plain};
 /// # Errors
 /// [`Error::NonFiniteInput`]
 pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
-    match not_finite(values) {
+    match find_non_finite(values) {
         Some((index, value)) => Err(Error::NonFiniteInput { argument, index, name: "", value }),
         None => Ok(()),
     }
@@ -23,7 +23,7 @@ pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(
 /// # Errors
 /// [`Error::NonFiniteInput`]
 pub(crate) fn check_named<M: Dae, T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
-    match not_finite(values) {
+    match find_non_finite(values) {
         Some((index, value)) => {
             Err(Error::NonFiniteInput { argument, index, name: name::<M>(argument, index), value })
         }
@@ -47,7 +47,7 @@ pub(crate) fn name<M: Dae>(argument: Argument, index: usize) -> &'static str {
 /// # Errors
 /// [`Error::Overflow`] of the first element that is not finite.
 pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
-    match not_finite(values) {
+    match find_non_finite(values) {
         Some((index, _)) => Err(Error::Overflow { step, index }),
         None => Ok(()),
     }
@@ -87,7 +87,7 @@ pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), 
 /// # Errors
 /// [`Error::Overflow`] of the first second derivative that is not finite.
 pub(crate) fn check_second<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
-    for values in result.second() {
+    for values in result.second_derivative_blocks() {
         check_output(values, 0)?;
     }
     Ok(())
@@ -96,7 +96,7 @@ pub(crate) fn check_second<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<()
 impl<M: Dae, T: Plain> Hessian<M, T> {
     /// The blocks of `∇²(λᵀx)`, column by column.
     #[inline]
-    pub(crate) fn second(&self) -> [&[T]; 6] {
+    pub(crate) fn second_derivative_blocks(&self) -> [&[T]; 6] {
         let Self { h_xx, h_xu, h_uu, h_xp, h_up, h_pp, .. } = self;
         [h_xx.as_slice(), h_xu.as_slice(), h_uu.as_slice(), h_xp.as_slice(), h_up.as_slice(), h_pp.as_slice()]
     }
@@ -104,20 +104,20 @@ impl<M: Dae, T: Plain> Hessian<M, T> {
 
 /// The first element that is infinite or NaN.
 #[inline]
-pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
+pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     // A few are looked at before the function for many is entered.
     let finite = if values.len() < 16 { are_finite(values) } else { are_all_finite(values) };
     if finite {
         return None;
     }
-    first_of(values)
+    first_non_finite(values)
 }
 
 /// The first of elements that are not all finite. Without an operating system callers see where it
 /// may be.
 #[cfg_attr(feature = "std", cold, inline(never))]
 #[cfg_attr(not(feature = "std"), inline(always))]
-fn first_of<T: Real>(values: &[T]) -> Option<(usize, f64)> {
+fn first_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
 }
 

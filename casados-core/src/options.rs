@@ -3,9 +3,9 @@
 use crate::error::Error;
 
 /// Solutions without a digit that is right are none.
-const COARSEST: f64 = 0.1;
+const MAX_RTOL: f64 = 0.1;
 /// Newton's method is there after a few dozens, or never.
-const MOST_ITERATIONS: usize = 10_000;
+const MAX_ITERATIONS: usize = 10_000;
 
 /// What can be chosen about an integrator.
 ///
@@ -204,7 +204,7 @@ impl Options {
             return invalid("steps", 0.0, "an interval has at least one step");
         }
         let newton = &self.newton;
-        if !(0.0..=COARSEST).contains(&newton.tolerance) {
+        if !(0.0..=MAX_RTOL).contains(&newton.tolerance) {
             return invalid("newton.tolerance", newton.tolerance, "a tolerance is between 0 and 0.1");
         }
         let limits = [
@@ -212,7 +212,7 @@ impl Options {
             ("newton.fixed_iterations", newton.fixed_iterations),
         ];
         for (option, iterations) in limits {
-            if let Some(count) = iterations.filter(|count| !(1..=MOST_ITERATIONS).contains(count)) {
+            if let Some(count) = iterations.filter(|count| !(1..=MAX_ITERATIONS).contains(count)) {
                 return invalid(option, count as f64, "Newton's method takes between 1 and 10000 iterations");
             }
         }

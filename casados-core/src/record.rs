@@ -68,13 +68,13 @@ pub trait Record: Sized {
     #[must_use]
     fn from_vector<T: Real, V: Matrix<T>>(vector: &V) -> Self {
         const { assert!(Self::NUMBERS == V::ROWS * V::COLUMNS, "the record has as many numbers as the vector") };
-        read(vector.as_slice())
+        record_from_slice(vector.as_slice())
     }
 
     /// From a slice: a stage of a solution. `None` if it has another length.
     #[must_use]
     fn from_slice<T: Real>(values: &[T]) -> Option<Self> {
-        (values.len() == Self::NUMBERS).then(|| read(values))
+        (values.len() == Self::NUMBERS).then(|| record_from_slice(values))
     }
 
     /// Its numbers, in order.
@@ -87,7 +87,7 @@ pub trait Record: Sized {
     }
 }
 
-fn read<T: Real, R: Record>(values: &[T]) -> R {
+fn record_from_slice<T: Real, R: Record>(values: &[T]) -> R {
     let mut values = values.iter();
     R::read(&mut || values.next().map_or(0.0, |value| value.to_f64()))
 }

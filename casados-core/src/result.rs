@@ -7,7 +7,7 @@ use crate::model::{
     Dae, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX, MatrixZC,
     MatrixZP, MatrixZU, MatrixZX, VectorP, VectorU, VectorX, VectorZ,
 };
-use crate::shape::{Array, Matrix, Plain, change, plain};
+use crate::shape::{Array, Matrix, Plain, plain, update_entry};
 use bytemuck::Zeroable;
 use core::ops::Deref;
 
@@ -360,7 +360,7 @@ contains!(Hessian.first: ForwardAdjoint,);
 contains!(DenseForward.dense: Dense,);
 
 /// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
-pub(crate) fn split<T: Plain>(
+pub(crate) fn write_row<T: Plain>(
     row: &[T],
     r: usize,
     x: &mut impl Matrix<T>,
@@ -376,7 +376,7 @@ pub(crate) fn split<T: Plain>(
 fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
     for column in 0..A::COLUMNS {
         if let Some(value) = values.next() {
-            change(to, r, column, |_| *value);
+            update_entry(to, r, column, |_| *value);
         }
     }
 }

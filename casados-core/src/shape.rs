@@ -97,7 +97,7 @@ impl<V> DerefMut for Aligned<V> {
 
 /// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
 #[inline(always)]
-pub(crate) fn assign<V: Copy>(to: &mut V, from: &V) {
+pub(crate) fn copy_into<V: Copy>(to: &mut V, from: &V) {
     core::slice::from_mut(to).copy_from_slice(core::slice::from_ref(from));
 }
 
@@ -179,7 +179,7 @@ pub(crate) fn entry<T: Plain, A: Matrix<T>>(matrix: &A, row: usize, column: usiz
 }
 
 /// Changes an element whose place comes out of a table.
-pub(crate) fn change<T: Plain, A: Matrix<T>>(
+pub(crate) fn update_entry<T: Plain, A: Matrix<T>>(
     matrix: &mut A,
     row: usize,
     column: usize,

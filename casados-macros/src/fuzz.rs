@@ -51,7 +51,7 @@ const MODELS: [&str; 6] = [
 const ATTRIBUTES: [&str; 5] =
     ["", "name = Model", "range(x = -1.0..=1.0)", "nominal(x = 0.5), name = Other", "sizes(x = 3), linear"];
 
-const WORDS: [&str; 54] = [
+const TOKEN_WORDS: [&str; 54] = [
     "fn", "mod", "let", "mut", "for", "in", "if", "else", "match", "while", "loop", "return", "break",
     "continue", "const", "struct", "impl", "use", "pub", "self", "Self", "as", "ref", "move", "where", "dyn",
     "f64", "f32", "usize", "bool", "x", "xdot", "z", "u", "p", "t", "model", "sin", "sum", "map", "iter",
@@ -59,7 +59,7 @@ const WORDS: [&str; 54] = [
     "T",
 ];
 
-const NUMBERS: [&str; 16] = [
+const TOKEN_NUMBERS: [&str; 16] = [
     "0",
     "1",
     "2",
@@ -90,12 +90,13 @@ impl Source {
 
     fn token(&mut self, depth: usize) -> TokenTree {
         match self.below(12) {
-            0..=4 => match WORDS[self.below(WORDS.len())] {
+            0..=4 => match TOKEN_WORDS[self.below(TOKEN_WORDS.len())] {
                 "r#fn" => Ident::new_raw("fn", Span::call_site()).into(),
                 word => Ident::new(word, Span::call_site()).into(),
             },
             5 | 6 => {
-                let number: Literal = NUMBERS[self.below(NUMBERS.len())].parse().expect("a literal");
+                let number: Literal =
+                    TOKEN_NUMBERS[self.below(TOKEN_NUMBERS.len())].parse().expect("a literal");
                 number.into()
             }
             7 => Literal::string("text").into(),
@@ -146,13 +147,13 @@ impl Source {
 }
 
 /// Longer than any of these takes in an unoptimised build on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const MAX_EXPANSION_TIME: Duration = Duration::from_secs(20);
 
 /// Whether it is a model.
-fn survives(seed: u64, form: Form, attribute: TokenStream, item: TokenStream) -> bool {
+fn expands_in_time(seed: u64, form: Form, attribute: TokenStream, item: TokenStream) -> bool {
     let (text, begin) = (format!("seed {seed}: #[{attribute}] {item}"), Instant::now());
     let outcome = catch_unwind(AssertUnwindSafe(|| expand(form, attribute, item).to_string()));
-    assert!(begin.elapsed() < PATIENCE, "{:?}: {text}", begin.elapsed());
+    assert!(begin.elapsed() < MAX_EXPANSION_TIME, "{:?}: {text}", begin.elapsed());
     match outcome {
         Ok(expanded) => !expanded.contains("compile_error"),
         Err(_) => panic!("{text}"),
@@ -175,7 +176,7 @@ fn models_are_models() {
 }
 
 #[test]
-fn any_tokens() {
+fn random_tokens_expand() {
     for seed in 0..4000 {
         let mut source = Source(seed);
         let length = source.below(40);
@@ -187,7 +188,7 @@ fn any_tokens() {
         }
         let length = source.below(6);
         let attribute = (0..length).map(|_| source.token(2)).collect();
-        survives(seed, form(seed), attribute, item);
+        expands_in_time(seed, form(seed), attribute, item);
     }
 }
 
@@ -204,7 +205,7 @@ fn mutated_models() {
         if source.below(4) == 0 {
             attribute = source.mutate(attribute);
         }
-        models += usize::from(survives(seed, form(seed), attribute, item));
+        models += usize::from(expands_in_time(seed, form(seed), attribute, item));
     }
     // Some mutations leave a model (57 of these seeds), and some do not.
     assert!((20..3900).contains(&models), "{models}");

@@ -122,10 +122,10 @@ fn expand(
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
     // What is long without brackets (sums, chains of methods, `else if`) nests in the syntax tree.
-    stacker::grow(STACK, || expand_within(form, attribute, item))
+    stacker::grow(STACK, || expand_on_thread(form, attribute, item))
 }
 
-fn expand_within(
+fn expand_on_thread(
     form: language::Form,
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
@@ -154,11 +154,11 @@ fn expand_within(
 
 fn expand_source(source: language::Source) -> syn::Result<proc_macro2::TokenStream> {
     let mut parts = Vec::new();
-    let mut mistakes = language::mistakes::Mistakes::default();
-    for language::Part { form, original, models } in source.parts {
+    let mut mistakes = language::mistakes::CollectedErrors::default();
+    for language::ModelOrFunctions { form, original, models } in source.parts {
         if form == language::Form::Function {
             let functions = models.into_iter().map(structure::analyse_function).collect();
-            parts.push(emit::Part::Functions(functions));
+            parts.push(emit::ReadItem::Functions(functions));
             continue;
         }
         let mut analysed = Vec::new();
@@ -168,8 +168,8 @@ fn expand_source(source: language::Source) -> syn::Result<proc_macro2::TokenStre
                 Err(error) => mistakes.note(error),
             }
         }
-        parts.push(emit::Part::Models(original, analysed));
+        parts.push(emit::ReadItem::Models(original, analysed));
     }
-    mistakes.none()?;
+    mistakes.into_result()?;
     emit::expand(source.item, source.place, &parts)
 }

@@ -6,10 +6,10 @@ use syn::{Data, DeriveInput, Error, Result, parse_quote};
 
 /// The implementation of `Record`, or what is wrong.
 pub fn derive(input: TokenStream) -> TokenStream {
-    implementation(input).unwrap_or_else(|error| error.to_compile_error())
+    record_impl(input).unwrap_or_else(|error| error.to_compile_error())
 }
 
-fn implementation(input: TokenStream) -> Result<TokenStream> {
+fn record_impl(input: TokenStream) -> Result<TokenStream> {
     let DeriveInput { ident, mut generics, data, .. } = syn::parse2(input)?;
     let Data::Struct(data) = data else {
         return Err(Error::new(
@@ -40,7 +40,7 @@ fn implementation(input: TokenStream) -> Result<TokenStream> {
 mod tests {
     use super::*;
 
-    fn text(input: TokenStream) -> String {
+    fn expanded_text(input: TokenStream) -> String {
         match syn::parse2(derive(input)) {
             Ok(file) => prettyplease::unparse(&file),
             Err(error) => error.to_string(),
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn named_and_numbered_fields() {
-        let named = text(quote!(
+        let named = expanded_text(quote!(
             pub struct State<T, const N: usize> {
                 pub load: [T; N],
                 mass: f64,
@@ -63,7 +63,7 @@ mod tests {
             assert!(named.contains(part), "{part}\n{named}");
         }
         assert!(
-            text(quote!(
+            expanded_text(quote!(
                 struct Pair(f64, f64);
             ))
             .contains("1: ::casados::Record::read(from),")
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn enums_have_no_list_of_numbers() {
         assert!(
-            text(quote!(
+            expanded_text(quote!(
                 enum Mode {
                     A,
                     B,

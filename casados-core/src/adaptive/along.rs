@@ -48,7 +48,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         controls: &[VectorU<M, T>],
         ends: &[T],
     ) -> Result<&'a Nominal<M, T>, Error> {
-        self.integrator.solve_along(x0, controls, ends, Some(self.integrand))
+        self.integrator.solve_with_quadrature(x0, controls, ends, Some(self.integrand))
     }
 
     /// See [`Piecewise::forward`]; the integral over all intervals, and its derivatives.
@@ -64,7 +64,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
     where
         Q: Spanning<M, T>,
     {
-        self.integrator.forward_along(x0, controls, ends, self.integrand)
+        self.integrator.forward_with_quadrature(x0, controls, ends, self.integrand)
     }
 
     /// See [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end and the
@@ -82,7 +82,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
     where
         Q: Spanning<M, T>,
     {
-        self.integrator.hessian_along(x0, controls, ends, lambda, self.integrand)
+        self.integrator.hessian_with_quadrature(x0, controls, ends, lambda, self.integrand)
     }
 
     /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over
@@ -97,7 +97,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         ends: &[T],
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, controls, ends, lambda, Some(self.integrand))
+        self.integrator.adjoint_with_quadrature(x0, controls, ends, lambda, Some(self.integrand))
     }
 }
 
@@ -121,7 +121,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
     /// # Errors
     /// See [`Hybrid`]; [`Error::Grazing`].
     pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Solution<M, T>, Error> {
-        self.integrator.solve_along(x0, u, h, Some(self.integrand))
+        self.integrator.solve_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Hybrid::forward`]; the integral and its derivatives.
@@ -129,7 +129,7 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
     /// # Errors
     /// See [`Hybrid`].
     pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<HybridForward<M, T>, Error> {
-        self.integrator.forward_along(x0, u, h, Some(self.integrand))
+        self.integrator.forward_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Hybrid::adjoint`]; the gradient is that of `λᵀx` and the integral.
@@ -143,6 +143,6 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
+        self.integrator.adjoint_with_quadrature(x0, u, h, lambda, Some(self.integrand))
     }
 }

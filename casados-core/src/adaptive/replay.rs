@@ -146,7 +146,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
         step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
+        self.go(step)?.solve_with_quadrature(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
@@ -163,7 +163,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, &[], along)
+        self.go(step)?.hessian_with_quadrature(step.at.x, step.at.u, step.h, lambda, &[], along)
     }
 
     fn adjoint(
@@ -172,7 +172,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
+        self.go(step)?.adjoint_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
     }
 
     fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {

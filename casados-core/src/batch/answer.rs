@@ -8,7 +8,7 @@ use crate::linalg::dispatch;
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Matrix, Plain, Shape, assign};
+use crate::shape::{Matrix, Plain, Shape, copy_into};
 
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All
 /// of it is inlined into kernels.
@@ -116,13 +116,13 @@ macro_rules! answer {
     };
 }
 answer!(Nominal, solve, 0, |single, at, to| {
-    assign(to, single.solve_along(at.x0, &vector(at.u), at.h, None)?);
+    copy_into(to, single.solve_with_quadrature(at.x0, &vector(at.u), at.h, None)?);
     Ok(())
 });
 answer!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
 answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single.forward_adjoint_to(at, to));
 answer!(Adjoint, adjoint, 1, |single, at, to| {
-    assign(to, single.adjoint_along(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
+    copy_into(to, single.adjoint_with_quadrature(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
     Ok(())
 });
 answer!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));

@@ -10,7 +10,7 @@ use crate::model::{ArrayX, Ode};
 use crate::options::Options;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Matrix, Shape, assign};
+use crate::shape::{Matrix, Shape, copy_into};
 use crate::statistics::Statistics;
 use crate::tableau::{Method, Tableau};
 use core::slice::{from_mut, from_ref};
@@ -46,7 +46,7 @@ impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
     }
 
     fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {
-        assign(to, self.forward(at.x0, &vector(at.u), at.h)?);
+        copy_into(to, self.forward(at.x0, &vector(at.u), at.h)?);
         Ok(())
     }
 
@@ -55,12 +55,12 @@ impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
         at: &Interval<'_, M, T>,
         to: &mut ForwardAdjoint<M, T>,
     ) -> Result<(), Error> {
-        assign(to, self.forward_adjoint(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
+        copy_into(to, self.forward_adjoint(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
         Ok(())
     }
 
     fn hessian_to(&mut self, at: &Interval<'_, M, T>, to: &mut Hessian<M, T>) -> Result<(), Error> {
-        assign(to, self.hessian(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
+        copy_into(to, self.hessian(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ use crate::model::Dae;
 use crate::options::Options;
 use crate::result::Nominal;
 use crate::scalar::Real;
-use crate::shape::{Shape, assign};
+use crate::shape::{Shape, copy_into};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
@@ -183,7 +183,7 @@ impl<I: Single> Worker<I> {
         fill(ends, MOST_LANES, Zeroable::zeroed()).ok()?;
         let mut warm = [false; MOST_LANES];
         for (to, from) in stages.iter_mut().zip(share.stages.iter()) {
-            assign(to, from);
+            copy_into(to, from);
         }
         for (to, from) in warm.iter_mut().zip(share.warm.iter()) {
             *to = *from;

@@ -12,7 +12,7 @@ use super::second::Blocks;
 
 /// The numbers of states, algebraic states and directions, and of rows of `∂y/∂w`.
 #[derive(Clone, Copy, Debug)]
-pub struct Sizes {
+pub struct OutputDimensions {
     pub nx: usize,
     pub nz: usize,
     pub nw: usize,
@@ -20,14 +20,14 @@ pub struct Sizes {
 }
 
 /// Adds `ζ_xᵀν` to the multipliers of the state.
-pub fn add_to_seed(sizes: Sizes, zeta: &Consistent, nu: &[f64], lambda: &mut [f64]) {
+pub fn add_to_seed(sizes: OutputDimensions, zeta: &Consistent, nu: &[f64], lambda: &mut [f64]) {
     for (lambda, column) in lambda.iter_mut().zip(zeta.jacobian.chunks_exact(sizes.nz)) {
         *lambda += dot(column, nu);
     }
 }
 
 /// Adds what controls and parameters change of `νᵀζ` directly to the gradient.
-pub fn add_to_gradient(sizes: Sizes, zeta: &Consistent, nu: &[f64], gradient: &mut [f64]) {
+pub fn add_to_gradient(sizes: OutputDimensions, zeta: &Consistent, nu: &[f64], gradient: &mut [f64]) {
     let columns = gradient.iter_mut().zip(zeta.jacobian.chunks_exact(sizes.nz));
     for (gradient, column) in columns.skip(sizes.nx) {
         *gradient += dot(column, nu);
@@ -35,8 +35,8 @@ pub fn add_to_gradient(sizes: Sizes, zeta: &Consistent, nu: &[f64], gradient: &m
 }
 
 /// Writes the rows of `ζ`, which are behind those of the state.
-pub fn write_jacobian(sizes: Sizes, zeta: &Consistent, jacobian: &mut [f64]) {
-    let Sizes { nx, nz, ny, .. } = sizes;
+pub fn write_jacobian(sizes: OutputDimensions, zeta: &Consistent, jacobian: &mut [f64]) {
+    let OutputDimensions { nx, nz, ny, .. } = sizes;
     for (w, column) in jacobian.chunks_exact_mut(ny).enumerate() {
         let (x, rest) = column.split_at_mut(nx);
         for (i, to) in rest.iter_mut().take(nz).enumerate() {
@@ -48,13 +48,13 @@ pub fn write_jacobian(sizes: Sizes, zeta: &Consistent, jacobian: &mut [f64]) {
 
 /// Adds `Dᵀ ∇²(νᵀζ) D` to the Hessian, where `X` are the first rows of the Jacobian.
 pub fn add_to_hessian(
-    sizes: Sizes,
+    sizes: OutputDimensions,
     blocks: Blocks,
     zeta: &Consistent,
     jacobian: &[f64],
     hessian: &mut [f64],
 ) {
-    let Sizes { nx, nw, ny, .. } = sizes;
+    let OutputDimensions { nx, nw, ny, .. } = sizes;
     // The column of `D` for a direction.
     let column = |w: usize| {
         (0..nw).map(move |v| match v {

@@ -1,9 +1,9 @@
 //! What functions of integrators want, and how results become their outputs.
 
-use super::cache::{Answer, Part, equal};
+use super::cache::{IntervalResults, Part, equal};
 use super::function::{Call, Port, Signature};
 use super::second::Blocks;
-use super::signature::{self, Output, Run, Source};
+use super::signature::{self, Output, Source, StridedPlaces};
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, Hessian};
 use crate::shape::{Matrix, Shape};
@@ -31,7 +31,7 @@ fn read<'a>(inputs: impl Iterator<Item = (usize, &'a Port)>, call: &dyn Call, to
 
 /// What the wanted outputs are made of.
 #[derive(Clone, Copy)]
-pub struct Wanted {
+pub struct WantedDerivatives {
     pub value: bool,
     pub jacobian: bool,
     pub gradient: bool,
@@ -40,7 +40,7 @@ pub struct Wanted {
     pub algebraic: [bool; 2],
 }
 
-impl Wanted {
+impl WantedDerivatives {
     /// What a call wants.
     pub fn by(outputs: &[Output], call: &dyn Call) -> Self {
         let wants = |source| {
@@ -63,12 +63,12 @@ impl Wanted {
     }
 
     /// Whether nothing is wanted.
-    pub fn is_nothing(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         !(self.value || self.jacobian || self.gradient || self.hessian)
     }
 
     /// Whether all of it is known, for these multipliers.
-    pub fn is_in<T>(&self, answer: &Answer<T>, lambda: &[f64]) -> bool {
+    pub fn is_in<T>(&self, answer: &IntervalResults<T>, lambda: &[f64]) -> bool {
         let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
         (!self.value || answer.value.get().is_some())
             && (!self.jacobian || answer.jacobian.get().is_some())
@@ -81,16 +81,16 @@ impl Wanted {
 /// The numbers that outputs are made of: of each source as blocks that count as one behind the
 /// other. What is not there is empty.
 #[derive(Clone, Copy, Default)]
-pub struct Numbers<'a> {
+pub struct ResultBlocks<'a> {
     pub value: [&'a [f64]; 1],
     pub jacobian: [&'a [f64]; 3],
     pub gradient: [&'a [f64]; 3],
     pub hessian: [&'a [f64]; 6],
 }
 
-impl<'a> Numbers<'a> {
+impl<'a> ResultBlocks<'a> {
     /// Those of an answer.
-    pub fn of<T>(answer: &'a Answer<T>) -> Self {
+    pub fn of<T>(answer: &'a IntervalResults<T>) -> Self {
         let of = |part: &'a Part| part.get().map_or(&[][..], |values| values);
         Self {
             value: [of(&answer.value)],
@@ -121,13 +121,13 @@ impl<'a> Numbers<'a> {
 }
 
 /// The outputs that are wanted. Each has its numbers in one block.
-pub fn write(numbers: &Numbers<'_>, outputs: &[Output], call: &mut dyn Call) {
+pub fn write(numbers: &ResultBlocks<'_>, outputs: &[Output], call: &mut dyn Call) {
     for (index, Output { source, runs, .. }) in outputs.iter().enumerate() {
         let Some(run) = runs.first() else { continue };
         let Some(to) = call.output(index) else { continue };
         let (block, begin) = numbers.block(*source, run.first);
         let mut rest = to;
-        for &Run { first, stride, count } in runs {
+        for &StridedPlaces { first, stride, count } in runs {
             let (to, behind) = rest.split_at_mut(count.min(rest.len()));
             rest = behind;
             let range = first.wrapping_sub(begin)..=(first + stride * (count - 1)).wrapping_sub(begin);
@@ -145,7 +145,7 @@ pub fn write(numbers: &Numbers<'_>, outputs: &[Output], call: &mut dyn Call) {
 }
 
 /// Blocks, one behind the other.
-pub fn join(blocks: &[&[f64]], to: &mut [f64]) {
+pub fn concatenate(blocks: &[&[f64]], to: &mut [f64]) {
     let mut rest = to;
     for block in blocks {
         let (to, behind) = rest.split_at_mut(block.len());
@@ -155,19 +155,19 @@ pub fn join(blocks: &[&[f64]], to: &mut [f64]) {
 }
 
 /// The blocks of `∇(λᵀx)`.
-pub fn of_adjoint<M: Dae>(result: &Adjoint<M>) -> [&[f64]; 3] {
+pub fn adjoint_gradient_blocks<M: Dae>(result: &Adjoint<M>) -> [&[f64]; 3] {
     [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()]
 }
 
 /// The blocks of `∇(λᵀx)`.
-pub fn of_gradient<M: Dae>(result: &Hessian<M>) -> [&[f64]; 3] {
+pub fn hessian_gradient_blocks<M: Dae>(result: &Hessian<M>) -> [&[f64]; 3] {
     [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()]
 }
 
 /// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
 pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
     if count > 0 && count == rows {
-        join(&blocks, to);
+        concatenate(&blocks, to);
     } else if count > 0 {
         let columns = blocks.into_iter().flat_map(|block| block.chunks_exact(count));
         for (column, to) in columns.zip(to.chunks_exact_mut(rows)) {
@@ -178,11 +178,11 @@ pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &m
 
 /// The rows of the states in a matrix of `ny` rows.
 pub fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
-    rows(of_jacobian(result), M::Shape::NX, 0, ny, to);
+    rows(jacobian_blocks(result), M::Shape::NX, 0, ny, to);
 }
 
 /// The blocks of `∂x/∂(x₀, u, p)`.
-pub fn of_jacobian<M: Dae>(result: &Forward<M>) -> [&[f64]; 3] {
+pub fn jacobian_blocks<M: Dae>(result: &Forward<M>) -> [&[f64]; 3] {
     [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()]
 }
 

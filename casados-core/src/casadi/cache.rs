@@ -37,7 +37,7 @@ impl<V> Part<V> {
         self.valid = false;
     }
 
-    fn take(&mut self, other: &mut Self) {
+    fn swap_if_missing(&mut self, other: &mut Self) {
         if other.valid {
             core::mem::swap(self, other);
         }
@@ -55,7 +55,7 @@ impl Part {
 
 /// What is known about an interval of these inputs.
 #[derive(Clone, Debug, Default)]
-pub struct Answer<T> {
+pub struct IntervalResults<T> {
     /// `y`
     pub value: Part,
     /// `∂y/∂w`, column by column.
@@ -72,7 +72,7 @@ pub struct Answer<T> {
     pub algebraic: [bool; 2],
 }
 
-impl<T> Answer<T> {
+impl<T> IntervalResults<T> {
     /// Forgets everything.
     pub fn clear(&mut self) {
         for part in
@@ -85,31 +85,31 @@ impl<T> Answer<T> {
     }
 
     /// Takes values and stages that another one knows about the same inputs.
-    fn take_stages(&mut self, other: &mut Self) {
+    fn merge_stages(&mut self, other: &mut Self) {
         if other.value.valid {
             self.algebraic[0] = other.algebraic[0];
         }
-        self.value.take(&mut other.value);
-        self.tape.take(&mut other.tape);
+        self.value.swap_if_missing(&mut other.value);
+        self.tape.swap_if_missing(&mut other.tape);
     }
 
     /// Takes what another one knows about the same inputs.
-    fn take(&mut self, other: &mut Self) {
+    fn merge(&mut self, other: &mut Self) {
         for (part, is_new) in [other.value.valid, other.jacobian.valid].into_iter().enumerate() {
             if is_new {
                 self.algebraic[part] = other.algebraic[part];
             }
         }
-        self.value.take(&mut other.value);
-        self.jacobian.take(&mut other.jacobian);
+        self.value.swap_if_missing(&mut other.value);
+        self.jacobian.swap_if_missing(&mut other.jacobian);
         if other.lambda.valid {
-            self.lambda.take(&mut other.lambda);
+            self.lambda.swap_if_missing(&mut other.lambda);
             self.gradient.clear();
             self.hessian.clear();
-            self.gradient.take(&mut other.gradient);
-            self.hessian.take(&mut other.hessian);
+            self.gradient.swap_if_missing(&mut other.gradient);
+            self.hessian.swap_if_missing(&mut other.hessian);
         }
-        self.tape.take(&mut other.tape);
+        self.tape.swap_if_missing(&mut other.tape);
     }
 }
 
@@ -118,7 +118,7 @@ impl<T> Answer<T> {
 pub struct Cache<T> {
     entries: Vec<Entry<T>>,
     /// Where the entry of a key is.
-    places: HashMap<u64, usize, BuildHasherDefault<Hashed>>,
+    places: HashMap<u64, usize, BuildHasherDefault<PrecomputedHash>>,
     capacity: usize,
     /// The oldest entry, if there are as many as may be.
     oldest: usize,
@@ -130,13 +130,13 @@ pub struct Cache<T> {
 struct Entry<T> {
     key: u64,
     inputs: Vec<f64>,
-    answer: Answer<T>,
-    given: Given,
+    answer: IntervalResults<T>,
+    given: ComputedDerivatives,
 }
 
 /// Derivatives that were computed, whether they were kept or not.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Given {
+pub struct ComputedDerivatives {
     pub jacobian: bool,
     /// The key of the multipliers of those of second order.
     pub second: Option<u64>,
@@ -150,7 +150,7 @@ impl<T: Default> Cache<T> {
     }
 
     /// What is known about these inputs, whose [`key`] this is.
-    pub fn find(&self, key: u64, inputs: &[f64]) -> Option<&Answer<T>> {
+    pub fn find(&self, key: u64, inputs: &[f64]) -> Option<&IntervalResults<T>> {
         self.entry(key, inputs).map(|entry| &entry.answer)
     }
 
@@ -165,7 +165,7 @@ impl<T: Default> Cache<T> {
 
     /// Derivatives at these inputs are wanted that are not there, the Jacobian or those of second
     /// order for some multipliers: if they were computed before, derivatives are kept from now on.
-    pub fn missed(&mut self, key: u64, inputs: &[f64], jacobian: bool, lambda: Option<&[f64]>) {
+    pub fn record_miss(&mut self, key: u64, inputs: &[f64], jacobian: bool, lambda: Option<&[f64]>) {
         if self.derivatives {
             return;
         }
@@ -176,7 +176,13 @@ impl<T: Default> Cache<T> {
 
     /// Takes what is to be kept about these inputs, and leaves some other memory in its place. The
     /// oldest inputs are forgotten if there is no place. `given` is what was asked for.
-    pub fn store(&mut self, key: u64, inputs: &[f64], answer: &mut Answer<T>, given: Given) {
+    pub fn store(
+        &mut self,
+        key: u64,
+        inputs: &[f64],
+        answer: &mut IntervalResults<T>,
+        given: ComputedDerivatives,
+    ) {
         if self.capacity == 0 {
             return;
         }
@@ -184,7 +190,7 @@ impl<T: Default> Cache<T> {
         let (place, same) = match self.places.get(&key) {
             Some(&place) => (place, self.entry(key, inputs).is_some()),
             None if self.entries.len() < self.capacity => {
-                let (answer, given) = (Answer::default(), Given::default());
+                let (answer, given) = (IntervalResults::default(), ComputedDerivatives::default());
                 self.entries.push(Entry { key, inputs: inputs.to_vec(), answer, given });
                 (self.entries.len() - 1, true)
             }
@@ -201,14 +207,14 @@ impl<T: Default> Cache<T> {
             }
             entry.inputs.copy_from_slice(inputs);
             entry.answer.clear();
-            (entry.key, entry.given) = (key, Given::default());
+            (entry.key, entry.given) = (key, ComputedDerivatives::default());
         }
         if self.derivatives {
-            entry.answer.take(answer);
+            entry.answer.merge(answer);
         } else {
             entry.given.jacobian |= given.jacobian;
             entry.given.second = given.second.or(entry.given.second);
-            entry.answer.take_stages(answer);
+            entry.answer.merge_stages(answer);
         }
         self.places.insert(key, place);
     }
@@ -239,9 +245,9 @@ pub fn key(inputs: &[f64]) -> u64 {
 
 /// What has a hash already.
 #[derive(Debug, Default)]
-struct Hashed(u64);
+struct PrecomputedHash(u64);
 
-impl Hasher for Hashed {
+impl Hasher for PrecomputedHash {
     fn write(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.0 = self.0.rotate_left(8) ^ u64::from(*byte);

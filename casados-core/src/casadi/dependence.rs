@@ -8,7 +8,7 @@
 //! Appl. 15, 1994). A state depends on its derivative, within a step by the tableau and from step
 //! to step.
 
-use super::sparsity::Relation;
+use super::sparsity::Dependence;
 use crate::structure::Pattern;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -43,9 +43,9 @@ impl Dimensions {
 /// `depth` is the number of evaluations of the model that come one after the other in an explicit
 /// method, each of which leads one equation further. In an implicit one each depends on all, and
 /// what holds at a stage holds at the end.
-pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>) -> Relation {
+pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>) -> Dependence {
     let Dimensions { nx, nz, nw } = dimensions;
-    let mut relation = Relation::zero(nx + nz + nw, nw);
+    let mut relation = Dependence::zero(nx + nz + nw, nw);
     // States, controls and parameters are themselves.
     for direction in 0..nx {
         relation.set(nx + direction, direction);
@@ -53,7 +53,7 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
     for direction in nx..nw {
         relation.set(nx + nz + direction, direction);
     }
-    let equations = matching(dimensions, jacobian);
+    let equations = match_equations(dimensions, jacobian);
     let mut contains = vec![Vec::new(); nx + nz];
     for (equation, variable) in jacobian.iter() {
         if let Some(variables) = contains.get_mut(equation) {
@@ -66,7 +66,7 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
         for (unknown, equation) in equations.iter().enumerate() {
             let variable = dimensions.variable(unknown);
             for from in equation.and_then(|equation| contains.get(equation)).into_iter().flatten() {
-                news |= relation.join(variable, &before, *from);
+                news |= relation.add_row(variable, &before, *from);
             }
             if equation.is_none() {
                 (0..nw).for_each(|direction| relation.set(variable, direction));
@@ -74,7 +74,7 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
         }
         let after = relation.clone();
         for state in 0..nx {
-            news |= relation.join(nx + state, &after, state);
+            news |= relation.add_row(nx + state, &after, state);
         }
         if !news {
             break;
@@ -85,15 +85,15 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
 
 /// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are
 /// those of second derivatives by the variables.
-pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation) {
+pub fn curvature(variables: &Dependence, second: Pattern, hessian: &mut Dependence) {
     for (one, other) in second.iter() {
-        hessian.join_products(variables, one, other);
+        hessian.add_row_products(variables, one, other);
     }
 }
 
 /// An equation for each unknown `(ẋ, z)`, by augmenting paths; none if there is no perfect
 /// matching.
-fn matching(Dimensions { nx, nz, .. }: Dimensions, jacobian: Pattern) -> Vec<Option<usize>> {
+fn match_equations(Dimensions { nx, nz, .. }: Dimensions, jacobian: Pattern) -> Vec<Option<usize>> {
     let nk = nx + nz;
     let mut unknowns_of = vec![Vec::new(); nk];
     for (equation, variable) in jacobian.iter() {

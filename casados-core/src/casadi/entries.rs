@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 /// A number that is added to an entry: where it is among those of a stage, or its value.
 #[derive(Clone, Copy, Debug)]
-pub enum Slot {
+pub enum EntryTerm {
     /// A number of a block of an interval.
     Interval {
         /// The stage at its start.
@@ -31,24 +31,24 @@ pub enum Slot {
 pub type Blocks<'a> = [&'a [f64]; 5];
 
 /// A number that is added to an entry, with the row and the column of this.
-pub type Term = ([usize; 2], Slot);
+pub type Term = ([usize; 2], EntryTerm);
 
 /// A matrix as a sum: what is added to which entry. First come the numbers of all intervals, then
 /// those of nodes and constants.
 #[derive(Debug, Default)]
-pub struct Entries {
+pub struct MatrixSum {
     /// The entries.
     pub sparsity: Sparsity,
     /// Numbers of each interval.
-    intervals: Vec<Vec<Run>>,
+    intervals: Vec<Vec<StridedEntries>>,
     /// Numbers of the matrix at each node.
-    nodes: Vec<Vec<Run>>,
+    nodes: Vec<Vec<StridedEntries>>,
     constants: Vec<Constant>,
 }
 
 /// Entries one behind the other, whose numbers are at equal distances.
 #[derive(Debug)]
-struct Run {
+struct StridedEntries {
     /// The first entry.
     entry: u32,
     /// Where its number is.
@@ -69,9 +69,9 @@ struct Constant {
     adds: bool,
 }
 
-impl Run {
+impl StridedEntries {
     /// Takes the next entry, if it is where the run goes on.
-    fn take(&mut self, next: &Self) -> bool {
+    fn try_append(&mut self, next: &Self) -> bool {
         let Some(stride) = next.place.checked_sub(self.place + self.stride * (self.count - 1)) else {
             return false;
         };
@@ -101,13 +101,13 @@ impl Run {
     }
 }
 
-impl Entries {
+impl MatrixSum {
     /// The matrix of these terms.
     pub fn new(rows: usize, columns: usize, mut terms: Vec<Term>) -> Self {
         let rank = |slot| match slot {
-            Slot::Interval { .. } => 0,
-            Slot::Node { .. } => 1,
-            Slot::Constant(_) => 2,
+            EntryTerm::Interval { .. } => 0,
+            EntryTerm::Node { .. } => 1,
+            EntryTerm::Constant(_) => 2,
         };
         // Those of stages stay in order.
         terms.sort_by_key(|&([row, column], slot)| (column, row, rank(slot)));
@@ -120,9 +120,9 @@ impl Entries {
             }
             let entry = entries.len() as u32 - 1;
             let (list, stage, [block, index]) = match slot {
-                Slot::Interval { stage, block, index } => (&mut matrix.intervals, stage, [block, index]),
-                Slot::Node { stage, index } => (&mut matrix.nodes, stage, [0, index]),
-                Slot::Constant(value) => {
+                EntryTerm::Interval { stage, block, index } => (&mut matrix.intervals, stage, [block, index]),
+                EntryTerm::Node { stage, index } => (&mut matrix.nodes, stage, [0, index]),
+                EntryTerm::Constant(value) => {
                     matrix.constants.push(Constant { entry, value, adds });
                     continue;
                 }
@@ -130,8 +130,9 @@ impl Entries {
             if list.len() <= stage {
                 list.resize_with(stage + 1, Vec::new);
             }
-            let run = Run { entry, block: block as u32, place: index as u32, stride: 1, count: 1, adds };
-            if !list[stage].last_mut().is_some_and(|last| last.take(&run)) {
+            let run =
+                StridedEntries { entry, block: block as u32, place: index as u32, stride: 1, count: 1, adds };
+            if !list[stage].last_mut().is_some_and(|last| last.try_append(&run)) {
                 list[stage].push(run);
             }
         }
@@ -159,8 +160,8 @@ impl Entries {
     }
 
     /// Makes the numbers of the matrix at a node zero.
-    pub fn clear_node(&self, stage: usize, matrix: &mut [f64]) {
-        for &Run { place, stride, count, .. } in self.nodes.get(stage).into_iter().flatten() {
+    pub fn zero_node_terms(&self, stage: usize, matrix: &mut [f64]) {
+        for &StridedEntries { place, stride, count, .. } in self.nodes.get(stage).into_iter().flatten() {
             let places = matrix[place as usize..].iter_mut().step_by(stride as usize);
             places.take(count as usize).for_each(|number| *number = 0.0);
         }

@@ -7,7 +7,7 @@
 #![allow(unsafe_code)]
 
 use super::function::{Call, Port, Signature};
-use super::library::{Client, Library};
+use super::library::{FunctionLibrary, Library};
 use alloc::sync::Arc;
 use core::ffi::{c_char, c_int, c_longlong};
 use core::panic::AssertUnwindSafe;
@@ -77,7 +77,7 @@ impl Call for Pointers<'_> {
 ///
 /// # Safety
 /// The pointers are those of a call by CasADi to this function: see the head of this file.
-pub unsafe fn evaluate<C: Client>(
+pub unsafe fn evaluate<C: FunctionLibrary>(
     library: &Library<C>,
     function: usize,
     arguments: *const *const f64,
@@ -101,12 +101,12 @@ pub unsafe fn evaluate<C: Client>(
 }
 
 /// `F_n_in`, `F_n_out`
-pub fn count<C: Client>(library: &Library<C>, function: usize, side: Side) -> c_longlong {
+pub fn count<C: FunctionLibrary>(library: &Library<C>, function: usize, side: Side) -> c_longlong {
     with(library, function, side, |ports| ports.len() as c_longlong).unwrap_or(0)
 }
 
 /// `F_name_in`, `F_name_out`: null if there is no such port.
-pub fn name<C: Client>(
+pub fn name<C: FunctionLibrary>(
     library: &Library<C>,
     function: usize,
     side: Side,
@@ -118,7 +118,7 @@ pub fn name<C: Client>(
 
 /// `F_sparsity_in`, `F_sparsity_out`: null if there is no such port. The pointer is one to memory
 /// of the client, which lives until the last reference to the functions is gone.
-pub fn sparsity<C: Client>(
+pub fn sparsity<C: FunctionLibrary>(
     library: &Library<C>,
     function: usize,
     side: Side,
@@ -133,7 +133,11 @@ pub fn sparsity<C: Client>(
 ///
 /// # Safety
 /// The pointers are null or to one number each, which nobody else reads or writes during the call.
-pub unsafe fn work<C: Client>(library: &Library<C>, function: usize, sizes: [*mut c_longlong; 4]) -> c_int {
+pub unsafe fn work<C: FunctionLibrary>(
+    library: &Library<C>,
+    function: usize,
+    sizes: [*mut c_longlong; 4],
+) -> c_int {
     let counts = [count(library, function, Side::Input), count(library, function, Side::Output), 0, 0];
     for (to, size) in sizes.into_iter().zip(counts) {
         // SAFETY: what is not null is a pointer to one number that is ours during the call.
@@ -145,28 +149,28 @@ pub unsafe fn work<C: Client>(library: &Library<C>, function: usize, sizes: [*mu
 }
 
 /// `F_checkout`: a memory, or −1.
-pub fn check_out<C: Client>(library: &Library<C>) -> c_int {
+pub fn check_out<C: FunctionLibrary>(library: &Library<C>) -> c_int {
     catch_unwind(AssertUnwindSafe(|| library.check_out())).ok().flatten().unwrap_or(-1)
 }
 
 /// `F_release`
-pub fn release<C: Client>(library: &Library<C>, memory: c_int) {
+pub fn release<C: FunctionLibrary>(library: &Library<C>, memory: c_int) {
     let _ = catch_unwind(AssertUnwindSafe(|| library.release(memory)));
 }
 
 /// `F_incref`
-pub fn refer<C: Client>(library: &Library<C>) {
+pub fn refer<C: FunctionLibrary>(library: &Library<C>) {
     let _ = catch_unwind(AssertUnwindSafe(|| library.refer()));
 }
 
 /// `F_decref`
-pub fn forget<C: Client>(library: &Library<C>) {
+pub fn forget<C: FunctionLibrary>(library: &Library<C>) {
     let _ = catch_unwind(AssertUnwindSafe(|| library.forget()));
 }
 
 /// How many intervals were integrated since somebody referred to the functions first; those of no
 /// length too, where algebraic states are found.
-pub fn integrations<C: Client>(library: &Library<C>) -> c_longlong {
+pub fn integrations<C: FunctionLibrary>(library: &Library<C>) -> c_longlong {
     catch_unwind(AssertUnwindSafe(|| {
         library.client().map_or(0, |client| client.integrations() as c_longlong)
     }))
@@ -178,7 +182,7 @@ fn port(ports: &[Port], index: c_longlong) -> Option<&Port> {
 }
 
 /// What a function has to say about its ports; none after a panic.
-fn with<C: Client, R>(
+fn with<C: FunctionLibrary, R>(
     library: &Library<C>,
     function: usize,
     side: Side,

@@ -19,7 +19,7 @@ pub struct Group {
 
 impl Group {
     /// Where they are among the variables of a stage.
-    pub fn places(&self, dims: &StageDims) -> Range<usize> {
+    pub fn variable_range(&self, dims: &StageDims) -> Range<usize> {
         let (first, count) = if self.controls { (dims.nx, dims.nu) } else { (0, dims.nx) };
         first + self.rows.start.min(count)..first + self.rows.end.min(count)
     }

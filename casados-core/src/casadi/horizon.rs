@@ -2,15 +2,16 @@
 //! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{
-    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, read_inputs, read_multipliers, second, write,
+    ResultBlocks, WantedDerivatives, adjoint_gradient_blocks, concatenate, hessian_gradient_blocks, jacobian,
+    read_inputs, read_multipliers, second, write,
 };
-use super::cache::{Answer, Cache, Given, key};
+use super::cache::{Cache, ComputedDerivatives, IntervalResults, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integrators::Settings;
-use super::library::{Client, Failure};
+use super::library::{CallFailure, FunctionLibrary};
 use super::signature::{self, Output};
-use super::sparsity::Relation;
+use super::sparsity::Dependence;
 use crate::batch::{self, Intervals, Standard, vector};
 use crate::error::Error;
 use crate::model::{Dae, VectorP, VectorU, VectorX};
@@ -44,9 +45,9 @@ pub trait Horizon: Sized + Send + 'static {
         &mut self,
         intervals: &Intervals<'_, Self::Model>,
         lambda: &[VectorX<Self::Model, f64>],
-        wanted: Wanted,
-        answer: &mut Answer<()>,
-    ) -> Result<(), Failure>;
+        wanted: WantedDerivatives,
+        answer: &mut IntervalResults<()>,
+    ) -> Result<(), CallFailure>;
 }
 
 impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::Integrator<I> {
@@ -60,11 +61,11 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
         &mut self,
         intervals: &Intervals<'_, M>,
         lambda: &[VectorX<M, f64>],
-        wanted: Wanted,
-        answer: &mut Answer<()>,
-    ) -> Result<(), Failure> {
+        wanted: WantedDerivatives,
+        answer: &mut IntervalResults<()>,
+    ) -> Result<(), CallFailure> {
         let (nx, nw, count) = (M::Shape::NX, M::Shape::NW, intervals.x0.len());
-        let failed = |error: batch::BatchError| Failure(error.to_string());
+        let failed = |error: batch::BatchError| CallFailure(error.to_string());
         let values = answer.value.set(count * nx).chunks_exact_mut(nx.max(1));
         if wanted.hessian {
             let mut results = vec![Hessian::default(); count];
@@ -77,8 +78,8 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
             for (result, ((value, slope), (first, second))) in results.iter().zip(places) {
                 value.copy_from_slice(result.x.as_slice());
                 jacobian(result, nx, slope);
-                join(&of_gradient(result), first);
-                join(&result.second(), second);
+                concatenate(&hessian_gradient_blocks(result), first);
+                concatenate(&result.second_derivative_blocks(), second);
             }
         } else if wanted.gradient {
             let mut results = vec![Adjoint::default(); count];
@@ -86,7 +87,7 @@ impl<M: Dae, I: Standard<Model = M, Number = f64> + 'static> Horizon for batch::
             let gradients = answer.gradient.set(count * nw).chunks_exact_mut(nw.max(1));
             for (result, (value, first)) in results.iter().zip(values.zip(gradients)) {
                 value.copy_from_slice(result.x.as_slice());
-                join(&of_adjoint(result), first);
+                concatenate(&adjoint_gradient_blocks(result), first);
             }
         } else if wanted.jacobian {
             let mut results = vec![Forward::default(); count];
@@ -125,7 +126,7 @@ pub struct Worker<B: Horizon> {
     /// `x₀` of all intervals, then `u`, then `p`; and the multipliers `λ`.
     inputs: Vec<f64>,
     lambda: Vec<f64>,
-    answer: Answer<()>,
+    answer: IntervalResults<()>,
 }
 
 impl<B: Horizon> Horizons<B> {
@@ -137,7 +138,7 @@ impl<B: Horizon> Horizons<B> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], in words
-    pub fn new(settings: Settings<Options>, count: usize) -> Result<Self, Failure> {
+    pub fn new(settings: Settings<Options>, count: usize) -> Result<Self, CallFailure> {
         let (nx, nu, nw) = (Self::NX, Self::NU, Self::NW);
         // Patterns of four functions have about so many indices, not asked for one by one.
         let bytes =
@@ -147,9 +148,9 @@ impl<B: Horizon> Horizons<B> {
         }
         let variables =
             dependence::variables(Dimensions::of::<B::Model>(), B::Model::STRUCTURE.jacobian, None);
-        let (mut value, mut hessian) = (Relation::zero(nx, nw), Relation::zero(nw, nw));
+        let (mut value, mut hessian) = (Dependence::zero(nx, nw), Dependence::zero(nw, nw));
         for state in 0..nx {
-            value.join(state, &variables, nx + state);
+            value.add_row(state, &variables, nx + state);
         }
         dependence::curvature(&variables, B::Model::STRUCTURE.hessian, &mut hessian);
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
@@ -161,7 +162,7 @@ impl<B: Horizon> Horizons<B> {
         Ok(Self { settings, count, signatures, outputs, cache, integrations, batch: PhantomData })
     }
 
-    fn compute(&self, worker: &mut Worker<B>, wanted: Wanted) -> Result<(), Failure> {
+    fn compute(&self, worker: &mut Worker<B>, wanted: WantedDerivatives) -> Result<(), CallFailure> {
         let Worker { batch, inputs, lambda, answer } = worker;
         let (nx, nu, nw) = (Self::NX, Self::NU, Self::NW);
         let (x, rest) = inputs.split_at(self.count * nx);
@@ -182,30 +183,35 @@ impl<B: Horizon> Horizons<B> {
     }
 }
 
-impl<B: Horizon> Client for Horizons<B> {
+impl<B: Horizon> FunctionLibrary for Horizons<B> {
     type Worker = Worker<B>;
 
     fn signatures(&self) -> &[Signature] {
         &self.signatures
     }
 
-    fn worker(&self) -> Result<Worker<B>, Failure> {
+    fn worker(&self) -> Result<Worker<B>, CallFailure> {
         self.settings.check()?;
         Ok(Worker {
             batch: B::build(&self.settings.options)?,
             inputs: vec![0.0; self.count * Self::NW],
             lambda: vec![0.0; self.count * Self::NX],
-            answer: Answer::default(),
+            answer: IntervalResults::default(),
         })
     }
 
-    fn evaluate(&self, worker: &mut Worker<B>, function: usize, call: &mut dyn Call) -> Result<(), Failure> {
+    fn evaluate(
+        &self,
+        worker: &mut Worker<B>,
+        function: usize,
+        call: &mut dyn Call,
+    ) -> Result<(), CallFailure> {
         let (Some(signature), Some(outputs)) = (self.signatures.get(function), self.outputs.get(function))
         else {
-            return Err(Failure("there is no such function".into()));
+            return Err(CallFailure("there is no such function".into()));
         };
-        let wanted = Wanted::by(outputs, call);
-        if wanted.is_nothing() {
+        let wanted = WantedDerivatives::by(outputs, call);
+        if wanted.is_empty() {
             return Ok(());
         }
         read_inputs(signature, call, &mut worker.inputs);
@@ -216,15 +222,15 @@ impl<B: Horizon> Client for Horizons<B> {
             if let Some(answer) =
                 cache.find(key, &worker.inputs).filter(|answer| wanted.is_in(answer, &worker.lambda))
             {
-                write(&Numbers::of(answer), outputs, call);
+                write(&ResultBlocks::of(answer), outputs, call);
                 return Ok(());
             }
         }
         worker.answer.clear();
         self.compute(worker, wanted)?;
-        write(&Numbers::of(&worker.answer), outputs, call);
+        write(&ResultBlocks::of(&worker.answer), outputs, call);
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.store(key, &worker.inputs, &mut worker.answer, Given::default());
+        cache.store(key, &worker.inputs, &mut worker.answer, ComputedDerivatives::default());
         Ok(())
     }
 

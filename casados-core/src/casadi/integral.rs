@@ -1,7 +1,7 @@
 //! Integrals along the solution as a further output.
 
 use super::dependence;
-use super::sparsity::Relation;
+use super::sparsity::Dependence;
 use crate::error::Error;
 use crate::function::Function;
 use crate::model::Dae;
@@ -31,7 +31,7 @@ pub trait Integral<M: Dae>: 'static {
     fn jacobian(memory: &Self::Memory) -> [&[f64]; 3];
     /// On which directions the outputs depend (in rows from `first` on), and where the Hessian of
     /// them has entries, if these are the variables at the stages.
-    fn depend(variables: &Relation, first: usize, value: &mut Relation, hessian: &mut Relation);
+    fn depend(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence);
 }
 
 /// No integrals.
@@ -55,7 +55,7 @@ impl<M: Dae> Integral<M> for Nothing {
     fn jacobian((): &()) -> [&[f64]; 3] {
         [&[]; 3]
     }
-    fn depend(_: &Relation, _: usize, _: &mut Relation, _: &mut Relation) {}
+    fn depend(_: &Dependence, _: usize, _: &mut Dependence, _: &mut Dependence) {}
 }
 
 /// The integrals of all outputs of a function `F`.
@@ -83,9 +83,9 @@ where
     fn jacobian(memory: &Self::Memory) -> [&[f64]; 3] {
         [memory.dq_dx0.as_slice(), memory.dq_du.as_slice(), memory.dq_dp.as_slice()]
     }
-    fn depend(variables: &Relation, first: usize, value: &mut Relation, hessian: &mut Relation) {
+    fn depend(variables: &Dependence, first: usize, value: &mut Dependence, hessian: &mut Dependence) {
         for (output, variable) in F::STRUCTURE.jacobian.iter() {
-            value.join(first + output, variables, variable);
+            value.add_row(first + output, variables, variable);
         }
         dependence::curvature(variables, F::STRUCTURE.hessian, hessian);
     }

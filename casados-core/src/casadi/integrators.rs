@@ -3,19 +3,19 @@
 //! With `w = (x₀, u, p)` and the outputs `y = (x, z, q)` they are `y`, `∂y/∂w`, `∇(λᵀy)`, and the
 //! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
 
-use super::algebraic::{self, Sizes};
+use super::algebraic::{self, OutputDimensions};
 use super::blocks::{
-    Numbers, Wanted, jacobian, join, of_adjoint, of_gradient, of_jacobian, read_inputs, read_multipliers,
-    rows, second, write,
+    ResultBlocks, WantedDerivatives, adjoint_gradient_blocks, concatenate, hessian_gradient_blocks, jacobian,
+    jacobian_blocks, read_inputs, read_multipliers, rows, second, write,
 };
-use super::cache::{self, Answer, Cache, Given, Part, key};
+use super::cache::{self, Cache, ComputedDerivatives, IntervalResults, Part, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
-use super::interval::{Consistent, Interval, Point};
-use super::library::{Client, Failure};
+use super::interval::{Consistent, Interval, IntervalStart};
+use super::library::{CallFailure, FunctionLibrary};
 use super::signature::{self, Output};
-use super::sparsity::Relation;
+use super::sparsity::Dependence;
 use crate::batch::vector;
 use crate::model::{Dae, VectorX};
 use crate::quadrature::OptionalIntegrand;
@@ -54,8 +54,8 @@ impl<O: Default> Settings<O> {
     }
 
     /// Whether the interval has a length: one without ends where it begins, whatever the model is.
-    pub(super) fn check(&self) -> Result<(), Failure> {
-        if self.interval == 0.0 { Err(Failure("`interval` has no length".into())) } else { Ok(()) }
+    pub(super) fn check(&self) -> Result<(), CallFailure> {
+        if self.interval == 0.0 { Err(CallFailure("`interval` has no length".into())) } else { Ok(()) }
     }
 }
 
@@ -77,7 +77,7 @@ pub struct Worker<I: Interval, Q: Integral<I::Model>> {
     /// `(x₀, u, p)` and the multipliers `λ`.
     inputs: Vec<f64>,
     lambda: Vec<f64>,
-    answer: Answer<I::Tape>,
+    answer: IntervalResults<I::Tape>,
     /// Whether the cache keeps derivatives.
     keeps: bool,
     /// Algebraic states at the end.
@@ -91,26 +91,26 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     const NZ: usize = <<I::Model as Dae>::Shape as Shape>::NZ;
 
     /// Dimensions, with the algebraic states that are outputs.
-    const fn sizes(settings: &Settings<I::Options>) -> Sizes {
+    const fn sizes(settings: &Settings<I::Options>) -> OutputDimensions {
         let nz = if settings.algebraic { Self::NZ } else { 0 };
-        Sizes { nx: Self::NX, nz, nw: Self::NW, ny: Self::NX + nz + Q::COUNT }
+        OutputDimensions { nx: Self::NX, nz, nw: Self::NW, ny: Self::NX + nz + Q::COUNT }
     }
 
     /// The functions with these settings.
     #[must_use]
     pub fn new(settings: Settings<I::Options>) -> Self {
-        let (Sizes { nx, nz, nw, ny }, nu) = (Self::sizes(&settings), Self::NU);
+        let (OutputDimensions { nx, nz, nw, ny }, nu) = (Self::sizes(&settings), Self::NU);
         let at =
             |depth| dependence::variables(Dimensions::of::<I::Model>(), I::Model::STRUCTURE.jacobian, depth);
         // The last evaluation of an explicit method is at a point that does not depend on it.
         let depth = I::depth(&settings.options);
         let (end, stages) = (at(depth), at(depth.map(|depth| depth.saturating_sub(1))));
-        let (mut value, mut hessian) = (Relation::zero(ny, nw), Relation::zero(nw, nw));
+        let (mut value, mut hessian) = (Dependence::zero(ny, nw), Dependence::zero(nw, nw));
         for state in 0..nx {
-            value.join(state, &end, nx + state);
+            value.add_row(state, &end, nx + state);
         }
         for output in 0..nz {
-            value.join(nx + output, &end, 2 * nx + output);
+            value.add_row(nx + output, &end, 2 * nx + output);
         }
         dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian);
         Q::depend(&stages, nx + nz, &mut value, &mut hessian);
@@ -124,11 +124,11 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     }
 
     /// Takes what is known from the cache: whether that is enough.
-    fn known(
+    fn load_cached(
         &self,
         worker: &mut Worker<I, Q>,
         key: u64,
-        wanted: &Wanted,
+        wanted: &WantedDerivatives,
         outputs: &[Output],
         call: &mut dyn Call,
     ) -> bool {
@@ -137,20 +137,25 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         worker.keeps = cache.keeps_derivatives();
         let Some(answer) = cache.find(key, &worker.inputs) else { return false };
         if wanted.is_in(answer, &worker.lambda) {
-            write(&Numbers::of(answer), outputs, call);
+            write(&ResultBlocks::of(answer), outputs, call);
             return true;
         }
         if let Some(tape) = answer.tape.get() {
             worker.answer.tape.open().clone_from(tape);
         }
         let lambda = (wanted.gradient || wanted.hessian).then_some(&worker.lambda[..]);
-        cache.missed(key, &worker.inputs, wanted.jacobian, lambda);
+        cache.record_miss(key, &worker.inputs, wanted.jacobian, lambda);
         worker.keeps = cache.keeps_derivatives();
         false
     }
 
     /// Parameters, and stages that are known; without any the next call is one more integration.
-    fn begin(&self, integrator: &mut I, p: &[f64], tape: Option<&I::Tape>) -> Result<(), Failure> {
+    fn prepare_integrator(
+        &self,
+        integrator: &mut I,
+        p: &[f64],
+        tape: Option<&I::Tape>,
+    ) -> Result<(), CallFailure> {
         if !p.is_empty() {
             integrator.set_parameters(&vector(p))?;
         }
@@ -167,16 +172,16 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     fn compute(
         &self,
         worker: &mut Worker<I, Q>,
-        wanted: &Wanted,
+        wanted: &WantedDerivatives,
         outputs: &[Output],
         call: &mut dyn Call,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CallFailure> {
         let Worker { integrator, integrals, inputs, lambda, answer, keeps, zeta } = worker;
-        let sizes @ Sizes { nx, nz, ny, .. } = Self::sizes(&self.settings);
+        let sizes @ OutputDimensions { nx, nz, ny, .. } = Self::sizes(&self.settings);
         let (x0, rest) = inputs.split_at(nx);
         let (u, p) = rest.split_at(Self::NU);
-        let point = Point { x0: vector(x0), u: vector(u), h: self.settings.interval };
-        self.begin(integrator, p, answer.tape.get())?;
+        let point = IntervalStart { x0: vector(x0), u: vector(u), h: self.settings.interval };
+        self.prepare_integrator(integrator, p, answer.tape.get())?;
         let (of_states, rest) = lambda.split_at(nx);
         let (nu, of_integrals) = rest.split_at(nz);
         let mut seed: VectorX<I::Model, f64> = vector(of_states);
@@ -185,8 +190,13 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         if algebraic && adjoint {
             // What the state is multiplied by depends on where it ends.
             let end = integrator.solve(&point.x0, &point.u, point.h)?.x;
-            keep(integrator, &mut answer.tape)?;
-            self.consistent(integrator, Point { x0: end, u: vector(u), h: 0.0 }, nu, zeta)?;
+            record_tape(integrator, &mut answer.tape)?;
+            self.algebraic_states_at_end(
+                integrator,
+                IntervalStart { x0: end, u: vector(u), h: 0.0 },
+                nu,
+                zeta,
+            )?;
             algebraic::add_to_seed(sizes, zeta, nu, seed.as_mut_slice());
             if let Some(tape) = answer.tape.get() {
                 integrator.restore(tape)?;
@@ -194,7 +204,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         }
         // With algebraic states and integrals outputs have more than the integrator's own results.
         let whole = !algebraic && Q::COUNT == 0;
-        let asked = Asked {
+        let asked = IntervalRequest {
             point: &point,
             seed: &seed,
             wanted: *wanted,
@@ -204,7 +214,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             outputs: if whole { outputs } else { &[] },
         };
         asked.of(integrator, Q::along(integrals, of_integrals), answer, call)?;
-        keep(integrator, &mut answer.tape)?;
+        record_tape(integrator, &mut answer.tape)?;
         if adjoint {
             answer.lambda.set(ny).copy_from_slice(lambda);
         }
@@ -219,8 +229,8 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         }
         if algebraic {
             if !adjoint {
-                let end = Point { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };
-                self.consistent(integrator, end, &[], zeta)?;
+                let end = IntervalStart { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };
+                self.algebraic_states_at_end(integrator, end, &[], zeta)?;
             }
             values[nx..nx + nz].copy_from_slice(&zeta.z);
             if answer.jacobian.get().is_some() {
@@ -234,18 +244,18 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
                 algebraic::add_to_hessian(sizes, second::<I::Model>(), zeta, jacobian, answer.hessian.open());
             }
         }
-        write(&Numbers::of(answer), outputs, call);
+        write(&ResultBlocks::of(answer), outputs, call);
         Ok(())
     }
 
     /// Algebraic states at the end of the interval.
-    fn consistent(
+    fn algebraic_states_at_end(
         &self,
         integrator: &mut I,
-        at: Point<I::Model>,
+        at: IntervalStart<I::Model>,
         nu: &[f64],
         zeta: &mut Consistent,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CallFailure> {
         self.integrations.fetch_add(1, Ordering::Relaxed);
         integrator.set_time(self.settings.time + self.settings.interval)?;
         let outcome = integrator.consistent(&at, nu, zeta);
@@ -255,56 +265,57 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
 }
 
 /// What an integrator is asked.
-struct Asked<'a, M: Dae> {
-    point: &'a Point<M>,
+struct IntervalRequest<'a, M: Dae> {
+    point: &'a IntervalStart<M>,
     seed: &'a VectorX<M, f64>,
-    wanted: Wanted,
+    wanted: WantedDerivatives,
     /// Whether derivatives are to be in the answer.
     copies: bool,
     /// Whether the Jacobian is, too, where it is computed for the Hessian.
     keeps: bool,
-    sizes: Sizes,
+    sizes: OutputDimensions,
     /// The outputs that the results are written to.
     outputs: &'a [Output],
 }
 
-impl<M: Dae> Asked<'_, M> {
+impl<M: Dae> IntervalRequest<'_, M> {
     /// Writes outputs, and the answer: values, and derivatives if they are to be there.
     fn of<I: Interval<Model = M>>(
         &self,
         integrator: &mut I,
         along: OptionalIntegrand<'_, '_, M, f64>,
-        answer: &mut Answer<I::Tape>,
+        answer: &mut IntervalResults<I::Tape>,
         call: &mut dyn Call,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CallFailure> {
         let Self { point, seed, wanted, copies, keeps, sizes, outputs } = *self;
-        let (Point { x0, u, h }, Sizes { nx, nw, ny, .. }) = (point, sizes);
-        let mut numbers = Numbers::default();
+        let (IntervalStart { x0, u, h }, OutputDimensions { nx, nw, ny, .. }) = (point, sizes);
+        let mut numbers = ResultBlocks::default();
         if wanted.hessian {
-            let result = integrator.hessian_along(x0, u, *h, seed, along)?;
+            let result = integrator.hessian_with_quadrature(x0, u, *h, seed, along)?;
             if keeps || copies && wanted.jacobian {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
             if copies {
-                join(&of_gradient(result), answer.gradient.set(nw));
-                join(&result.second(), answer.hessian.set(second::<M>().len()));
+                concatenate(&hessian_gradient_blocks(result), answer.gradient.set(nw));
+                concatenate(&result.second_derivative_blocks(), answer.hessian.set(second::<M>().len()));
             }
-            (numbers.gradient, numbers.hessian) = (of_gradient(result), result.second());
-            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
+            (numbers.gradient, numbers.hessian) =
+                (hessian_gradient_blocks(result), result.second_derivative_blocks());
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], jacobian_blocks(result));
         } else if wanted.gradient {
-            let result = integrator.adjoint_along(x0, u, *h, seed, along)?;
+            let result = integrator.adjoint_with_quadrature(x0, u, *h, seed, along)?;
             if copies {
-                join(&of_adjoint(result), answer.gradient.set(nw));
+                concatenate(&adjoint_gradient_blocks(result), answer.gradient.set(nw));
             }
-            (numbers.value, numbers.gradient) = ([result.x.as_slice()], of_adjoint(result));
+            (numbers.value, numbers.gradient) = ([result.x.as_slice()], adjoint_gradient_blocks(result));
         } else if wanted.jacobian {
-            let result = integrator.forward_along(x0, u, *h, along)?;
+            let result = integrator.forward_with_quadrature(x0, u, *h, along)?;
             if copies {
                 jacobian(result, ny, answer.jacobian.set(ny * nw));
             }
-            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], of_jacobian(result));
+            (numbers.value, numbers.jacobian) = ([result.x.as_slice()], jacobian_blocks(result));
         } else {
-            numbers.value = [integrator.solve_along(x0, u, *h, along)?.x.as_slice()];
+            numbers.value = [integrator.solve_with_quadrature(x0, u, *h, along)?.x.as_slice()];
         }
         answer.value.set(ny)[..nx].copy_from_slice(numbers.value[0]);
         write(&numbers, outputs, call);
@@ -313,31 +324,31 @@ impl<M: Dae> Asked<'_, M> {
 }
 
 /// Keeps the stages of the last call, if nobody has.
-fn keep<I: Interval>(integrator: &mut I, tape: &mut Part<I::Tape>) -> Result<(), Failure> {
+fn record_tape<I: Interval>(integrator: &mut I, tape: &mut Part<I::Tape>) -> Result<(), CallFailure> {
     if tape.get().is_none() && !integrator.record(tape.open())? {
         tape.clear();
     }
     Ok(())
 }
 
-impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
+impl<I: Interval, Q: Integral<I::Model>> FunctionLibrary for Integrators<I, Q> {
     type Worker = Worker<I, Q>;
 
     fn signatures(&self) -> &[Signature] {
         &self.signatures
     }
 
-    fn worker(&self) -> Result<Self::Worker, Failure> {
+    fn worker(&self) -> Result<Self::Worker, CallFailure> {
         self.settings.check()?;
-        if self.settings.algebraic && Self::NZ > 0 && !I::CONSISTENT {
-            return Err(Failure("`algebraic` is for implicit methods with steps of equal size".into()));
+        if self.settings.algebraic && Self::NZ > 0 && !I::FINDS_ALGEBRAIC_STATES {
+            return Err(CallFailure("`algebraic` is for implicit methods with steps of equal size".into()));
         }
         let mut integrator = I::build(&self.settings.options)?;
         integrator.set_time(self.settings.time)?;
         if I::CHOOSES {
             let at = self.settings.steps_at;
             if at.len() != Self::NW {
-                return Err(Failure(alloc::format!(
+                return Err(CallFailure(alloc::format!(
                     "`steps_at` has {} numbers: (x0, u, p) where an adaptive integrator chooses its steps are {}",
                     at.len(),
                     Self::NW
@@ -348,14 +359,14 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             if !p.is_empty() {
                 integrator.set_parameters(&vector(p))?;
             }
-            integrator.choose(&Point { x0: vector(x0), u: vector(u), h: self.settings.interval })?;
+            integrator.choose(&IntervalStart { x0: vector(x0), u: vector(u), h: self.settings.interval })?;
         }
         Ok(Worker {
             integrator,
             integrals: Q::memory()?,
             inputs: vec![0.0; Self::NW],
             lambda: vec![0.0; Self::sizes(&self.settings).ny],
-            answer: Answer::default(),
+            answer: IntervalResults::default(),
             keeps: false,
             zeta: Consistent::default(),
         })
@@ -366,25 +377,28 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
         worker: &mut Self::Worker,
         function: usize,
         call: &mut dyn Call,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CallFailure> {
         let (Some(signature), Some(outputs)) = (self.signatures.get(function), self.outputs.get(function))
         else {
-            return Err(Failure("there is no such function".into()));
+            return Err(CallFailure("there is no such function".into()));
         };
-        let wanted = Wanted::by(outputs, call);
-        if wanted.is_nothing() {
+        let wanted = WantedDerivatives::by(outputs, call);
+        if wanted.is_empty() {
             return Ok(());
         }
         read_inputs(signature, call, &mut worker.inputs);
         read_multipliers(signature, call, &mut worker.lambda);
         let key = key(&worker.inputs);
-        if self.known(worker, key, &wanted, outputs, call) {
+        if self.load_cached(worker, key, &wanted, outputs, call) {
             return Ok(());
         }
         // Stages that were not taken by a call that was refused are not those of the next one.
         self.compute(worker, &wanted, outputs, call).inspect_err(|_| worker.integrator.forget())?;
         let adjoint = wanted.gradient || wanted.hessian;
-        let given = Given { jacobian: wanted.jacobian, second: adjoint.then(|| cache::key(&worker.lambda)) };
+        let given = ComputedDerivatives {
+            jacobian: wanted.jacobian,
+            second: adjoint.then(|| cache::key(&worker.lambda)),
+        };
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         cache.store(key, &worker.inputs, &mut worker.answer, given);
         Ok(())

@@ -36,18 +36,23 @@ pub trait Interval: Integrator<Number = f64, Memory = Heap> + Sized + Send + 'st
     ///
     /// # Errors
     /// Those of the integrator.
-    fn choose(&mut self, at: &Point<Self::Model>) -> Result<(), Error> {
+    fn choose(&mut self, at: &IntervalStart<Self::Model>) -> Result<(), Error> {
         let _ = at;
         Ok(())
     }
     /// Whether it finds algebraic states that are consistent with a state.
-    const CONSISTENT: bool = false;
+    const FINDS_ALGEBRAIC_STATES: bool = false;
     /// Algebraic states `ζ(x, u, p)` that are consistent with a state, and derivatives: of first
     /// order, and of second order of `νᵀζ` if `nu` is not empty.
     ///
     /// # Errors
     /// Those of the integrator.
-    fn consistent(&mut self, at: &Point<Self::Model>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
+    fn consistent(
+        &mut self,
+        at: &IntervalStart<Self::Model>,
+        nu: &[f64],
+        to: &mut Consistent,
+    ) -> Result<(), Error> {
         let _ = (at, nu, to);
         Err(Error::NoInterpolation)
     }
@@ -86,7 +91,7 @@ pub struct Consistent {
 }
 
 /// Where an interval begins, its control and its length.
-pub struct Point<M: Dae> {
+pub struct IntervalStart<M: Dae> {
     /// The state at the start.
     pub x0: VectorX<M, f64>,
     /// The control.
@@ -118,9 +123,9 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
         self.reset();
     }
 
-    const CONSISTENT: bool = true;
+    const FINDS_ALGEBRAIC_STATES: bool = true;
     /// All stages of an interval of no length are at its start.
-    fn consistent(&mut self, at: &Point<M>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
+    fn consistent(&mut self, at: &IntervalStart<M>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
         let copy = |to: &mut Consistent, result: &Forward<M>| {
             to.z.clear();
             to.z.extend(result.z0.as_slice());
@@ -136,7 +141,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
             let result = self.hessian_with_z0(&at.x0, &at.u, 0.0, &Zeroable::zeroed(), &vector(nu))?;
             copy(to, result);
             to.hessian.resize(super::blocks::second::<M>().len(), 0.0);
-            super::blocks::join(&result.second(), &mut to.hessian);
+            super::blocks::concatenate(&result.second_derivative_blocks(), &mut to.hessian);
         }
         Ok(())
     }
@@ -169,7 +174,7 @@ where
     fn depth(_: &AdaptiveOptions) -> Option<usize> {
         None
     }
-    fn choose(&mut self, at: &Point<M>) -> Result<(), Error> {
+    fn choose(&mut self, at: &IntervalStart<M>) -> Result<(), Error> {
         self.solve(&at.x0, &at.u, at.h)?;
         self.freeze()
     }

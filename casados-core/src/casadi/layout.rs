@@ -8,8 +8,8 @@
 //! lower ≤ x + e_lower − e_upper ≤ upper        e ≥ 0, at the cost linear · e + ½ quadratic · e²
 //! ```
 
-use super::entries::{Entries, Slot, Term};
-use super::program::{Limit, Program};
+use super::entries::{EntryTerm, MatrixSum, Term};
+use super::program::{Program, SoftBound};
 use super::sparsity::Sparsity;
 use crate::qp::{QpView, StageDims};
 use alloc::vec;
@@ -28,9 +28,9 @@ pub struct Layout {
     slacks: Vec<Slack>,
     /// The variables with soft bounds.
     soft: Vec<usize>,
-    pub jacobian: Entries,
+    pub jacobian: MatrixSum,
     /// The upper triangle of the Hessian.
-    pub upper: Entries,
+    pub upper: MatrixSum,
     /// All of it, and where its entries are among those of the upper triangle.
     pub hessian: Sparsity,
     pub mirrored: Vec<usize>,
@@ -48,7 +48,7 @@ struct Slack {
 }
 
 /// What a layout is made of while it grows.
-struct Draft {
+struct LayoutBuilder {
     layout: Layout,
     jacobian: Vec<Term>,
     /// Of the upper triangle.
@@ -68,13 +68,13 @@ impl Layout {
         let bounds = [vec![[f64::NEG_INFINITY, f64::INFINITY]; variables], vec![[0.0; 2]; functions]];
         let layout =
             Self { dims, variables, constraints: functions, columns, functions, bounds, ..Self::default() };
-        let mut draft = Draft { layout, jacobian: Vec::new(), hessian: Vec::new() };
+        let mut draft = LayoutBuilder { layout, jacobian: Vec::new(), hessian: Vec::new() };
         draft.stages(program);
-        draft.bounds(program);
-        let Draft { mut layout, jacobian, hessian } = draft;
+        draft.add_bounds(program);
+        let LayoutBuilder { mut layout, jacobian, hessian } = draft;
         let (n, m) = (layout.variables, layout.constraints);
-        layout.jacobian = Entries::new(m, n, jacobian);
-        layout.upper = Entries::new(n, n, hessian);
+        layout.jacobian = MatrixSum::new(m, n, jacobian);
+        layout.upper = MatrixSum::new(n, n, hessian);
         (layout.hessian, layout.mirrored) = layout.upper.sparsity.symmetric();
         layout
     }
@@ -142,7 +142,7 @@ impl Layout {
     }
 }
 
-impl Draft {
+impl LayoutBuilder {
     /// The entries of the matrices of all stages.
     fn stages(&mut self, program: &mut dyn Program) {
         let Layout { dims, columns, .. } = &self.layout;
@@ -150,35 +150,35 @@ impl Draft {
         for (stage, &StageDims { nx, nu, ng, .. }) in dims.iter().enumerate() {
             let next = dims.get(stage + 1).map_or(0, |next| next.nx);
             let (n, rows) = (nx + nu, next + ng);
-            let ld = crate::qp::pad::<f64>(n);
+            let ld = crate::qp::padded_len::<f64>(n);
             let pattern = program.pattern(stage);
             for (j, &column) in columns[begin..begin + n].iter().enumerate() {
-                for i in (0..rows).filter(|&i| pattern.jacobian.has(i, j)) {
+                for i in (0..rows).filter(|&i| pattern.jacobian.contains(i, j)) {
                     let slot = match i.checked_sub(next) {
-                        None if j < nx => Slot::Interval { stage, block: 0, index: i + j * next },
-                        None => Slot::Interval { stage, block: 1, index: i + (j - nx) * next },
-                        Some(_) => Slot::Node { stage, index: i * ld + j },
+                        None if j < nx => EntryTerm::Interval { stage, block: 0, index: i + j * next },
+                        None => EntryTerm::Interval { stage, block: 1, index: i + (j - nx) * next },
+                        Some(_) => EntryTerm::Node { stage, index: i * ld + j },
                     };
                     self.jacobian.push(([row + i, column], slot));
                 }
                 for i in (0..n).filter(|&i| columns[begin + i] <= column) {
                     let entry = [columns[begin + i], column];
                     let (one, other) = (i.min(j), i.max(j));
-                    if pattern.interval.has(i, j) {
+                    if pattern.interval.contains(i, j) {
                         let (block, index) = match (one.checked_sub(nx), other.checked_sub(nx)) {
                             (Some(one), Some(other)) => (4, one + other * nu),
                             (None, Some(other)) => (3, one + other * nx),
                             _ => (2, one + other * nx),
                         };
-                        self.hessian.push((entry, Slot::Interval { stage, block, index }));
+                        self.hessian.push((entry, EntryTerm::Interval { stage, block, index }));
                     }
-                    if pattern.node.has(i, j) {
-                        self.hessian.push((entry, Slot::Node { stage, index: one * ld + other }));
+                    if pattern.node.contains(i, j) {
+                        self.hessian.push((entry, EntryTerm::Node { stage, index: one * ld + other }));
                     }
                 }
             }
             for (i, &column) in columns[begin + n..].iter().take(next).enumerate() {
-                self.jacobian.push(([row + i, column], Slot::Constant(-1.0)));
+                self.jacobian.push(([row + i, column], EntryTerm::Constant(-1.0)));
             }
             begin += n;
             row += rows;
@@ -186,11 +186,11 @@ impl Draft {
     }
 
     /// Bounds, and slack variables where they are soft.
-    fn bounds(&mut self, program: &dyn Program) {
+    fn add_bounds(&mut self, program: &dyn Program) {
         let (mut begin, mut row) = (0, 0);
         for stage in 0..self.layout.dims.len() {
             for limits in program.bounds(stage) {
-                self.bound(self.layout.columns[begin], limits);
+                self.add_variable_bounds(self.layout.columns[begin], limits);
                 begin += 1;
             }
             row += self.layout.dims.get(stage + 1).map_or(0, |next| next.nx);
@@ -203,7 +203,7 @@ impl Draft {
     }
 
     /// Bounds of a variable: a row if a side is soft. Of stages that share it the narrowest hold.
-    fn bound(&mut self, variable: usize, limits: [Limit; 2]) {
+    fn add_variable_bounds(&mut self, variable: usize, limits: [SoftBound; 2]) {
         let none = [f64::NEG_INFINITY, f64::INFINITY];
         let (mut hard, mut soft) = (none, none);
         for (side, limit) in limits.iter().enumerate() {
@@ -216,22 +216,22 @@ impl Draft {
             self.layout.constraints += 1;
             self.layout.bounds[1].push(soft);
             self.layout.soft.push(variable);
-            self.jacobian.push(([row, variable], Slot::Constant(1.0)));
+            self.jacobian.push(([row, variable], EntryTerm::Constant(1.0)));
             self.slack(row, limits);
         }
     }
 
     /// A slack variable for each soft side of a row.
-    fn slack(&mut self, row: usize, limits: [Limit; 2]) {
+    fn slack(&mut self, row: usize, limits: [SoftBound; 2]) {
         for (limit, sign) in limits.into_iter().zip([1.0, -1.0]) {
             let Some([linear, quadratic]) = limit.penalty else { continue };
             let variable = self.layout.variables;
             self.layout.variables += 1;
             self.layout.bounds[0].push([0.0, f64::INFINITY]);
             self.layout.slacks.push(Slack { variable, row, sign, linear, quadratic });
-            self.jacobian.push(([row, variable], Slot::Constant(sign)));
+            self.jacobian.push(([row, variable], EntryTerm::Constant(sign)));
             if quadratic != 0.0 {
-                self.hessian.push(([variable; 2], Slot::Constant(quadratic)));
+                self.hessian.push(([variable; 2], EntryTerm::Constant(quadratic)));
             }
         }
     }

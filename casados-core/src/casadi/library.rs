@@ -13,7 +13,7 @@ use std::panic::catch_unwind;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Several functions that share memory.
-pub trait Client: Send + Sync + 'static {
+pub trait FunctionLibrary: Send + Sync + 'static {
     /// What a thread has to itself.
     type Worker: Send;
     /// Inputs and outputs of all functions.
@@ -22,7 +22,7 @@ pub trait Client: Send + Sync + 'static {
     ///
     /// # Errors
     /// Those of the options.
-    fn worker(&self) -> Result<Self::Worker, Failure>;
+    fn worker(&self) -> Result<Self::Worker, CallFailure>;
     /// Computes the outputs of a function that are wanted.
     ///
     /// # Errors
@@ -32,22 +32,22 @@ pub trait Client: Send + Sync + 'static {
         worker: &mut Self::Worker,
         function: usize,
         call: &mut dyn Call,
-    ) -> Result<(), Failure>;
+    ) -> Result<(), CallFailure>;
     /// How many intervals were integrated.
     fn integrations(&self) -> u64;
 }
 
 /// Why a call failed, in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Failure(pub String);
+pub struct CallFailure(pub String);
 
-impl From<Error> for Failure {
+impl From<Error> for CallFailure {
     fn from(error: Error) -> Self {
         Self(error.to_string())
     }
 }
 
-impl Failure {
+impl CallFailure {
     /// A memory that is nobody's.
     fn memory(id: i32) -> Self {
         Self(alloc::format!("memory {id} was not checked out, or another call has it"))
@@ -56,19 +56,19 @@ impl Failure {
 
 /// A client that is made when it is needed first, and forgotten when nobody refers to it any more.
 #[doc(hidden)]
-pub struct Library<C: Client> {
-    make: fn() -> Result<C, Failure>,
+pub struct Library<C: FunctionLibrary> {
+    make: fn() -> Result<C, CallFailure>,
     state: Mutex<State<C>>,
 }
 
-struct State<C: Client> {
+struct State<C: FunctionLibrary> {
     references: usize,
     client: Option<Arc<C>>,
-    memories: Vec<Memory<C::Worker>>,
+    memories: Vec<WorkerSlot<C::Worker>>,
 }
 
 /// A memory of the pool.
-enum Memory<W> {
+enum WorkerSlot<W> {
     /// Nobody's.
     Free(Option<Box<W>>),
     /// Checked out.
@@ -77,9 +77,9 @@ enum Memory<W> {
     Busy,
 }
 
-impl<C: Client> Library<C> {
+impl<C: FunctionLibrary> Library<C> {
     /// A library whose client is made by `make`.
-    pub const fn new(make: fn() -> Result<C, Failure>) -> Self {
+    pub const fn new(make: fn() -> Result<C, CallFailure>) -> Self {
         Self { make, state: Mutex::new(State { references: 0, client: None, memories: Vec::new() }) }
     }
 
@@ -93,7 +93,8 @@ impl<C: Client> Library<C> {
         if let Some(client) = &self.state().client {
             return Some(Arc::clone(client));
         }
-        let made = Arc::new(guarded(self.make).flatten().map_err(|failure| say(&failure.0)).ok()?);
+        let made =
+            Arc::new(catch_panic(self.make).flatten().map_err(|failure| log_failure(&failure.0)).ok()?);
         Some(Arc::clone(self.state().client.get_or_insert(made)))
     }
 
@@ -116,18 +117,18 @@ impl<C: Client> Library<C> {
     /// A memory of the caller's own.
     pub fn check_out(&self) -> Option<i32> {
         let mut state = self.state();
-        let free = state.memories.iter().position(|memory| matches!(memory, Memory::Free(_)));
+        let free = state.memories.iter().position(|memory| matches!(memory, WorkerSlot::Free(_)));
         let id = free.unwrap_or(state.memories.len());
         let number = i32::try_from(id).ok()?;
         match state.memories.get_mut(id) {
             Some(memory) => {
                 let worker = match memory {
-                    Memory::Free(worker) => worker.take(),
+                    WorkerSlot::Free(worker) => worker.take(),
                     _ => None,
                 };
-                *memory = Memory::Ready(worker);
+                *memory = WorkerSlot::Ready(worker);
             }
-            None => state.memories.push(Memory::Ready(None)),
+            None => state.memories.push(WorkerSlot::Ready(None)),
         }
         Some(number)
     }
@@ -137,9 +138,9 @@ impl<C: Client> Library<C> {
         let mut state = self.state();
         let memory = usize::try_from(id).ok().and_then(|id| state.memories.get_mut(id));
         if let Some(memory) = memory
-            && let Memory::Ready(worker) = memory
+            && let WorkerSlot::Ready(worker) = memory
         {
-            *memory = Memory::Free(worker.take());
+            *memory = WorkerSlot::Free(worker.take());
         }
     }
 
@@ -147,21 +148,21 @@ impl<C: Client> Library<C> {
     ///
     /// # Errors
     /// A memory that was not checked out; no client.
-    pub fn begin(&self, id: i32) -> Result<Begun<C>, Failure> {
+    pub fn begin(&self, id: i32) -> Result<PendingCall<C>, CallFailure> {
         let mut state = self.state();
         let client = match &state.client {
             Some(client) => Arc::clone(client),
             None => {
                 drop(state);
-                let made = self.client().ok_or_else(|| Failure("the library has no client".into()))?;
+                let made = self.client().ok_or_else(|| CallFailure("the library has no client".into()))?;
                 state = self.state();
                 made
             }
         };
-        let worker = state.take(id).ok_or_else(|| Failure::memory(id));
+        let worker = state.take_worker(id).ok_or_else(|| CallFailure::memory(id));
         drop(state);
-        let worker = worker.inspect_err(|failure| say(&failure.0))?;
-        Ok(Begun { client, worker, id })
+        let worker = worker.inspect_err(|failure| log_failure(&failure.0))?;
+        Ok(PendingCall { client, worker, id })
     }
 
     /// Computes the outputs of a function that are wanted, which ends the call.
@@ -170,50 +171,50 @@ impl<C: Client> Library<C> {
     /// Those of the client; no such function; a panic.
     pub fn end(
         &self,
-        Begun { worker, client, id }: Begun<C>,
+        PendingCall { worker, client, id }: PendingCall<C>,
         function: usize,
         call: &mut dyn Call,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CallFailure> {
         // After a panic the worker is gone, and the next call has a new one.
-        let outcome = guarded(AssertUnwindSafe(|| {
+        let outcome = catch_panic(AssertUnwindSafe(|| {
             let mut worker = match worker {
                 Some(worker) => worker,
                 None => Box::new(client.worker()?),
             };
             let outcome = match client.signatures().get(function) {
                 Some(_) => client.evaluate(&mut worker, function, call),
-                None => Err(Failure("there is no such function".into())),
+                None => Err(CallFailure("there is no such function".into())),
             };
-            Ok::<_, Failure>((worker, outcome))
+            Ok::<_, CallFailure>((worker, outcome))
         }));
         let (worker, outcome) = match outcome {
             Ok(Ok((worker, outcome))) => (Some(worker), outcome),
             Ok(Err(failure)) | Err(failure) => (None, Err(failure)),
         };
-        self.state().give(id, worker);
-        outcome.inspect_err(|failure| say(&failure.0))
+        self.state().return_worker(id, worker);
+        outcome.inspect_err(|failure| log_failure(&failure.0))
     }
 }
 
 /// A call that has begun.
-pub struct Begun<C: Client> {
+pub struct PendingCall<C: FunctionLibrary> {
     client: Arc<C>,
     worker: Option<Box<C::Worker>>,
     id: i32,
 }
 
-impl<C: Client> Begun<C> {
+impl<C: FunctionLibrary> PendingCall<C> {
     /// Whose function is called.
     pub fn client(&self) -> Arc<C> {
         Arc::clone(&self.client)
     }
 }
 
-impl<C: Client> State<C> {
-    fn take(&mut self, id: i32) -> Option<Option<Box<C::Worker>>> {
+impl<C: FunctionLibrary> State<C> {
+    fn take_worker(&mut self, id: i32) -> Option<Option<Box<C::Worker>>> {
         let memory = self.memories.get_mut(usize::try_from(id).ok()?)?;
-        match core::mem::replace(memory, Memory::Busy) {
-            Memory::Ready(worker) => Some(worker),
+        match core::mem::replace(memory, WorkerSlot::Busy) {
+            WorkerSlot::Ready(worker) => Some(worker),
             other => {
                 *memory = other;
                 None
@@ -221,25 +222,25 @@ impl<C: Client> State<C> {
         }
     }
 
-    fn give(&mut self, id: i32, worker: Option<Box<C::Worker>>) {
+    fn return_worker(&mut self, id: i32, worker: Option<Box<C::Worker>>) {
         if let Some(memory) = usize::try_from(id).ok().and_then(|id| self.memories.get_mut(id)) {
-            *memory = Memory::Ready(worker);
+            *memory = WorkerSlot::Ready(worker);
         }
     }
 }
 
 /// What a function returns, or that it panicked.
-fn guarded<R>(run: impl FnOnce() -> R) -> Result<R, Failure> {
+fn catch_panic<R>(run: impl FnOnce() -> R) -> Result<R, CallFailure> {
     catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
         let said = panic.downcast_ref::<&str>().copied().map(String::from);
         let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
-        Failure(alloc::format!("panicked: {}", said.unwrap_or_default()))
+        CallFailure(alloc::format!("panicked: {}", said.unwrap_or_default()))
     })
 }
 
 /// Writes a failure to where errors go, if the environment asks for that: solvers try points at
 /// which functions fail.
-fn say(what: &dyn Display) {
+fn log_failure(what: &dyn Display) {
     if std::env::var_os("CASADOS_CASADI_ERRORS").is_some() {
         std::eprintln!("casados: {what}");
     }

@@ -2,7 +2,7 @@
 //! and constraints know, followed through the interval.
 
 use super::dependence::{self, Dimensions};
-use super::sparsity::Relation;
+use super::sparsity::Dependence;
 use crate::ocp::{Constraints, Cost, Dynamics, Entry, Formulation, Origin, Problem};
 use crate::shape::Shape;
 use crate::structure::Pattern;
@@ -11,18 +11,18 @@ use crate::structure::Pattern;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StagePattern {
     /// Of the end of the interval, then of the constraints.
-    pub jacobian: Relation,
+    pub jacobian: Dependence,
     /// Of what the interval adds to the Hessian of the Lagrangian.
-    pub interval: Relation,
+    pub interval: Dependence,
     /// Of what costs and constraints at the node do.
-    pub node: Relation,
+    pub node: Dependence,
 }
 
 /// What a stage has.
 struct Stage {
     pattern: StagePattern,
     /// On which states and controls each of `(x, u, z)` depends.
-    variables: Relation,
+    variables: Dependence,
     /// Rows of the end of the interval.
     next: usize,
 }
@@ -33,9 +33,9 @@ impl Stage {
         let Self { pattern: StagePattern { jacobian, node, .. }, variables, .. } = self;
         let is_known = tell(&mut |entry| match entry {
             Entry::Slope(row, variable) => {
-                jacobian.join(first + row, variables, variable);
+                jacobian.add_row(first + row, variables, variable);
             }
-            Entry::Curvature(one, other) => node.join_products(variables, one, other),
+            Entry::Curvature(one, other) => node.add_row_products(variables, one, other),
         });
         if !is_known {
             (first..jacobian.rows()).for_each(|row| jacobian.fill(row));
@@ -44,7 +44,7 @@ impl Stage {
     }
 
     /// The end of the interval.
-    fn integrate(&mut self, origin: Origin, dimensions: Dimensions, controls: usize) {
+    fn add_interval_end(&mut self, origin: Origin, dimensions: Dimensions, controls: usize) {
         let Dimensions { nx, nz, .. } = dimensions;
         match origin {
             Origin::Unknown => {
@@ -55,13 +55,13 @@ impl Stage {
             Origin::Equations(jacobian, hessian) => {
                 let on = dependence::variables(dimensions, jacobian, None);
                 for row in 0..nx {
-                    self.pattern.jacobian.join(row, &on, nx + row);
+                    self.pattern.jacobian.add_row(row, &on, nx + row);
                 }
                 for row in 0..nz {
-                    self.variables.join(nx + controls + row, &on, 2 * nx + row);
+                    self.variables.add_row(nx + controls + row, &on, 2 * nx + row);
                 }
                 for (one, other) in hessian.iter() {
-                    self.pattern.interval.join_products(&on, one, other);
+                    self.pattern.interval.add_row_products(&on, one, other);
                 }
             }
             Origin::Map(jacobian, hessian) => self.map(jacobian, hessian, dimensions, controls),
@@ -81,21 +81,21 @@ impl Stage {
         }
         for (one, other) in hessian.iter() {
             if let (Some(one), Some(other)) = (position(one), position(other)) {
-                self.pattern.interval.join_products(&self.variables, one, other);
+                self.pattern.interval.add_row_products(&self.variables, one, other);
             }
         }
     }
 }
 
 /// The patterns of a stage: of all but the last, or of the last, with `rows` constraints.
-pub fn of_stage<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize) -> StagePattern {
+pub fn stage_pattern<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize) -> StagePattern {
     let [nx, nz, nu] = [P::Shape::NX, P::Shape::NZ, P::Shape::NU];
     let [next, nu, nz] = if is_last { [0; 3] } else { [nx, nu, nz] };
     let n = nx + nu;
-    let mut variables = Relation::zero(n + nz, n);
+    let mut variables = Dependence::zero(n + nz, n);
     (0..n).for_each(|variable| variables.set(variable, variable));
-    let [interval, node] = [Relation::zero(n, n), Relation::zero(n, n)];
-    let pattern = StagePattern { jacobian: Relation::zero(next + rows, n), interval, node };
+    let [interval, node] = [Dependence::zero(n, n), Dependence::zero(n, n)];
+    let pattern = StagePattern { jacobian: Dependence::zero(next + rows, n), interval, node };
     let mut stage = Stage { pattern, variables, next };
     let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
     if is_last {
@@ -103,7 +103,7 @@ pub fn of_stage<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize
         stage.add(next + rows, |visit| terminal_cost.pattern(visit));
     } else {
         let dimensions = Dimensions { nx, nz, nw: P::Shape::NW };
-        stage.integrate(<P::Dynamics as Dynamics<f64>>::ORIGIN, dimensions, nu);
+        stage.add_interval_end(<P::Dynamics as Dynamics<f64>>::ORIGIN, dimensions, nu);
         stage.add(next, |visit| path.pattern(visit));
         stage.add(next + rows, |visit| stage_cost.pattern(visit));
     }

@@ -7,7 +7,7 @@
 use super::function::{Call, Port, Signature};
 use super::groups::{Group, groups};
 use super::layout::Layout;
-use super::library::{Client, Failure};
+use super::library::{CallFailure, FunctionLibrary};
 use super::nlp::signatures;
 use super::program::{Derivatives, Program, Trial};
 use crate::ocp::OcpError;
@@ -20,14 +20,14 @@ use core::ops::Range;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 /// What makes a problem.
-pub type Make = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
+pub type ProgramConstructor = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 
 /// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
 /// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
 /// `jac_adj1_nlp`, `nlp_trajectory`.
 #[doc(hidden)]
 pub struct Problems {
-    make: Make,
+    make: ProgramConstructor,
     layout: Layout,
     signatures: Vec<Signature>,
     /// States and controls by their names.
@@ -49,7 +49,7 @@ pub struct Worker {
     /// `σ`, then `μ`.
     multipliers: Vec<f64>,
     input_multipliers: Vec<f64>,
-    known: Known,
+    known: PointCache,
     /// Whether derivatives were asked for at the last point that values were asked for at.
     follows: bool,
     objective: f64,
@@ -65,7 +65,7 @@ pub struct Worker {
 
 /// What is known at the last point.
 #[derive(Clone, Copy, Default)]
-struct Known {
+struct PointCache {
     value: bool,
     /// Gradient and Jacobian.
     first: bool,
@@ -73,12 +73,12 @@ struct Known {
     second: bool,
 }
 
-const NOT_MADE: &str = "the problem could not be made";
+const CONSTRUCTION_FAILED: &str = "the problem could not be made";
 
 impl Problems {
     /// The functions of what `make` makes.
     #[must_use]
-    pub fn new(make: Make) -> Self {
+    pub fn new(make: ProgramConstructor) -> Self {
         let made = make().map_err(|error| error.to_string());
         let made = made.and_then(|mut program| {
             program.check()?;
@@ -94,7 +94,7 @@ impl Problems {
     }
 
     /// What comes before intervals are integrated, or differentiated where they were.
-    fn begin(&self, program: &mut dyn Program, known: bool) {
+    fn prepare_intervals(&self, program: &mut dyn Program, known: bool) {
         let known = program.keep_stages(known);
         let intervals = if known { 0 } else { self.layout.dims.len().saturating_sub(1) as u64 };
         self.integrations.fetch_add(intervals, Ordering::Relaxed);
@@ -111,7 +111,7 @@ impl Problems {
             worker.follows = false;
             return Ok(());
         }
-        self.begin(worker.program.as_mut(), false);
+        self.prepare_intervals(worker.program.as_mut(), false);
         worker.objective = worker.program.value(&worker.v, &mut worker.room, &mut worker.ends)?;
         worker.known.value = true;
         Ok(())
@@ -124,24 +124,24 @@ impl Problems {
         }
         // What an error interrupts is known no more.
         let known = core::mem::take(&mut worker.known);
-        self.begin(worker.program.as_mut(), known.value);
+        self.prepare_intervals(worker.program.as_mut(), known.value);
         let Layout { jacobian: slopes, upper, .. } = &self.layout;
         let Worker { program, x, v, ends, jacobian, gradient, .. } = worker;
         let apart = Derivatives {
-            clear: &|stage, matrix| upper.clear_node(stage, matrix),
+            clear: &|stage, matrix| upper.zero_node_terms(stage, matrix),
             interval: &mut |stage, blocks| slopes.write_interval(stage, blocks, 1.0, jacobian),
         };
         worker.objective = program.first(v, ends, apart)?;
         let qp = program.qp();
         slopes.write_nodes(qp.stages().map(|stage| stage.arrays().matrix), 1.0, jacobian);
         self.layout.gradient(&qp, x, gradient);
-        worker.known = Known { value: true, first: true, ..known };
+        worker.known = PointCache { value: true, first: true, ..known };
         Ok(())
     }
 
     /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
     /// It is kept unless it has a place of its own.
-    fn second(&self, worker: &mut Worker, to: Option<&mut [f64]>) -> Result<(), OcpError> {
+    fn evaluate_hessian(&self, worker: &mut Worker, to: Option<&mut [f64]>) -> Result<(), OcpError> {
         if worker.known.second && to.is_none() {
             return Ok(());
         }
@@ -152,33 +152,33 @@ impl Problems {
         worker.scaled.extend(mu.iter().take(self.layout.functions).map(|mu| mu / factor));
         let mut own = core::mem::take(&mut worker.hessian);
         let (is_kept, to) = (to.is_none(), to.unwrap_or(&mut own));
-        let mut outcome = self.curvature(worker, known, factor, to);
+        let mut outcome = self.assemble_hessian(worker, known, factor, to);
         if sigma == 0.0 && outcome.is_ok() {
             let mut objective = vec![0.0; to.len()];
             worker.scaled.fill(0.0);
-            let known = Known { value: true, first: true, second: false };
-            outcome = self.curvature(worker, known, 1.0, &mut objective);
+            let known = PointCache { value: true, first: true, second: false };
+            outcome = self.assemble_hessian(worker, known, 1.0, &mut objective);
             to.iter_mut().zip(&objective).for_each(|(to, objective)| *to -= objective);
         }
         worker.hessian = own;
         outcome?;
-        worker.known = Known { value: true, first: true, second: is_kept };
+        worker.known = PointCache { value: true, first: true, second: is_kept };
         Ok(())
     }
 
     /// The Hessian times `factor`; and gradient and Jacobian, if they are not `known`.
-    fn curvature(
+    fn assemble_hessian(
         &self,
         worker: &mut Worker,
-        known: Known,
+        known: PointCache,
         factor: f64,
         to: &mut [f64],
     ) -> Result<(), OcpError> {
         let Layout { jacobian: slopes, upper, .. } = &self.layout;
         let Worker { program, x, v, scaled, ends, gradient, jacobian, .. } = worker;
-        self.begin(program.as_mut(), known.value);
+        self.prepare_intervals(program.as_mut(), known.value);
         let apart = Derivatives {
-            clear: &|stage, matrix| upper.clear_node(stage, matrix),
+            clear: &|stage, matrix| upper.zero_node_terms(stage, matrix),
             interval: &mut |stage, blocks| {
                 if !known.first {
                     slopes.write_interval(stage, blocks, 1.0, jacobian);
@@ -197,20 +197,20 @@ impl Problems {
     }
 }
 
-impl Client for Problems {
+impl FunctionLibrary for Problems {
     type Worker = Worker;
 
     fn signatures(&self) -> &[Signature] {
         &self.signatures
     }
 
-    fn worker(&self) -> Result<Worker, Failure> {
+    fn worker(&self) -> Result<Worker, CallFailure> {
         if let Some(wrong) = &self.wrong {
-            return Err(Failure(wrong.clone()));
+            return Err(CallFailure(wrong.clone()));
         }
-        let program = (self.make)().map_err(|error| Failure(error.to_string()))?;
+        let program = (self.make)().map_err(|error| CallFailure(error.to_string()))?;
         if program.dims() != self.layout.dims {
-            return Err(Failure(NOT_MADE.into()));
+            return Err(CallFailure(CONSTRUCTION_FAILED.into()));
         }
         let (n, m) = (self.layout.variables, self.layout.constraints);
         Ok(Worker {
@@ -220,27 +220,28 @@ impl Client for Problems {
             input: vec![0.0; n],
             multipliers: vec![f64::NAN; m + 1],
             input_multipliers: vec![0.0; m + 1],
-            known: Known::default(),
+            known: PointCache::default(),
             follows: false,
             objective: 0.0,
             ends: Vec::new(),
             gradient: vec![0.0; n],
             jacobian: vec![0.0; self.transposed.len()],
             hessian: vec![0.0; self.layout.upper.sparsity.entries().len()],
-            room: Solution::new(&self.layout.dims).map_err(|error| Failure(error.to_string()))?,
+            room: Solution::new(&self.layout.dims).map_err(|error| CallFailure(error.to_string()))?,
             scaled: Vec::new(),
         })
     }
 
-    fn evaluate(&self, worker: &mut Worker, function: usize, call: &mut dyn Call) -> Result<(), Failure> {
-        let signature = self.signatures.get(function).ok_or_else(|| Failure(NOT_MADE.into()))?;
+    fn evaluate(&self, worker: &mut Worker, function: usize, call: &mut dyn Call) -> Result<(), CallFailure> {
+        let signature =
+            self.signatures.get(function).ok_or_else(|| CallFailure(CONSTRUCTION_FAILED.into()))?;
         if signature.inputs.is_empty() {
-            self.bounds(worker, call);
+            self.write_bounds(worker, call);
             return Ok(());
         }
         call.read(0, &mut worker.input);
         if !super::cache::equal(&worker.x, &worker.input) {
-            worker.known = Known::default();
+            worker.known = PointCache::default();
             worker.x.copy_from_slice(&worker.input);
             self.layout.gather(&worker.x, &mut worker.v);
         }
@@ -262,7 +263,7 @@ impl Client for Problems {
                 if is_value(port) == values
                     && let Some(to) = call.output(output)
                 {
-                    self.answer(worker, port, to).map_err(|error| Failure(error.to_string()))?;
+                    self.compute_output(worker, port, to).map_err(|error| CallFailure(error.to_string()))?;
                 }
             }
         }
@@ -276,15 +277,15 @@ impl Client for Problems {
 
 impl Problems {
     /// Computes and writes an output; the Hessian that IPOPT asks for to where it belongs.
-    fn answer(&self, worker: &mut Worker, port: &Port, to: &mut [f64]) -> Result<(), OcpError> {
+    fn compute_output(&self, worker: &mut Worker, port: &Port, to: &mut [f64]) -> Result<(), OcpError> {
         match port.name.to_bytes() {
             b"f" | b"g" => self.value(worker)?,
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" | b"jac_g_x" | b"jac_adj_x_adj_g" => {
                 self.first(worker)?;
             }
             b"grad_gamma_x" | b"adj_x" => self.first(worker)?,
-            b"triu_hess_gamma_x_x" if !worker.known.second => return self.second(worker, Some(to)),
-            b"jac_adj_x_x" => self.second(worker, None)?,
+            b"triu_hess_gamma_x_x" if !worker.known.second => return self.evaluate_hessian(worker, Some(to)),
+            b"jac_adj_x_x" => self.evaluate_hessian(worker, None)?,
             _ => {}
         }
         self.write(worker, port, to);
@@ -299,8 +300,8 @@ impl Problems {
             b"g" => self.layout.constraints(&worker.x, &worker.v, &worker.ends, to),
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => to.copy_from_slice(&worker.gradient),
             b"jac_g_x" => to.copy_from_slice(&worker.jacobian),
-            b"jac_adj_x_adj_g" => choose(&worker.jacobian, &self.transposed, to),
-            b"jac_adj_x_x" => choose(&worker.hessian, &self.layout.mirrored, to),
+            b"jac_adj_x_adj_g" => copy_selected(&worker.jacobian, &self.transposed, to),
+            b"jac_adj_x_x" => copy_selected(&worker.hessian, &self.layout.mirrored, to),
             b"triu_hess_gamma_x_x" => to.copy_from_slice(&worker.hessian),
             b"grad_gamma_x" | b"adj_x" => {
                 for (to, gradient) in to.iter_mut().zip(&worker.gradient) {
@@ -312,18 +313,18 @@ impl Problems {
                     to[column] += mu[row] * value;
                 }
             }
-            b"x" => self.trajectory(worker, |dims| 0..dims.nx, to),
-            b"u" => self.trajectory(worker, |dims| dims.nx..dims.nx + dims.nu, to),
+            b"x" => self.write_trajectory(worker, |dims| 0..dims.nx, to),
+            b"u" => self.write_trajectory(worker, |dims| dims.nx..dims.nx + dims.nu, to),
             _ => {
                 if let Some(group) = self.groups.iter().find(|group| *group.name == *port.name) {
-                    self.trajectory(worker, |dims| group.places(dims), to);
+                    self.write_trajectory(worker, |dims| group.variable_range(dims), to);
                 }
             }
         }
     }
 
     /// States or controls of all stages, one behind the other.
-    fn trajectory(&self, worker: &Worker, choose: impl Fn(&StageDims) -> Range<usize>, to: &mut [f64]) {
+    fn write_trajectory(&self, worker: &Worker, choose: impl Fn(&StageDims) -> Range<usize>, to: &mut [f64]) {
         let (mut rest, mut to) = (&worker.v[..], to.iter_mut());
         for dims in &self.layout.dims {
             let (stage, behind) = rest.split_at(dims.nx + dims.nu);
@@ -335,7 +336,7 @@ impl Problems {
     }
 
     /// Bounds, the iterate as a start, and bounds of the constraints.
-    fn bounds(&self, worker: &Worker, call: &mut dyn Call) {
+    fn write_bounds(&self, worker: &Worker, call: &mut dyn Call) {
         let mut start = vec![0.0; self.layout.variables];
         self.layout.scatter(&worker.program.point(), &mut start);
         let [x, g] = &self.layout.bounds;
@@ -351,7 +352,7 @@ impl Problems {
 }
 
 /// Some of the numbers.
-fn choose(from: &[f64], places: &[usize], to: &mut [f64]) {
+fn copy_selected(from: &[f64], places: &[usize], to: &mut [f64]) {
     for (to, &place) in to.iter_mut().zip(places) {
         *to = from[place];
     }

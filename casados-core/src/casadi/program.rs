@@ -1,11 +1,11 @@
 //! A problem of optimal control as a nonlinear program: what is asked of it.
 
 use super::entries::Blocks;
-use super::pattern::{StagePattern, of_stage};
+use super::pattern::{StagePattern, stage_pattern};
 use crate::ocp::{
     Convexification, Curvature, Dynamics, Exact, Formulation, GaussNewton, HeapOcp, OcpError, SecondOrder,
 };
-use crate::qp::{Bounds, QpView, Solution, StageDims, marked};
+use crate::qp::{Bounds, QpView, Solution, StageDims, marked_indices};
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
@@ -27,9 +27,9 @@ pub trait Program: Send {
     /// Where the matrices of a stage may differ from zero.
     fn pattern(&mut self, stage: usize) -> StagePattern;
     /// Bounds of the states and controls of a stage.
-    fn bounds(&self, stage: usize) -> Vec<[Limit; 2]>;
+    fn bounds(&self, stage: usize) -> Vec<[SoftBound; 2]>;
     /// Bounds of its constraints.
-    fn limits(&self, stage: usize) -> Vec<[Limit; 2]>;
+    fn limits(&self, stage: usize) -> Vec<[SoftBound; 2]>;
     /// Whether all that was to be said was.
     ///
     /// # Errors
@@ -80,14 +80,14 @@ pub type Trial = Solution<f64, Vec<StageDims>, Vec<f64>>;
 
 /// A side of a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limit {
+pub struct SoftBound {
     /// Infinite if there is none.
     pub value: f64,
     /// What leaving it costs, linearly and quadratically; nothing if it is hard.
     pub penalty: Option<[f64; 2]>,
 }
 
-impl Limit {
+impl SoftBound {
     /// A side with its penalties; an infinite one is hard.
     fn new(value: f64, linear: f64, quadratic: f64) -> Self {
         let is_soft = value.is_finite() && linear.is_finite();
@@ -96,12 +96,15 @@ impl Limit {
 }
 
 /// Both sides of all bounds, with these values.
-fn limits<'a>(bounds: &Bounds<'a, f64>, values: impl Iterator<Item = [f64; 2]> + 'a) -> Vec<[Limit; 2]> {
+fn constraint_bounds<'a>(
+    bounds: &Bounds<'a, f64>,
+    values: impl Iterator<Item = [f64; 2]> + 'a,
+) -> Vec<[SoftBound; 2]> {
     let lower = bounds.lower_linear.iter().zip(bounds.lower_quadratic);
     let upper = bounds.upper_linear.iter().zip(bounds.upper_quadratic);
     let sides = values.zip(lower.zip(upper));
     let limits = sides.map(|([lower, upper], ((&l, &q), (&linear, &quadratic)))| {
-        [Limit::new(lower, l, q), Limit::new(upper, linear, quadratic)]
+        [SoftBound::new(lower, l, q), SoftBound::new(upper, linear, quadratic)]
     });
     limits.collect()
 }
@@ -121,13 +124,13 @@ where
 
     fn couplings(&self) -> [Vec<usize>; 2] {
         let qp = HeapOcp::qp(self);
-        [marked(qp.periodic()).collect(), marked(qp.shared()).collect()]
+        [marked_indices(qp.periodic()).collect(), marked_indices(qp.shared()).collect()]
     }
 
     fn pattern(&mut self, stage: usize) -> StagePattern {
         let rows = HeapOcp::qp(self).dims().get(stage).map_or(0, |dims| dims.ng);
         let is_last = stage == self.intervals();
-        let mut pattern = of_stage(self.problem(), is_last, rows);
+        let mut pattern = stage_pattern(self.problem(), is_last, rows);
         if stage == 0 && self.has_arrival_cost() {
             let nx = self.names().x.len();
             (0..nx).for_each(|i| (0..nx).for_each(|j| pattern.node.set(i, j)));
@@ -135,19 +138,19 @@ where
         pattern
     }
 
-    fn bounds(&self, stage: usize) -> Vec<[Limit; 2]> {
+    fn bounds(&self, stage: usize) -> Vec<[SoftBound; 2]> {
         let Some(stage) = HeapOcp::qp(self).stages().nth(stage) else { return Vec::new() };
         let of = |bounds: Bounds<'_, f64>| {
             let values = bounds.lower.iter().zip(bounds.upper).map(|(&lower, &upper)| [lower, upper]);
-            limits(&bounds, values)
+            constraint_bounds(&bounds, values)
         };
         [of(stage.x_bounds()), of(stage.u_bounds())].concat()
     }
 
-    fn limits(&self, stage: usize) -> Vec<[Limit; 2]> {
+    fn limits(&self, stage: usize) -> Vec<[SoftBound; 2]> {
         let Some(view) = HeapOcp::qp(self).stages().nth(stage) else { return Vec::new() };
         let values = (0..).map(|row| HeapOcp::limits(self, stage, row));
-        limits(&view.g_bounds(), values)
+        constraint_bounds(&view.g_bounds(), values)
     }
 
     fn check(&mut self) -> Result<(), String> {

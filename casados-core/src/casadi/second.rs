@@ -21,7 +21,7 @@ impl Blocks {
 
     /// Where the derivatives by two kinds of variables begin, and the distances of rows and of
     /// columns.
-    pub fn place(self, row: usize, column: usize) -> [usize; 3] {
+    pub fn block_layout(self, row: usize, column: usize) -> [usize; 3] {
         let Self(sizes) = self;
         if row <= column {
             [self.offset(row, column), 1, sizes[row]]
@@ -33,7 +33,7 @@ impl Blocks {
     /// Where the derivative by two directions is.
     pub fn index(self, row: usize, column: usize) -> usize {
         let [(one, i), (two, j)] = [self.kind(row), self.kind(column)];
-        let [first, of_rows, of_columns] = self.place(one, two);
+        let [first, of_rows, of_columns] = self.block_layout(one, two);
         first + of_rows * i + of_columns * j
     }
 

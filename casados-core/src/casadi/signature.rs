@@ -7,7 +7,7 @@
 
 use super::function::{Port, Signature};
 use super::second::Blocks;
-use super::sparsity::{Relation, Sparsity};
+use super::sparsity::{Dependence, Sparsity};
 use alloc::vec::Vec;
 use core::ffi::CStr;
 use core::ops::Range;
@@ -33,7 +33,7 @@ pub struct Entry(pub usize);
 
 /// Places at equal distances, at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Run {
+pub struct StridedPlaces {
     pub first: usize,
     pub stride: usize,
     pub count: usize,
@@ -47,21 +47,21 @@ pub struct Output {
     /// The place of each non-zero there.
     pub entries: Vec<Entry>,
     /// The same as places at equal distances, in their order.
-    pub runs: Vec<Run>,
+    pub runs: Vec<StridedPlaces>,
     /// Whether these are of algebraic states.
     pub algebraic: bool,
 }
 
 impl Output {
     fn new(source: Source, entries: Vec<Entry>, algebraic: bool) -> Self {
-        let mut runs: Vec<Run> = Vec::new();
+        let mut runs: Vec<StridedPlaces> = Vec::new();
         for &Entry(place) in &entries {
             match runs.last_mut() {
                 Some(run) if run.count == 1 && place > run.first => {
                     (run.stride, run.count) = (place - run.first, 2);
                 }
                 Some(run) if run.count > 1 && run.first + run.stride * run.count == place => run.count += 1,
-                _ => runs.push(Run { first: place, stride: 1, count: 1 }),
+                _ => runs.push(StridedPlaces { first: place, stride: 1, count: 1 }),
             }
         }
         Self { source, entries, runs, algebraic }
@@ -112,9 +112,9 @@ pub struct Shape<'a> {
     /// outputs, but for the states.
     pub outputs: [Range<usize>; 3],
     /// Where `∂y/∂w` has entries.
-    pub value: &'a Relation,
+    pub value: &'a Dependence,
     /// Where `∇²(λᵀy)` has.
-    pub hessian: &'a Relation,
+    pub hessian: &'a Dependence,
 }
 
 impl Shape<'_> {
@@ -134,14 +134,14 @@ impl Shape<'_> {
     }
 
     /// What the outputs are, and their ranges.
-    fn present(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+    fn existing_outputs(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
         self.outputs.iter().cloned().enumerate().filter(|(kind, range)| *kind == 0 || !range.is_empty())
     }
 
     /// The four functions.
     pub fn functions(&self) -> [(Signature, Vec<Output>); 4] {
         let inputs = &self.inputs;
-        let (kinds, outputs): (Vec<_>, Vec<_>) = self.present().unzip();
+        let (kinds, outputs): (Vec<_>, Vec<_>) = self.existing_outputs().unzip();
         let outputs = &outputs;
         let of = |names: [&'static CStr; 3]| kinds.iter().map(|&kind| names[kind]).collect::<Vec<_>>();
         let [of_inputs, of_outputs] =
@@ -155,7 +155,7 @@ impl Shape<'_> {
             self.vectors(Source::Value, outputs, self.rows(), |index| kinds[index] == ALGEBRAIC),
             self.vectors(Source::Gradient, inputs, self.directions(), |_| false),
         ];
-        let [first, second] = [self.first(), self.second()];
+        let [first, second] = [self.first(), self.hessian_outputs()];
         let whole =
             |inputs, (outputs, sources): (Vec<Port>, Vec<Output>)| (Signature { inputs, outputs }, sources);
         [
@@ -194,12 +194,12 @@ impl Shape<'_> {
     fn first(&self) -> (Vec<Port>, Vec<Output>) {
         let rows = self.rows();
         let mut blocks = (Vec::new(), Vec::new());
-        for (kind, output) in self.present() {
+        for (kind, output) in self.existing_outputs() {
             for (name, input) in JACOBIANS[kind].iter().zip(&self.inputs) {
                 let sparsity = self.value.block(output.clone(), input.clone());
                 let algebraic = kind == ALGEBRAIC;
                 let place =
-                    Place { first: output.start + rows * input.start, row: 1, column: rows, algebraic };
+                    BlockPlace { first: output.start + rows * input.start, row: 1, column: rows, algebraic };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
             }
         }
@@ -207,27 +207,28 @@ impl Shape<'_> {
     }
 
     /// The blocks of the derivatives of `∇(λᵀy)`.
-    fn second(&self) -> (Vec<Port>, Vec<Output>) {
+    fn hessian_outputs(&self) -> (Vec<Port>, Vec<Output>) {
         let rows = self.rows();
         let mut blocks = (Vec::new(), Vec::new());
         for (gradient, row) in self.inputs.iter().enumerate() {
             for (kind, (name, column)) in HESSIANS[gradient].iter().zip(&self.inputs).enumerate() {
                 let sparsity = self.hessian.block(row.clone(), column.clone());
-                let [first, row, column] = self.blocks().place(gradient, kind);
-                let place = Place { first, row, column, algebraic: false };
+                let [first, row, column] = self.blocks().block_layout(gradient, kind);
+                let place = BlockPlace { first, row, column, algebraic: false };
                 self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
             }
-            for (kind, output) in self.present() {
+            for (kind, output) in self.existing_outputs() {
                 let name = BY_NOMINAL[gradient][kind];
                 let sparsity = Sparsity::zero(row.len(), output.len());
-                let place = Place { first: 0, row: 0, column: 0, algebraic: false };
+                let place = BlockPlace { first: 0, row: 0, column: 0, algebraic: false };
                 self.push(&mut blocks, name, &sparsity, Source::Zero, place);
             }
-            for (kind, output) in self.present() {
+            for (kind, output) in self.existing_outputs() {
                 let name = BY_SEEDS[gradient][kind];
                 let sparsity = self.value.transposed_block(output.clone(), row.clone());
                 let algebraic = kind == ALGEBRAIC;
-                let place = Place { first: output.start + rows * row.start, row: rows, column: 1, algebraic };
+                let place =
+                    BlockPlace { first: output.start + rows * row.start, row: rows, column: 1, algebraic };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
             }
         }
@@ -241,7 +242,7 @@ impl Shape<'_> {
         name: &'static CStr,
         sparsity: &Sparsity,
         source: Source,
-        place: Place,
+        place: BlockPlace,
     ) {
         // How much there is of one interval.
         let length = match source {
@@ -261,7 +262,7 @@ impl Shape<'_> {
 /// Where the first element of a block is, the distances of rows and columns, and whether they are
 /// of algebraic states.
 #[derive(Clone, Copy)]
-struct Place {
+struct BlockPlace {
     first: usize,
     row: usize,
     column: usize,

@@ -53,7 +53,7 @@ impl Sparsity {
         let mut order: Vec<usize> = (0..self.entries.len()).collect();
         order.sort_by_key(|&entry| self.entries[entry]);
         let entries = order.iter().map(|&entry| self.entries[entry]).collect();
-        (Self::from_entries(columns, rows, swapped(entries)), order)
+        (Self::from_entries(columns, rows, swap_rows_and_columns(entries)), order)
     }
 
     /// The pattern of the symmetric matrix with this upper triangle, and where its entries are
@@ -67,7 +67,7 @@ impl Sparsity {
         both.sort_unstable();
         both.dedup();
         let (entries, places) = both.into_iter().unzip();
-        (Self::from_entries(rows, columns, swapped(entries)), places)
+        (Self::from_entries(rows, columns, swap_rows_and_columns(entries)), places)
     }
 
     /// This pattern so many times along the diagonal.
@@ -93,18 +93,18 @@ impl Sparsity {
     }
 }
 
-fn swapped(entries: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
+fn swap_rows_and_columns(entries: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
     entries.into_iter().map(|(row, column)| (column, row)).collect()
 }
 
 /// Which entries of a matrix may differ from zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Relation {
+pub struct Dependence {
     columns: usize,
     related: Vec<bool>,
 }
 
-impl Relation {
+impl Dependence {
     /// Nothing but zeros.
     pub fn zero(rows: usize, columns: usize) -> Self {
         Self { columns, related: vec![false; rows * columns] }
@@ -123,10 +123,10 @@ impl Relation {
     }
 
     /// The products of what is in two rows of `other`, in both orders.
-    pub fn join_products(&mut self, other: &Self, one: usize, two: usize) {
+    pub fn add_row_products(&mut self, other: &Self, one: usize, two: usize) {
         let columns = self.columns;
-        for a in (0..columns).filter(|&a| other.has(one, a)) {
-            for b in (0..columns).filter(|&b| other.has(two, b)) {
+        for a in (0..columns).filter(|&a| other.contains(one, a)) {
+            for b in (0..columns).filter(|&b| other.contains(two, b)) {
                 self.set(a, b);
                 self.set(b, a);
             }
@@ -139,7 +139,7 @@ impl Relation {
     }
 
     /// Whether an entry may differ from zero.
-    pub fn has(&self, row: usize, column: usize) -> bool {
+    pub fn contains(&self, row: usize, column: usize) -> bool {
         self.row(row).get(column).copied().unwrap_or(false)
     }
 
@@ -151,7 +151,7 @@ impl Relation {
     }
 
     /// What is in `row` of `other` is in `to` too; whether that is news.
-    pub fn join(&mut self, to: usize, other: &Self, row: usize) -> bool {
+    pub fn add_row(&mut self, to: usize, other: &Self, row: usize) -> bool {
         let mut news = false;
         let range = to * self.columns..(to + 1) * self.columns;
         let Some(related) = self.related.get_mut(range) else { return false };
@@ -165,14 +165,14 @@ impl Relation {
     /// The pattern of a block.
     pub fn block(&self, rows: Range<usize>, columns: Range<usize>) -> Sparsity {
         Sparsity::new(rows.len(), columns.len(), |row, column| {
-            self.has(rows.start + row, columns.start + column)
+            self.contains(rows.start + row, columns.start + column)
         })
     }
 
     /// The pattern of a transposed block: `columns` are its rows.
     pub fn transposed_block(&self, rows: Range<usize>, columns: Range<usize>) -> Sparsity {
         Sparsity::new(columns.len(), rows.len(), |row, column| {
-            self.has(rows.start + column, columns.start + row)
+            self.contains(rows.start + column, columns.start + row)
         })
     }
 }

@@ -11,19 +11,19 @@
 
 use super::{Constrained, Inconsistent};
 use crate::error::Argument;
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYX, MatrixYY};
 use crate::model::{ArrayX, Dae, VectorP, VectorX};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Shape, change};
-use crate::structure::means;
+use crate::shape::{Array, Matrix, Outputs, Shape, update_entry};
+use crate::structure::name_matches;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
 /// Iterations after which the values are given up.
-const ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 /// The size of a state that is zero.
-const TINY: f64 = 1e-30;
+const MIN_STATE_SIZE: f64 = 1e-30;
 
 /// States that satisfy the invariants of a model, nearest to given ones.
 ///
@@ -64,7 +64,7 @@ type Invariants<M> = <M as Constrained>::Invariants;
 /// What an iteration works with.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-struct Work<M: Constrained, T: Real> {
+struct ConsistencyWorkspace<M: Constrained, T: Real> {
     v: ArrayV<Invariants<M>, T>,
     y: ArrayY<Invariants<M>, T>,
     jacobian: <Invariants<M> as Function>::Jacobian<T>,
@@ -90,7 +90,7 @@ impl<M: Constrained> Consistent<M> {
     pub fn hold(mut self, name: &'static str) -> Result<Self, Inconsistent> {
         let mut found = false;
         for (held, state) in self.held.as_mut().iter_mut().zip(M::STRUCTURE.x) {
-            if means(name, state) {
+            if name_matches(name, state) {
                 (*held, found) = (true, true);
             }
         }
@@ -110,18 +110,18 @@ impl<M: Constrained> Consistent<M> {
         for (argument, values) in
             [(Argument::X0, x.as_slice()), (Argument::P, p.as_slice()), (Argument::T, &[t])]
         {
-            if let Some((index, value)) = not_finite(values) {
+            if let Some((index, value)) = find_non_finite(values) {
                 let name = crate::finite::name::<M>(argument, index);
                 return Err(Inconsistent::NonFiniteInput { argument, index, name, value });
             }
         }
-        let mut work = Work::<M, T>::new(p, t);
+        let mut work = ConsistencyWorkspace::<M, T>::new(p, t);
         let (mut found, mut last) = (*x, f64::INFINITY);
         let epsilon = T::EPSILON;
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             work.linearise(&self.held, &found)?;
             work.factorise()?;
-            let moved = work.advance(x, &mut found);
+            let moved = work.gauss_newton_step(x, &mut found);
             // Once it is at rounding, it does not shrink any more.
             if moved <= 4.0 * epsilon || (moved < 1e3 * epsilon && moved > 0.5 * last) {
                 return Ok(found);
@@ -129,18 +129,18 @@ impl<M: Constrained> Consistent<M> {
             last = moved;
         }
         work.linearise(&self.held, &found)?;
-        let (output, residual) = work.largest();
-        let (equation, derivative) = origin::<M>(output);
+        let (output, residual) = work.largest_violation();
+        let (equation, derivative) = equation_and_derivative::<M>(output);
         Err(Inconsistent::NotConverged { equation, derivative, residual })
     }
 }
 
 /// The equation that an invariant comes from, and which derivative of it that is.
-fn origin<M: Dae>(output: usize) -> (u32, u32) {
+fn equation_and_derivative<M: Dae>(output: usize) -> (u32, u32) {
     M::STRUCTURE.reduction.and_then(|reduction| reduction.invariant(output)).unwrap_or((output as u32, 0))
 }
 
-impl<M: Constrained, T: Real> Work<M, T> {
+impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
     fn new(p: &VectorP<M, T>, t: T) -> Self {
         let mut work = Self::zeroed();
         let v = work.v.as_mut();
@@ -159,22 +159,22 @@ impl<M: Constrained, T: Real> Work<M, T> {
         self.rows.as_mut_slice().fill(T::ZERO);
         self.held.as_mut().fill(T::ZERO);
         let pattern = &<Invariants<M> as Function>::STRUCTURE.jacobian;
-        let mut bad = not_finite(self.y.as_ref());
+        let mut bad = find_non_finite(self.y.as_ref());
         for ((output, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
             if !value.is_finite() {
                 bad = bad.or(Some((output, value.to_f64())));
             }
             let state = variable.wrapping_sub(nx);
             match (held.as_ref().get(state), x.as_slice().get(state), self.held.as_mut().get_mut(output)) {
-                (Some(false), ..) => change(&mut self.rows, output, state, |_| value),
+                (Some(false), ..) => update_entry(&mut self.rows, output, state, |_| value),
                 (Some(true), Some(x), Some(sum)) => {
-                    *sum = *sum + value.abs() * (x.abs() + T::from_f64(TINY));
+                    *sum = *sum + value.abs() * (x.abs() + T::from_f64(MIN_STATE_SIZE));
                 }
                 _ => {}
             }
         }
         let Some((output, value)) = bad else { return Ok(()) };
-        let (equation, derivative) = origin::<M>(output);
+        let (equation, derivative) = equation_and_derivative::<M>(output);
         Err(Inconsistent::NonFinite { equation, derivative, value })
     }
 
@@ -207,7 +207,7 @@ impl<M: Constrained, T: Real> Work<M, T> {
             // What remains of equal rows is rounding; squares of it say whether anything does.
             let independent = rest.to_f64() * rest.to_f64() > T::EPSILON * whole.to_f64() * whole.to_f64();
             if !independent {
-                let (equation, derivative) = origin::<M>(i);
+                let (equation, derivative) = equation_and_derivative::<M>(i);
                 let residual = self.y[i].to_f64();
                 return Err(Inconsistent::Dependent { equation, derivative, residual });
             }
@@ -221,7 +221,7 @@ impl<M: Constrained, T: Real> Work<M, T> {
 
     /// The next iterate, and by how much it moved, relative to the size of the states; NaN if it is
     /// not finite.
-    fn advance(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
+    fn gauss_newton_step(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
         let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
         let (given, found) = (given.as_slice(), found.as_mut_slice());
         self.step.as_mut().fill(T::ZERO);
@@ -246,14 +246,14 @@ impl<M: Constrained, T: Real> Work<M, T> {
             found[state] = next;
         }
         // A maximum does not show what is not a number.
-        if not_finite(found).is_some() {
+        if find_non_finite(found).is_some() {
             return f64::NAN;
         }
         if size > 0.0 { moved / size } else { moved }
     }
 
     /// The invariant that is violated most.
-    fn largest(&self) -> (usize, f64) {
+    fn largest_violation(&self) -> (usize, f64) {
         let mut largest = (0, 0.0f64);
         for (output, value) in self.y.as_ref().iter().enumerate() {
             if value.to_f64().abs() > largest.1.abs() {

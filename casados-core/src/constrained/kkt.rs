@@ -12,42 +12,42 @@
 
 use super::Projectable;
 use crate::error::{Error, Place, Quantity};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::model::{VectorP, VectorX};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Shape, change, entry};
+use crate::shape::{Array, Matrix, Outputs, Shape, entry, update_entry};
 use bytemuck::Zeroable;
 
 /// Iterations of Newton's method after which the projection is given up.
-const ITERATIONS: usize = 30;
+const MAX_ITERATIONS: usize = 30;
 
 /// `F`
-pub(super) type Equations<M> = <M as Projectable>::Projection;
+pub(super) type ProjectionFunction<M> = <M as Projectable>::Projection;
 /// How many equations `F` has.
-pub(super) const fn rows<M: Projectable>() -> usize {
-    <Equations<M> as Function>::Outputs::NY
+pub(super) const fn equation_count<M: Projectable>() -> usize {
+    <ProjectionFunction<M> as Function>::Outputs::NY
 }
 /// Where `x̂` begins among the variables `(ẋ, x, ν, x̂, p, t)` of `F`.
-const fn given<M: Projectable>() -> usize {
-    M::Shape::NX + rows::<M>()
+const fn given_states_begin<M: Projectable>() -> usize {
+    M::Shape::NX + equation_count::<M>()
 }
 /// Where `p` begins.
 const fn parameters<M: Projectable>() -> usize {
-    given::<M>() + M::Shape::NX
+    given_states_begin::<M>() + M::Shape::NX
 }
 
 /// The projection at a state.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct Kkt<M: Projectable, T: Real> {
-    v: ArrayV<Equations<M>, T>,
-    f: ArrayY<Equations<M>, T>,
-    jacobian: <Equations<M> as Function>::Jacobian<T>,
+    v: ArrayV<ProjectionFunction<M>, T>,
+    f: ArrayY<ProjectionFunction<M>, T>,
+    jacobian: <ProjectionFunction<M> as Function>::Jacobian<T>,
     /// `K`, and then its factors: `L` with a diagonal of ones, and `U`.
-    factors: MatrixYY<Equations<M>, T>,
+    factors: MatrixYY<ProjectionFunction<M>, T>,
     /// The row that was exchanged with each.
-    exchanged: ArrayY<Equations<M>, usize>,
+    exchanged: ArrayY<ProjectionFunction<M>, usize>,
 }
 
 impl<M: Projectable, T: Real> Kkt<M, T> {
@@ -61,12 +61,12 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         let v = self.v.as_mut();
         v.fill(T::ZERO);
         v[nx..2 * nx].copy_from_slice(x.as_slice());
-        v[given::<M>()..][..nx].copy_from_slice(x.as_slice());
+        v[given_states_begin::<M>()..][..nx].copy_from_slice(x.as_slice());
         v[parameters::<M>()..][..M::Shape::NP].copy_from_slice(p.as_slice());
         v[parameters::<M>() + M::Shape::NP] = t;
-        <Equations<M> as Function>::jacobian_constants::<T>(&mut self.jacobian);
+        <ProjectionFunction<M> as Function>::jacobian_constants::<T>(&mut self.jacobian);
         let mut last = f64::INFINITY;
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             self.linearise()?;
             let mut step = self.f;
             self.solve(&mut step);
@@ -87,24 +87,24 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
             }
             last = relative;
         }
-        Err(self.refusal())
+        Err(self.largest_violation_error())
     }
 
     /// `F`, and `K` with its factors.
     fn linearise(&mut self) -> Result<(), Error> {
-        let (nx, count) = (M::Shape::NX, rows::<M>());
-        <Equations<M> as Function>::value_jacobian::<T>(&self.v, &mut self.f, &mut self.jacobian);
+        let (nx, count) = (M::Shape::NX, equation_count::<M>());
+        <ProjectionFunction<M> as Function>::value_jacobian::<T>(&self.v, &mut self.f, &mut self.jacobian);
         self.factors.as_mut_slice().fill(T::ZERO);
-        let pattern = &<Equations<M> as Function>::STRUCTURE.jacobian;
+        let pattern = &<ProjectionFunction<M> as Function>::STRUCTURE.jacobian;
         for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
             let column = variable.wrapping_sub(nx);
             if column < count {
-                change(&mut self.factors, row, column, |_| value);
+                update_entry(&mut self.factors, row, column, |_| value);
             }
         }
         let finite =
-            [self.f.as_ref(), self.factors.as_slice()].iter().all(|values| not_finite(values).is_none());
-        if finite && self.factorise() { Ok(()) } else { Err(self.refusal()) }
+            [self.f.as_ref(), self.factors.as_slice()].iter().all(|values| find_non_finite(values).is_none());
+        if finite && self.factorise() { Ok(()) } else { Err(self.largest_violation_error()) }
     }
 
     /// # Errors
@@ -113,7 +113,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     pub fn check_parameters(&self) -> Result<(), Error> {
         // Of the invariants, if they have one; those of `Gᵀν` are in the rows before.
         let mut found: Option<(usize, T)> = None;
-        self.by_parameters(|row, _, value| {
+        self.visit_parameter_jacobian(|row, _, value| {
             if !value.is_finite() && found.is_none_or(|(last, _)| last < row) {
                 found = Some((row, value));
             }
@@ -126,7 +126,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 
     /// What is violated most.
-    fn refusal(&self) -> Error {
+    fn largest_violation_error(&self) -> Error {
         let (mut worst, mut residual) = (0, 0.0f64);
         for (output, value) in self.f.as_ref()[M::Shape::NX..].iter().enumerate() {
             let value = value.to_f64();
@@ -140,7 +140,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
 
     /// Gaussian elimination with partial pivoting; whether the matrix is regular.
     fn factorise(&mut self) -> bool {
-        let count = rows::<M>();
+        let count = equation_count::<M>();
         for step in 0..count {
             let mut pivot = step;
             for row in step + 1..count {
@@ -152,7 +152,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
             for column in 0..count {
                 let other = entry(&self.factors, pivot, column);
                 let own = core::mem::replace(&mut self.factors[(step, column)], other);
-                change(&mut self.factors, pivot, column, |_| own);
+                update_entry(&mut self.factors, pivot, column, |_| own);
             }
             let diagonal = self.factors[(step, step)];
             if diagonal == T::ZERO || !diagonal.is_finite() {
@@ -173,8 +173,8 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 
     /// `b = K⁻¹ b`
-    pub fn solve(&self, b: &mut ArrayY<Equations<M>, T>) {
-        let count = rows::<M>();
+    pub fn solve(&self, b: &mut ArrayY<ProjectionFunction<M>, T>) {
+        let count = equation_count::<M>();
         for step in 0..count {
             exchange(b.as_mut(), step, self.exchanged[step]);
         }
@@ -192,8 +192,8 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 
     /// `b = K⁻ᵀ b`
-    fn solve_transposed(&self, b: &mut ArrayY<Equations<M>, T>) {
-        let count = rows::<M>();
+    fn solve_transposed(&self, b: &mut ArrayY<ProjectionFunction<M>, T>) {
+        let count = equation_count::<M>();
         for row in 0..count {
             for column in 0..row {
                 b[row] = b[row] - self.factors[(column, row)] * b[column];
@@ -211,10 +211,15 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 
     /// `d(x, ν)` where the given state changes by `change` and the parameters by `dp`.
-    pub fn direction(&self, change: impl Fn(usize) -> T, dp: impl Fn(usize) -> T) -> ArrayY<Equations<M>, T> {
-        let mut b =
-            ArrayY::<Equations<M>, T>::from_fn(|row| if row < M::Shape::NX { change(row) } else { T::ZERO });
-        self.by_parameters(|row, parameter, value| {
+    pub fn direction(
+        &self,
+        change: impl Fn(usize) -> T,
+        dp: impl Fn(usize) -> T,
+    ) -> ArrayY<ProjectionFunction<M>, T> {
+        let mut b = ArrayY::<ProjectionFunction<M>, T>::from_fn(|row| {
+            if row < M::Shape::NX { change(row) } else { T::ZERO }
+        });
+        self.visit_parameter_jacobian(|row, parameter, value| {
             if let Some(b) = b.as_mut().get_mut(row) {
                 *b = *b - value * dp(parameter);
             }
@@ -224,16 +229,17 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     }
 
     /// `μ` with `Kᵀμ = (λ, 0)`.
-    pub fn multipliers(&self, lambda: &VectorX<M, T>) -> ArrayY<Equations<M>, T> {
+    pub fn multipliers(&self, lambda: &VectorX<M, T>) -> ArrayY<ProjectionFunction<M>, T> {
         let lambda = lambda.as_slice();
-        let mut mu = ArrayY::<Equations<M>, T>::from_fn(|row| lambda.get(row).copied().unwrap_or(T::ZERO));
+        let mut mu =
+            ArrayY::<ProjectionFunction<M>, T>::from_fn(|row| lambda.get(row).copied().unwrap_or(T::ZERO));
         self.solve_transposed(&mut mu);
         mu
     }
 
     /// Visits the entries of `F_p`: row, parameter, value.
-    pub fn by_parameters(&self, mut visit: impl FnMut(usize, usize, T)) {
-        let pattern = &<Equations<M> as Function>::STRUCTURE.jacobian;
+    pub fn visit_parameter_jacobian(&self, mut visit: impl FnMut(usize, usize, T)) {
+        let pattern = &<ProjectionFunction<M> as Function>::STRUCTURE.jacobian;
         for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
             if let Some(parameter) = variable.checked_sub(parameters::<M>()) {
                 visit(row, parameter, value);
@@ -244,10 +250,10 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     /// The entries of the lower triangle of `∇²(μᵀF)` in the order of its pattern.
     pub fn hessian(
         &self,
-        mu: &ArrayY<Equations<M>, T>,
-        hessian: &mut <Equations<M> as Function>::Hessian<T>,
+        mu: &ArrayY<ProjectionFunction<M>, T>,
+        hessian: &mut <ProjectionFunction<M> as Function>::Hessian<T>,
     ) {
-        <Equations<M> as Function>::hessian::<T>(&self.v, mu, hessian);
+        <ProjectionFunction<M> as Function>::hessian::<T>(&self.v, mu, hessian);
     }
 }
 

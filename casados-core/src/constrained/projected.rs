@@ -1,7 +1,7 @@
 //! An integrator whose results satisfy the invariants.
 
 use super::Projectable;
-use super::kkt::{Equations, Kkt, Variable, variable};
+use super::kkt::{Kkt, ProjectionFunction, Variable, variable};
 use crate::error::{Argument, Error};
 use crate::finite::{check_forward, check_named, check_output, check_second};
 use crate::function::{ArrayY, Function};
@@ -11,7 +11,7 @@ use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Plain, Shape, change, entry};
+use crate::shape::{Array, Matrix, Outputs, Plain, Shape, entry, update_entry};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
@@ -53,13 +53,13 @@ pub struct Projected<I: Integrator<Model: Projectable>> {
     /// Those that were set.
     parameters: Option<VectorP<I::Model, I::Number>>,
     time: I::Number,
-    nominal: Place<I, NominalMemory<I::Model, I::Number>>,
+    nominal: NominalStorage<I, NominalMemory<I::Model, I::Number>>,
     forward: <I::Memory as Memory>::Forward<Forward<I::Model, I::Number>>,
     adjoint: <I::Memory as Memory>::Adjoint<Adjoints<I::Model, I::Number>>,
     hessian: <I::Memory as Memory>::Hessian<HessianMemory<I::Model, I::Number>>,
 }
 
-type Place<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
+type NominalStorage<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
 
 /// What every call needs.
 #[derive(Zeroable)]
@@ -82,10 +82,10 @@ impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
 struct HessianMemory<M: Projectable, T: Real> {
     result: Hessian<M, T>,
     /// `d(x, ν)/dw`: columns by `x₀`, `u` and `p`.
-    by_x: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYX<M::Shape, T>,
-    by_u: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYU<M::Shape, T>,
-    by_p: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYP<M::Shape, T>,
-    second: <Equations<M> as Function>::Hessian<T>,
+    by_x: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYX<M::Shape, T>,
+    by_u: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYU<M::Shape, T>,
+    by_p: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYP<M::Shape, T>,
+    second: <ProjectionFunction<M> as Function>::Hessian<T>,
 }
 
 /// `A + B` element by element.
@@ -119,7 +119,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
     ///
     /// # Errors
     /// [`Error::ParametersNotSet`]
-    fn begin(&mut self) -> Result<VectorP<M, T>, Error> {
+    fn prepare_integrator(&mut self) -> Result<VectorP<M, T>, Error> {
         self.integrator.set_time(self.time)?;
         match &self.parameters {
             Some(p) => {
@@ -139,8 +139,8 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         h: T,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&mut NominalMemory<M, T>, Error> {
-        let p = self.begin()?;
-        let end = *self.integrator.solve_along(x0, u, h, along)?;
+        let p = self.prepare_integrator()?;
+        let end = *self.integrator.solve_with_quadrature(x0, u, h, along)?;
         let memory = I::Memory::nominal(&mut self.nominal)?;
         memory.result = end;
         memory.kkt.project(&mut memory.result.x, &p, self.time + h)?;
@@ -149,7 +149,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
 }
 
 /// `V ← dx₊/dw` of one block of columns; `of(row, column)` receives the rows of `d(x, ν)/dw`.
-fn directions<M: Projectable, T: Real, V: Matrix<T>>(
+fn write_projected_columns<M: Projectable, T: Real, V: Matrix<T>>(
     kkt: &Kkt<M, T>,
     block: &mut V,
     parameters: bool,
@@ -192,7 +192,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         self.integrator.statistics()
     }
 
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -202,7 +202,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         Ok(&self.project(x0, u, h, along)?.result)
     }
 
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -212,21 +212,21 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithForward,
     {
-        let p = self.begin()?;
-        let forward = self.integrator.forward_along(x0, u, h, along)?;
+        let p = self.prepare_integrator()?;
+        let forward = self.integrator.forward_with_quadrature(x0, u, h, along)?;
         let result = I::Memory::forward(&mut self.forward)?;
         result.clone_from(forward);
         let memory = I::Memory::nominal(&mut self.nominal)?;
         memory.kkt.project(&mut result.nominal.x, &p, self.time + h)?;
         memory.kkt.check_parameters()?;
-        directions(&memory.kkt, &mut result.dx_dx0, false, |_, _, _| {});
-        directions(&memory.kkt, &mut result.dx_du, false, |_, _, _| {});
-        directions(&memory.kkt, &mut result.dx_dp, true, |_, _, _| {});
+        write_projected_columns(&memory.kkt, &mut result.dx_dx0, false, |_, _, _| {});
+        write_projected_columns(&memory.kkt, &mut result.dx_du, false, |_, _, _| {});
+        write_projected_columns(&memory.kkt, &mut result.dx_dp, true, |_, _, _| {});
         check_forward(result, 0)?;
         Ok(result)
     }
 
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -245,13 +245,13 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         let mut of_integrator = VectorX::<M, T>::zeroed();
         of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
-        let adjoint = self.integrator.adjoint_along(x0, u, h, &of_integrator, along)?;
+        let adjoint = self.integrator.adjoint_with_quadrature(x0, u, h, &of_integrator, along)?;
         let result = I::Memory::adjoint(&mut self.adjoint)?;
         result.clone_from(adjoint);
         result.nominal.x = x;
         let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
         let gradient = result.grad_p.as_mut_slice();
-        kkt.by_parameters(|row, parameter, value| {
+        kkt.visit_parameter_jacobian(|row, parameter, value| {
             if let (Some(gradient), Some(mu)) = (gradient.get_mut(parameter), mu.as_ref().get(row)) {
                 *gradient = *gradient - value * *mu;
             }
@@ -260,7 +260,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         Ok(result)
     }
 
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -279,11 +279,11 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         let mut of_integrator = VectorX::<M, T>::zeroed();
         of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
-        let hessian = self.integrator.hessian_along(x0, u, h, &of_integrator, along)?;
+        let hessian = self.integrator.hessian_with_quadrature(x0, u, h, &of_integrator, along)?;
         let memory = I::Memory::hessian(&mut self.hessian)?;
         memory.result.clone_from(hessian);
         let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
-        memory.finish(kkt, &mu, x);
+        memory.project_derivatives(kkt, &mu, x);
         let result = &memory.result;
         check_forward(&result.first.forward, 0)?;
         check_output(result.first.grad_p.as_slice(), 0)?;
@@ -294,15 +294,26 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
 
 impl<M: Projectable, T: Real> HessianMemory<M, T> {
     /// What the projection does to derivatives.
-    fn finish(&mut self, kkt: &Kkt<M, T>, mu: &ArrayY<Equations<M>, T>, x: VectorX<M, T>) {
+    fn project_derivatives(
+        &mut self,
+        kkt: &Kkt<M, T>,
+        mu: &ArrayY<ProjectionFunction<M>, T>,
+        x: VectorX<M, T>,
+    ) {
         let Self { result, by_x, by_u, by_p, second } = self;
         let first = &mut result.first;
         first.forward.nominal.x = x;
-        directions(kkt, &mut first.forward.dx_dx0, false, |row, column, value| by_x[(row, column)] = value);
-        directions(kkt, &mut first.forward.dx_du, false, |row, column, value| by_u[(row, column)] = value);
-        directions(kkt, &mut first.forward.dx_dp, true, |row, column, value| by_p[(row, column)] = value);
+        write_projected_columns(kkt, &mut first.forward.dx_dx0, false, |row, column, value| {
+            by_x[(row, column)] = value
+        });
+        write_projected_columns(kkt, &mut first.forward.dx_du, false, |row, column, value| {
+            by_u[(row, column)] = value
+        });
+        write_projected_columns(kkt, &mut first.forward.dx_dp, true, |row, column, value| {
+            by_p[(row, column)] = value
+        });
         let mut gradient = VectorP::<M, T>::zeroed();
-        kkt.by_parameters(|row, parameter, value| {
+        kkt.visit_parameter_jacobian(|row, parameter, value| {
             let gradient = gradient.as_mut_slice().get_mut(parameter);
             if let (Some(gradient), Some(mu)) = (gradient, mu.as_ref().get(row)) {
                 *gradient = *gradient - value * *mu;
@@ -327,7 +338,7 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
                 },
             })
         };
-        let pattern = &<Equations<M> as Function>::STRUCTURE.hessian;
+        let pattern = &<ProjectionFunction<M> as Function>::STRUCTURE.hessian;
         for ((i, j), &value) in pattern.iter().zip(second.as_ref()) {
             let (a, b) = (row_of(i), row_of(j));
             subtract(result, &a, &b, if i == j { value * T::from_f64(0.5) } else { value });
@@ -337,7 +348,7 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
 
 /// `H −= value (a bᵀ + b aᵀ)`
 fn subtract<M: Dae, T: Real>(result: &mut Hessian<M, T>, a: &ArrayW<M, T>, b: &ArrayW<M, T>, value: T) {
-    let (a, b) = (parts::<M, T>(a), parts::<M, T>(b));
+    let (a, b) = (split_row::<M, T>(a), split_row::<M, T>(b));
     let [x, u, p] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
     block(&mut result.h_xx, x, x, value);
     block(&mut result.h_xu, x, u, value);
@@ -348,7 +359,7 @@ fn subtract<M: Dae, T: Real>(result: &mut Hessian<M, T>, a: &ArrayW<M, T>, b: &A
 }
 
 /// What belongs to `x₀`, `u` and `p`.
-fn parts<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
+fn split_row<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
     let (x, rest) = row.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
     let (u, p) = rest.split_at_checked(M::Shape::NU).unwrap_or_default();
     [x, u, p]
@@ -358,7 +369,7 @@ fn parts<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
 fn block<T: Real, V: Matrix<T>>(matrix: &mut V, rows: [&[T]; 2], columns: [&[T]; 2], value: T) {
     for (j, (a_j, b_j)) in columns[0].iter().zip(columns[1]).enumerate() {
         for (i, (a_i, b_i)) in rows[0].iter().zip(rows[1]).enumerate() {
-            change(matrix, i, j, |element| element - value * (*a_i * *b_j + *b_i * *a_j));
+            update_entry(matrix, i, j, |element| element - value * (*a_i * *b_j + *b_i * *a_j));
         }
     }
 }

@@ -6,14 +6,14 @@
 //!
 //! The patterns of a dual model are dense: what it depends on is known only when it has run.
 
+mod dependency_tracking;
 mod passes;
 mod structure;
-mod tracked;
 
+pub use dependency_tracking::Tracked;
 pub use num_dual::{DualNum, DualNumCopy};
 pub use passes::Passes;
 pub use structure::{hessian_pattern, jacobian_pattern};
-pub use tracked::Tracked;
 
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Tangent};

@@ -1,6 +1,6 @@
 //! Which variables are differentiated in one evaluation.
 
-use super::tracked::{Tape, Tracked};
+use super::dependency_tracking::{Tape, Tracked};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -38,10 +38,10 @@ impl Passes {
                 }
             });
         });
-        if tape.looked() {
+        if tape.depends_on_value() {
             depends.iter_mut().for_each(|row| row.fill(true));
         }
-        let interacts = |a: usize, b: usize| tape.looked() || tape.interacts(a, b);
+        let interacts = |a: usize, b: usize| tape.depends_on_value() || tape.interacts(a, b);
         Self::colour(columns, &depends, interacts)
     }
 

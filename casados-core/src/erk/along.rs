@@ -43,7 +43,7 @@ impl<M: Ode, T: Real> Beside<M, T> for OptionalIntegrand<'_, '_, M, T> {
     }
 
     fn begin(&mut self) {
-        crate::quadrature::begin(self);
+        crate::quadrature::reset_integrand(self);
     }
 
     fn value(&mut self, v: &[T], [h, b]: [T; 2], at: Place) -> Result<(), Error> {
@@ -103,7 +103,7 @@ impl<M: Ode, T: Real> Beside<M, T> for OptionalIntegrand<'_, '_, M, T> {
     }
 
     fn finish(&mut self) -> Result<(), Error> {
-        crate::quadrature::finish(self)
+        crate::quadrature::finish_integrand(self)
     }
 }
 

@@ -31,7 +31,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         Self::statistics(self)
     }
 
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -42,7 +42,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         Ok(self.engine.solve(&grid, &mut along)?.1)
     }
 
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -56,7 +56,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         Ok(self.engine.forward(&grid, &mut Whole, &mut along)?.1)
     }
 
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -70,7 +70,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         self.backward(x0, u, h, lambda, along)
     }
 
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,

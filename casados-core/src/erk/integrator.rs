@@ -187,7 +187,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Input or model values that are not finite, parameters that were never set, overflow, and in
     /// the first call of a mode [`Error::OutOfMemory`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
-        self.solve_along(x0, u, h, None)
+        self.solve_with_quadrature(x0, u, h, None)
     }
 
     /// Checks the input, and goes to the start of the interval.

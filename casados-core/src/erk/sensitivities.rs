@@ -29,7 +29,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.forward_along(x0, u, h, None)
+        self.forward_with_quadrature(x0, u, h, None)
     }
 
     /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
@@ -195,7 +195,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        self.hessian_along(x0, u, h, lambda, None)
+        self.hessian_with_quadrature(x0, u, h, lambda, None)
     }
 }
 

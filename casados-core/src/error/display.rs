@@ -27,7 +27,7 @@ impl fmt::Display for Argument {
 
 impl Quantity {
     /// What is not finite, and its value.
-    fn write(self, f: &mut fmt::Formatter<'_>, equation: usize, value: f64) -> fmt::Result {
+    fn fmt_value(self, f: &mut fmt::Formatter<'_>, equation: usize, value: f64) -> fmt::Result {
         match self {
             Quantity::Residual => write!(f, "equation {equation} of the model is {value}"),
             Quantity::Jacobian => write!(f, "a derivative of equation {equation} of the model is {value}"),
@@ -74,7 +74,7 @@ impl fmt::Display for Error {
                 f.write_str("the start values are `Start::Given`: call `set_start` before the first step")
             }
             Error::NonFiniteModel { quantity, equation, value, at } => {
-                quantity.write(f, equation, value)?;
+                quantity.fmt_value(f, equation, value)?;
                 write!(
                     f,
                     " at {at}: look for roots, logarithms or quotients outside of their domains, or take shorter steps"
@@ -87,7 +87,7 @@ impl fmt::Display for Error {
                 started: Started { unknown, value: start },
                 at,
             } => {
-                quantity.write(f, equation, value)?;
+                quantity.fmt_value(f, equation, value)?;
                 write!(f, " at {at}; `{unknown}` started at {start}: {OTHER_START}")
             }
             Error::Singular { unknown, at } => write!(

@@ -1,11 +1,11 @@
 //! What integrators have in common: the calls of one interval.
 
-pub(crate) mod blocks;
+pub(crate) mod chain_rule;
 mod divided;
-mod with;
+mod with_quadrature;
 
 pub use divided::Divided;
-pub use with::With;
+pub use with_quadrature::With;
 
 use crate::error::Error;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
@@ -69,7 +69,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -80,7 +80,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -93,7 +93,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -107,7 +107,7 @@ pub trait Integrator {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -128,7 +128,7 @@ pub trait Integrator {
         u: &U<Self>,
         h: Self::Number,
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error> {
-        self.solve_along(x0, u, h, None)
+        self.solve_with_quadrature(x0, u, h, None)
     }
     /// The solution, and its derivatives with respect to `x₀`, `u` and `p`.
     ///
@@ -143,7 +143,7 @@ pub trait Integrator {
     where
         Self::Memory: WithForward,
     {
-        self.forward_along(x0, u, h, None)
+        self.forward_with_quadrature(x0, u, h, None)
     }
     /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`.
     ///
@@ -159,7 +159,7 @@ pub trait Integrator {
     where
         Self::Memory: WithAdjoint<1>,
     {
-        self.adjoint_along(x0, u, h, lambda, None)
+        self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`.
     ///
@@ -175,7 +175,7 @@ pub trait Integrator {
     where
         Self::Memory: WithHessian,
     {
-        self.hessian_along(x0, u, h, lambda, None)
+        self.hessian_with_quadrature(x0, u, h, lambda, None)
     }
     /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
     /// those of the solution; see [`quadrature`](crate::quadrature).

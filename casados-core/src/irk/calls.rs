@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::integrator;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{OptionalIntegrand, begin, finish};
+use crate::quadrature::{OptionalIntegrand, finish_integrand, reset_integrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -33,24 +33,24 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         self.run.statistics
     }
 
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         self.run.steps(&Arguments { x0, u, h }, |parts, n, step, _| match &mut along {
             Some(integrand) => parts.work.along_value(parts.coefficients, n, step, &mut **integrand),
             None => Ok(()),
         })?;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         self.sweep = None;
         Ok(&self.run.keep()?.result)
     }
 
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -64,7 +64,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         self.keep_forward()
     }
 
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -78,7 +78,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
     }
 
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -89,6 +89,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
     where
         W: WithHessian,
     {
-        Self::hessian_along(self, x0, u, h, lambda, &[], along)
+        Self::hessian_with_quadrature(self, x0, u, h, lambda, &[], along)
     }
 }

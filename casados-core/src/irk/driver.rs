@@ -4,7 +4,7 @@
 use super::step::Scheme;
 use super::workspace::{Step, Work};
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, check_named, not_finite};
+use crate::finite::{check_input, check_named, find_non_finite};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::stages::initial_guess::InitialGuess;
 #[cfg(feature = "alloc")]
@@ -70,7 +70,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         }
         let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::HAS_MEMORY);
         let ends = [&coefficients.start, &coefficients.end];
-        if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
+        if M::Shape::NZ > 0 && ends.iter().any(|weights| find_non_finite(*weights).is_some()) {
             return Err(Error::NoInterpolation);
         }
         Ok(Self::empty(options, coefficients, T::ZERO))
@@ -236,7 +236,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn set_stages_of_steps(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         for (step, y) in self.last_steps()?.iter_mut().zip(stages) {
-            crate::shape::assign(&mut *step.y, y);
+            crate::shape::copy_into(&mut *step.y, y);
         }
         (self.warm, self.solved) = (true, false);
         Ok(())

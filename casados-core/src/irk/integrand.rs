@@ -150,6 +150,6 @@ impl<'a, M: Dae, B, const S: usize, T: Real, W: WithHessian, Q: Integrand<M, T>>
         lambda: &VectorX<M, T>,
         nu: &VectorZ<M, T>,
     ) -> Result<&'a Hessian<M, T>, Error> {
-        self.integrator.hessian_along(x0, u, h, lambda, nu.as_slice(), Some(self.integrand))
+        self.integrator.hessian_with_quadrature(x0, u, h, lambda, nu.as_slice(), Some(self.integrand))
     }
 }

@@ -234,7 +234,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     #[cfg(feature = "alloc")]
     pub(crate) fn copy_stages(&mut self, to: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         for (y, step) in to.iter_mut().zip(self.run.last()?.steps) {
-            crate::shape::assign(y, &step.y);
+            crate::shape::copy_into(y, &step.y);
         }
         Ok(())
     }
@@ -260,7 +260,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// See [`Integrator`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
-        self.solve_along(x0, u, h, None)
+        self.solve_with_quadrature(x0, u, h, None)
     }
 
     /// The solution at the time `t`, as the model sees it, inside the interval of the last

@@ -6,7 +6,7 @@ use super::stages::compensated;
 use super::stages::initial_guess::{InitialGuess, stay};
 use super::workspace::{Linearization, Step, Validity, Work};
 use crate::error::{Error, Place};
-use crate::finite::{check_output, not_finite};
+use crate::finite::{check_output, find_non_finite};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::linalg::kernels;
@@ -14,7 +14,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Matrix, Shape, assign};
+use crate::shape::{Matrix, Shape, copy_into};
 use crate::statistics::Statistics;
 
 /// How an interval is integrated.
@@ -82,7 +82,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             step.x = self.x;
             let exact = self.solve(scheme, n, before, step, statistics)?;
             self.advance(scheme.coefficients, scheme.options.compensated, step, n, count);
-            if let Some((index, _)) = not_finite(self.x.as_ref()) {
+            if let Some((index, _)) = find_non_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
             after(self, n, step, exact, statistics)?;
@@ -203,7 +203,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let Linearization { jacobian, factors } = &mut self.linear;
             let factors = match to {
                 Some(to) => {
-                    assign(&mut to.jacobian, jacobian);
+                    copy_into(&mut to.jacobian, jacobian);
                     &mut to.factors
                 }
                 None => factors,

@@ -6,7 +6,7 @@ use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Lanes, Strided};
-use crate::shape::{Aligned, Plain, assign, copy};
+use crate::shape::{Aligned, Plain, copy, copy_into};
 use bytemuck::Zeroable;
 
 /// One step: all that is needed to find out anything else about it.
@@ -114,7 +114,7 @@ copy!([M: Dae, T: Plain] Inputs<M, T>);
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     /// Copies what holds.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        assign(&mut self.jacobian, &other.jacobian);
+        copy_into(&mut self.jacobian, &other.jacobian);
         self.factors.copy_from(&other.factors);
     }
 }

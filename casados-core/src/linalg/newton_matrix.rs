@@ -12,7 +12,7 @@ use crate::memory::{Fallback, OptionalPlace, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
 use crate::plan::{self, Known, Plan, PlanOf, Table};
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Aligned, Array, Plain, Shape, assign};
+use crate::shape::{Aligned, Array, Plain, Shape, copy_into};
 use bytemuck::Zeroable;
 
 /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
@@ -92,9 +92,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn copy_from(&mut self, other: &Self) {
         self.is_dense = other.is_dense;
         if let (Some(to), Some(from)) = (self.dense.get_mut(), other.dense()) {
-            assign(to, from);
+            copy_into(to, from);
         } else {
-            assign(&mut self.blocks, &other.blocks);
+            copy_into(&mut self.blocks, &other.blocks);
         }
     }
 }

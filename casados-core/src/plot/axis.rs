@@ -55,13 +55,13 @@ impl Axis {
                 }
             }
         };
-        let (low, high) = sensible(low, high);
+        let (low, high) = nonempty_range(low, high);
         Scale { is_log: self.is_log, low, high, from: pixels.start, to: pixels.end }
     }
 }
 
 /// A range with a length, whatever is given.
-fn sensible(low: f64, high: f64) -> (f64, f64) {
+fn nonempty_range(low: f64, high: f64) -> (f64, f64) {
     if !(low.is_finite() && high.is_finite()) {
         return (0.0, 1.0);
     }
@@ -78,12 +78,12 @@ impl Scale {
     /// The pixel of a number; not finite if it has none.
     pub fn at(&self, value: f64) -> f64 {
         let value = if self.is_log { value.log10() } else { value };
-        self.from + self.share(value) * (self.to - self.from)
+        self.from + self.fraction_of_range(value) * (self.to - self.from)
     }
 
     /// Where a number, or an exponent, lies between both ends: in halves, whose difference is a
     /// number.
-    fn share(&self, value: f64) -> f64 {
+    fn fraction_of_range(&self, value: f64) -> f64 {
         (0.5 * value - 0.5 * self.low) / (0.5 * self.high - 0.5 * self.low)
     }
 
@@ -97,7 +97,7 @@ impl Scale {
     /// Whether a number is on the axis.
     pub fn contains(&self, value: f64) -> bool {
         let value = if self.is_log { value.log10() } else { value };
-        (-1e-9..=1.0 + 1e-9).contains(&self.share(value))
+        (-1e-9..=1.0 + 1e-9).contains(&self.fraction_of_range(value))
     }
 
     /// Makes the range so long that a pixel is worth `unit`.
@@ -123,14 +123,14 @@ impl Scale {
         if decades >= 3 {
             let every = (decades as usize).div_ceil(count.max(2)) as i32;
             let shown = (first..=last).filter(|exponent| exponent.rem_euclid(every) == 0);
-            return shown.map(|exponent| (decade(exponent), power(exponent))).collect();
+            return shown.map(|exponent| (power_of_ten(exponent), power_of_ten_text(exponent))).collect();
         }
         let mut all = Vec::new();
         for exponent in first - 1..=last + 1 {
             for digit in [1.0, 2.0, 5.0] {
-                let value = digit * decade(exponent);
+                let value = digit * power_of_ten(exponent);
                 if value.is_finite() && self.contains(value) {
-                    all.push((value, short(value)));
+                    all.push((value, fixed_point_text(value)));
                 }
             }
         }
@@ -139,7 +139,7 @@ impl Scale {
 }
 
 /// A power of ten, also where it is denormal: `powi` divides by its inverse, which is infinite.
-fn decade(exponent: i32) -> f64 {
+fn power_of_ten(exponent: i32) -> f64 {
     if exponent < -300 { 10f64.powf(f64::from(exponent)) } else { 10f64.powi(exponent) }
 }
 
@@ -162,7 +162,7 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     all.map(|value| {
         let text = match value {
             0.0 => "0".to_string(),
-            _ if is_wide => scientific(value, precision),
+            _ if is_wide => scientific_text(value, precision),
             _ => format!("{value:.digits$}"),
         };
         (value, text)
@@ -171,22 +171,22 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
 }
 
 /// With three digits.
-pub(super) fn rounded(value: f64) -> String {
+pub(super) fn three_digit_text(value: f64) -> String {
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
-    short(if unit > 0.0 && unit.is_finite() { (value / unit).round() * unit } else { value })
+    fixed_point_text(if unit > 0.0 && unit.is_finite() { (value / unit).round() * unit } else { value })
 }
 
 /// With four digits behind the point at most.
-pub(super) fn short(value: f64) -> String {
+pub(super) fn fixed_point_text(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e5).contains(&value.abs()) {
-        return scientific(value, 3);
+        return scientific_text(value, 3);
     }
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
 /// With a power of ten, and digits behind the point as far as they are not zero.
-fn scientific(value: f64, digits: usize) -> String {
+fn scientific_text(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let short = if digits > 0 { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
@@ -194,7 +194,7 @@ fn scientific(value: f64, digits: usize) -> String {
 }
 
 /// A power of ten.
-fn power(exponent: i32) -> String {
+fn power_of_ten_text(exponent: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',
         '0' => '⁰',
@@ -209,7 +209,7 @@ fn power(exponent: i32) -> String {
         _ => '⁹',
     };
     match exponent {
-        -2..=3 => short(10f64.powi(exponent)),
+        -2..=3 => fixed_point_text(10f64.powi(exponent)),
         _ => format!("10{}", exponent.to_string().chars().map(raised).collect::<String>()),
     }
 }
@@ -218,22 +218,22 @@ fn power(exponent: i32) -> String {
 mod tests {
     use super::*;
 
-    fn texts(low: f64, high: f64, count: usize) -> Vec<String> {
+    fn tick_texts(low: f64, high: f64, count: usize) -> Vec<String> {
         ticks(low, high, count).into_iter().map(|(_, text)| text).collect()
     }
 
     #[test]
     fn round_numbers_stand_at_an_axis() {
-        assert_eq!(texts(-0.1, 1.05, 5), ["0", "0.5", "1.0"]);
-        assert_eq!(texts(0.0, 10.0, 5), ["0", "2", "4", "6", "8", "10"]);
-        assert_eq!(texts(1.7, 1.9, 4), ["1.70", "1.75", "1.80", "1.85", "1.90"]);
-        assert_eq!(texts(0.0, 4e6, 4), ["0", "1e6", "2e6", "3e6", "4e6"]);
-        assert_eq!(texts(0.0, 2e-5, 2), ["0", "1e-5", "2e-5"]);
+        assert_eq!(tick_texts(-0.1, 1.05, 5), ["0", "0.5", "1.0"]);
+        assert_eq!(tick_texts(0.0, 10.0, 5), ["0", "2", "4", "6", "8", "10"]);
+        assert_eq!(tick_texts(1.7, 1.9, 4), ["1.70", "1.75", "1.80", "1.85", "1.90"]);
+        assert_eq!(tick_texts(0.0, 4e6, 4), ["0", "1e6", "2e6", "3e6", "4e6"]);
+        assert_eq!(tick_texts(0.0, 2e-5, 2), ["0", "1e-5", "2e-5"]);
         // Neighbours differ, however close they are.
-        assert_eq!(texts(1.79951, 1.79953, 2), ["1.79951", "1.79952", "1.79953"]);
-        assert_eq!(texts(1.0e6 + 100.0, 1.0e6 + 300.0, 2), ["1.0001e6", "1.0002e6", "1.0003e6"]);
+        assert_eq!(tick_texts(1.79951, 1.79953, 2), ["1.79951", "1.79952", "1.79953"]);
+        assert_eq!(tick_texts(1.0e6 + 100.0, 1.0e6 + 300.0, 2), ["1.0001e6", "1.0002e6", "1.0003e6"]);
         assert_eq!(
-            (rounded(8.6572), rounded(-1234.5), rounded(0.0)),
+            (three_digit_text(8.6572), three_digit_text(-1234.5), three_digit_text(0.0)),
             ("8.66".into(), "-1230".into(), "0".into())
         );
     }

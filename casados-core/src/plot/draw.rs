@@ -1,9 +1,9 @@
 //! Panels become shapes.
 
-use super::axis::{Scale, rounded};
+use super::axis::{Scale, three_digit_text};
 use super::curve::Curve;
 use super::panel::Panel;
-use super::svg::{Anchor, Canvas, Colour, LETTERS, Point, Stroke, width};
+use super::svg::{Anchor, Canvas, Colour, FONT_HEIGHT, Point, Stroke, text_width};
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -17,7 +17,7 @@ pub(super) struct Area {
 }
 
 /// Pixels between two ticks, about.
-const APART: [f64; 2] = [85.0, 32.0];
+const TICK_SPACING: [f64; 2] = [85.0, 32.0];
 /// Pixels of a row of the legend, and of the scale of colours.
 const ROW: f64 = 18.0;
 const BAR: f64 = 84.0;
@@ -26,7 +26,7 @@ const GAP: f64 = 8.0;
 const SHADES: usize = 32;
 
 impl Area {
-    fn inside(&self, left: f64, top: f64, right: f64, bottom: f64) -> Self {
+    fn shrunk_by(&self, left: f64, top: f64, right: f64, bottom: f64) -> Self {
         Self {
             x: self.x + left,
             y: self.y + top,
@@ -45,7 +45,7 @@ fn legend(series: &[(&Curve, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f6
             continue;
         }
         let stroke = Stroke { colour: *colour, width: series.width, dashed: series.dashed };
-        let width = 32.0 + width(&series.name) + 12.0;
+        let width = 32.0 + text_width(&series.name) + 12.0;
         if right + width > room {
             rows.push(Vec::new());
             right = 0.0;
@@ -59,13 +59,13 @@ fn legend(series: &[(&Curve, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f6
 }
 
 /// The least and the largest of what decides about colours.
-pub(super) fn span<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
+pub(super) fn value_range<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
     let finite = values.copied().filter(|value| value.is_finite());
     finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// A line whose colour changes: pieces of the same shade.
-pub(super) fn gradient(
+pub(super) fn draw_coloured_line(
     canvas: &mut Canvas,
     points: &[Point],
     values: &[f64],
@@ -93,15 +93,19 @@ pub(super) fn gradient(
 pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high): (f64, f64)) {
     let (left, top, height) = (area.x + area.width + 14.0, area.y + 18.0, 0.7 * area.height);
     canvas.group("scale", name, |canvas| {
-        canvas.words((left - 2.0, area.y + 6.0), name, Anchor::Start);
+        canvas.draw_text((left - 2.0, area.y + 6.0), name, Anchor::Start);
         let step = height / SHADES as f64;
         for i in 0..SHADES {
             let colour = Colour::mix(1.0 - i as f64 / (SHADES - 1) as f64);
             canvas.rectangle((left, top + step * i as f64), (10.0, step + 0.3), Some(colour), None);
         }
         for share in [0.0, 0.5, 1.0] {
-            let text = rounded(low + share * (high - low));
-            canvas.words((left + 15.0, top + height * (1.0 - share) + 0.35 * LETTERS), &text, Anchor::Start);
+            let text = three_digit_text(low + share * (high - low));
+            canvas.draw_text(
+                (left + 15.0, top + height * (1.0 - share) + 0.35 * FONT_HEIGHT),
+                &text,
+                Anchor::Start,
+            );
         }
     });
 }
@@ -131,7 +135,7 @@ impl Panel {
                 (series, colour)
             })
             .collect();
-        let values = Some(span(self.series.iter().flat_map(|series| &series.values)));
+        let values = Some(value_range(self.series.iter().flat_map(|series| &series.values)));
         let values = values.filter(|(low, high)| low <= high);
         let legend = legend(&coloured, area.width - 40.0);
         let begin = if self.title.is_empty() { 6.0 } else { 28.0 };
@@ -144,16 +148,16 @@ impl Panel {
     /// Pixels at the left of the axes: what numbers and the label take.
     pub(super) fn left(&self, area: Area) -> f64 {
         let Layout { top, bottom, right, .. } = self.layout(area);
-        let inside = area.inside(0.0, top, right, bottom);
-        let numbers = self.y_scale(inside).ticks((inside.height / APART[1]) as usize);
-        let widest = numbers.iter().map(|(_, text)| width(text)).fold(0.0, f64::max);
+        let inside = area.shrunk_by(0.0, top, right, bottom);
+        let numbers = self.y_scale(inside).ticks((inside.height / TICK_SPACING[1]) as usize);
+        let widest = numbers.iter().map(|(_, text)| text_width(text)).fold(0.0, f64::max);
         GAP + widest + 6.0 + if self.y.label.is_empty() { 0.0 } else { 20.0 }
     }
 
     /// With room at the left, of which there may be more than is needed.
     pub(super) fn draw(&self, canvas: &mut Canvas, area: Area, left: f64) {
         let layout = self.layout(area);
-        let inside = area.inside(left, layout.top, layout.right, layout.bottom);
+        let inside = area.shrunk_by(left, layout.top, layout.right, layout.bottom);
         let (x, y) = self.scales(inside);
         canvas.group("panel", &self.title, |canvas| {
             canvas.heading((area.x + left, area.y + 18.0), &self.title);
@@ -161,7 +165,7 @@ impl Panel {
             self.draw_axes(canvas, (area.x, inside), [&x, &y]);
             let data = |canvas: &mut Canvas| self.draw_data(canvas, inside, &layout, [&x, &y]);
             if self.x.given.is_some() || self.y.given.is_some() {
-                canvas.inside((inside.x, inside.y), (inside.width, inside.height), data);
+                canvas.clipped((inside.x, inside.y), (inside.width, inside.height), data);
             } else {
                 data(canvas);
             }
@@ -184,7 +188,7 @@ impl Panel {
             canvas.group("series", &series.name, |canvas| series.draw(canvas, [x, y], *colour, values));
         }
         for (at, words) in &self.texts {
-            canvas.words((x.at(at.0) + 5.0, y.at(at.1) - 5.0), words, Anchor::Start);
+            canvas.draw_text((x.at(at.0) + 5.0, y.at(at.1) - 5.0), words, Anchor::Start);
         }
     }
 
@@ -211,32 +215,32 @@ impl Panel {
         let (right, bottom) = (inside.x + inside.width, inside.y + inside.height);
         let grid = Stroke::new(Colour::GRID, 1.0);
         canvas.group("axes", "", |canvas| {
-            for (value, text) in self.x.ticks(x, (inside.width / APART[0]) as usize) {
+            for (value, text) in self.x.ticks(x, (inside.width / TICK_SPACING[0]) as usize) {
                 let at = x.at(value);
                 canvas.line(&[(at, inside.y), (at, bottom)], grid);
-                canvas.words((at, bottom + 16.0), &text, Anchor::Middle);
+                canvas.draw_text((at, bottom + 16.0), &text, Anchor::Middle);
             }
-            for (value, text) in y.ticks((inside.height / APART[1]) as usize) {
+            for (value, text) in y.ticks((inside.height / TICK_SPACING[1]) as usize) {
                 let at = y.at(value);
                 canvas.line(&[(inside.x, at), (right, at)], grid);
-                canvas.words((inside.x - 6.0, at + 0.35 * LETTERS), &text, Anchor::End);
+                canvas.draw_text((inside.x - 6.0, at + 0.35 * FONT_HEIGHT), &text, Anchor::End);
             }
             let size = (inside.width, inside.height);
             canvas.rectangle((inside.x, inside.y), size, None, Some(Colour::INK));
-            canvas.words((inside.x + 0.5 * inside.width, bottom + 35.0), &self.x.label, Anchor::Middle);
-            canvas.upright((border + LETTERS + 2.0, inside.y + 0.5 * inside.height), &self.y.label);
+            canvas.draw_text((inside.x + 0.5 * inside.width, bottom + 35.0), &self.x.label, Anchor::Middle);
+            canvas.vertical_text((border + FONT_HEIGHT + 2.0, inside.y + 0.5 * inside.height), &self.y.label);
         });
     }
 
     /// Strokes of one length, each from a dot on.
     fn draw_field(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2]) {
-        const EVERY: f64 = 22.0;
+        const ARROW_SPACING: f64 = 22.0;
         let Some(field) = self.field else { return };
         let (wide, high) = ((x.to - x.from).abs(), (y.to - y.from).abs());
         let mut strokes = Vec::new();
-        for i in 0..(wide / EVERY) as usize {
-            for j in 0..(high / EVERY) as usize {
-                let at = (x.from + EVERY * (i as f64 + 0.5), y.to + EVERY * (j as f64 + 0.5));
+        for i in 0..(wide / ARROW_SPACING) as usize {
+            for j in 0..(high / ARROW_SPACING) as usize {
+                let at = (x.from + ARROW_SPACING * (i as f64 + 0.5), y.to + ARROW_SPACING * (j as f64 + 0.5));
                 let [dx, dy] = field([x.value(at.0), y.value(at.1)]);
                 let (dx, dy) = (dx / x.unit(), -dy / y.unit());
                 let length = dx.hypot(dy);
@@ -264,7 +268,7 @@ fn draw_legend(canvas: &mut Canvas, at: Point, rows: &[Vec<(String, Stroke, f64)
             } else {
                 canvas.dot((from + 14.0, y), 3.0, stroke.colour);
             }
-            canvas.words((from + 30.0, y + 0.35 * LETTERS), name, Anchor::Start);
+            canvas.draw_text((from + 30.0, y + 0.35 * FONT_HEIGHT), name, Anchor::Start);
         }
     }
 }
@@ -273,7 +277,7 @@ impl Curve {
     fn draw(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2], colour: Colour, values: (f64, f64)) {
         let points: Vec<Point> = self.points.iter().map(|point| (x.at(point.0), y.at(point.1))).collect();
         if !self.values.is_empty() {
-            gradient(canvas, &points, &self.values, values, self.width);
+            draw_coloured_line(canvas, &points, &self.values, values, self.width);
         } else if self.width > 0.0 {
             canvas.line(&points, Stroke { colour, width: self.width, dashed: self.dashed });
         }

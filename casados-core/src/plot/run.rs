@@ -16,7 +16,7 @@ impl Panel {
         let residual = |of: fn(&Iteration) -> f64| -> Vec<(f64, f64)> {
             log.0.iter().map(|row| (row.iteration as f64, of(row))).collect()
         };
-        Self::of_iterations("Residuals")
+        Self::iteration_panel("Residuals")
             .with(Curve::line("stationarity", residual(|row| row.residuals.stationarity)).marked())
             .with(Curve::line("dynamics", residual(|row| row.residuals.dynamics)).marked())
             .with(Curve::line("inequalities", residual(|row| row.residuals.inequalities)).marked())
@@ -26,13 +26,13 @@ impl Panel {
     /// The largest residual over the iterations of several runs.
     #[must_use]
     pub fn convergences<'a, N: Into<String>>(runs: impl IntoIterator<Item = (N, Log<'a>)>) -> Self {
-        runs.into_iter().fold(Self::of_iterations("Largest residual"), |panel, (name, log)| {
+        runs.into_iter().fold(Self::iteration_panel("Largest residual"), |panel, (name, log)| {
             let points = log.0.iter().map(|row| (row.iteration as f64, row.residuals.largest()));
             panel.with(Curve::line(name, points).marked())
         })
     }
 
-    fn of_iterations(title: &str) -> Self {
+    fn iteration_panel(title: &str) -> Self {
         Self::new(title).x("iteration").log_y()
     }
 

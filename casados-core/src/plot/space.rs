@@ -1,18 +1,18 @@
 //! Curves in three dimensions, as they are seen from one side.
 
 use super::axis::ticks;
-use super::draw::{Area, colour_bar, gradient, span};
-use super::svg::{Anchor, Canvas, Colour, LETTERS, Point, Stroke};
+use super::draw::{Area, colour_bar, draw_coloured_line, value_range};
+use super::svg::{Anchor, Canvas, Colour, FONT_HEIGHT, Point, Stroke};
 use alloc::string::String;
 use alloc::vec::Vec;
 
-type Place = [f64; 3];
+type Point3 = [f64; 3];
 
 /// A curve, with what decides about its colour.
 #[derive(Clone, Debug)]
-struct Curve {
+struct SpaceCurve {
     name: String,
-    points: Vec<Place>,
+    points: Vec<Point3>,
     values: Vec<f64>,
     colour: Colour,
     width: f64,
@@ -34,27 +34,27 @@ pub struct Space {
     /// Where it is seen from: degrees from the first axis on, and above the floor.
     azimuth: f64,
     elevation: f64,
-    curves: Vec<Curve>,
+    curves: Vec<SpaceCurve>,
     drawn: usize,
 }
 
 /// Where points of the space are on the canvas.
 struct View {
-    right: Place,
-    up: Place,
-    middle: Place,
+    right: Point3,
+    up: Point3,
+    middle: Point3,
     unit: f64,
     centre: Point,
 }
 
-fn product(a: Place, b: Place) -> f64 {
+fn dot(a: Point3, b: Point3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl View {
-    fn at(&self, place: Place) -> Point {
+    fn project(&self, place: Point3) -> Point {
         let from_middle = [0, 1, 2].map(|i| place[i] - self.middle[i]);
-        let (right, up) = (product(self.right, from_middle), product(self.up, from_middle));
+        let (right, up) = (dot(self.right, from_middle), dot(self.up, from_middle));
         (self.centre.0 + self.unit * right, self.centre.1 - self.unit * up)
     }
 }
@@ -86,11 +86,11 @@ impl Space {
 
     /// A curve. A point with a number that is not finite interrupts it.
     #[must_use]
-    pub fn line(mut self, name: impl Into<String>, points: impl IntoIterator<Item = Place>) -> Self {
+    pub fn line(mut self, name: impl Into<String>, points: impl IntoIterator<Item = Point3>) -> Self {
         let colour = Colour::of(self.drawn);
         self.drawn += 1;
         let points = points.into_iter().collect();
-        self.curves.push(Curve { name: name.into(), points, values: Vec::new(), colour, width: 2.0 });
+        self.curves.push(SpaceCurve { name: name.into(), points, values: Vec::new(), colour, width: 2.0 });
         self
     }
 
@@ -99,25 +99,25 @@ impl Space {
     pub fn coloured(
         mut self,
         name: impl Into<String>,
-        points: impl IntoIterator<Item = (Place, f64)>,
+        points: impl IntoIterator<Item = (Point3, f64)>,
     ) -> Self {
         let (points, values) = points.into_iter().unzip();
-        self.curves.push(Curve { name: name.into(), points, values, colour: Colour::INK, width: 4.0 });
+        self.curves.push(SpaceCurve { name: name.into(), points, values, colour: Colour::INK, width: 4.0 });
         self
     }
 
     /// The outline of a thing in the colour of ink, without a shadow.
     #[must_use]
-    pub fn outline(mut self, points: impl IntoIterator<Item = Place>) -> Self {
+    pub fn outline(mut self, points: impl IntoIterator<Item = Point3>) -> Self {
         let (name, points) = (String::new(), points.into_iter().collect());
-        self.curves.push(Curve { name, points, values: Vec::new(), colour: Colour::INK, width: 1.5 });
+        self.curves.push(SpaceCurve { name, points, values: Vec::new(), colour: Colour::INK, width: 1.5 });
         self
     }
 
     /// The box around everything.
     fn bounds(&self) -> [(f64, f64); 3] {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);
-        let all = [0, 1, 2].map(|i| span(points().map(|point| &point[i])));
+        let all = [0, 1, 2].map(|i| value_range(points().map(|point| &point[i])));
         let longest = all.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
         let longest = if longest.is_finite() && longest > 0.0 { longest } else { 1.0 };
         all.map(
@@ -133,7 +133,7 @@ impl Space {
         let right = [-sin_a, cos_a, 0.0];
         let up = [-cos_a * sin_e, -sin_a * sin_e, cos_e];
         let middle = bounds.map(|(low, high)| 0.5 * (low + high));
-        let reach = |axis: Place| (0..3).map(|i| axis[i].abs() * (bounds[i].1 - bounds[i].0)).sum::<f64>();
+        let reach = |axis: Point3| (0..3).map(|i| axis[i].abs() * (bounds[i].1 - bounds[i].0)).sum::<f64>();
         let (wide, high) = (reach(right).max(f64::MIN_POSITIVE), reach(up).max(f64::MIN_POSITIVE));
         let (left, below) = (64.0, 52.0);
         let unit = ((area.width - 2.0 * left) / wide).min((area.height - 2.0 * below) / high).max(0.0);
@@ -147,7 +147,7 @@ impl Space {
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, area: Area) {
-        let values = span(self.curves.iter().flat_map(|curve| &curve.values));
+        let values = value_range(self.curves.iter().flat_map(|curve| &curve.values));
         let has_bar = values.0 <= values.1;
         let inside = Area { width: area.width - if has_bar { 70.0 } else { 0.0 }, ..area };
         let bounds = self.bounds();
@@ -156,17 +156,20 @@ impl Space {
             canvas.heading((area.x + 12.0, area.y + 18.0), &self.title);
             self.draw_box(canvas, &view, bounds);
             for curve in self.curves.iter().filter(|curve| !curve.name.is_empty()) {
-                let shadow: Vec<Point> =
-                    curve.points.iter().map(|p| view.at([p[0], p[1], bounds[2].0 + 0.0 * p[2]])).collect();
+                let shadow: Vec<Point> = curve
+                    .points
+                    .iter()
+                    .map(|p| view.project([p[0], p[1], bounds[2].0 + 0.0 * p[2]]))
+                    .collect();
                 canvas.line(&shadow, Stroke::new(Colour(200, 200, 205), 2.0));
             }
             for curve in &self.curves {
-                let points: Vec<Point> = curve.points.iter().map(|&place| view.at(place)).collect();
+                let points: Vec<Point> = curve.points.iter().map(|&place| view.project(place)).collect();
                 canvas.group("series", &curve.name, |canvas| {
                     if curve.values.is_empty() {
                         canvas.line(&points, Stroke::new(curve.colour, curve.width));
                     } else {
-                        gradient(canvas, &points, &curve.values, values, curve.width);
+                        draw_coloured_line(canvas, &points, &curve.values, values, curve.width);
                     }
                 });
             }
@@ -179,7 +182,7 @@ impl Space {
             for (i, curve) in named.enumerate() {
                 let (x, y) = (area.x + 12.0, area.y + 36.0 + 18.0 * i as f64);
                 canvas.line(&[(x, y), (x + 24.0, y)], Stroke::new(curve.colour, curve.width));
-                canvas.words((x + 30.0, y + 0.35 * LETTERS), &curve.name, Anchor::Start);
+                canvas.draw_text((x + 30.0, y + 0.35 * FONT_HEIGHT), &curve.name, Anchor::Start);
             }
         });
     }
@@ -195,33 +198,34 @@ impl Space {
         let outwards = |at: Point, by: f64| {
             let (dx, dy) = (at.0 - view.centre.0, at.1 - view.centre.1);
             let length = dx.hypot(dy).max(1.0);
-            (at.0 + by * dx / length, at.1 + by * dy / length + 0.35 * LETTERS)
+            (at.0 + by * dx / length, at.1 + by * dy / length + 0.35 * FONT_HEIGHT)
         };
         canvas.group("axes", "", |canvas| {
             let count = |i: usize| ((bounds[i].1 - bounds[i].0) * view.unit / 55.0).clamp(1.0, 6.0) as usize;
             for (value, text) in ticks(x.0, x.1, count(0)) {
-                let floor = [view.at([value, back_y, z.0]), view.at([value, front_y, z.0])];
-                canvas.line(&[view.at([value, back_y, z.1]), floor[0], floor[1]], grid);
-                canvas.words(outwards(floor[1], 16.0), &text, Anchor::Middle);
+                let floor = [view.project([value, back_y, z.0]), view.project([value, front_y, z.0])];
+                canvas.line(&[view.project([value, back_y, z.1]), floor[0], floor[1]], grid);
+                canvas.draw_text(outwards(floor[1], 16.0), &text, Anchor::Middle);
             }
             for (value, text) in ticks(y.0, y.1, count(1)) {
-                let floor = [view.at([back_x, value, z.0]), view.at([front_x, value, z.0])];
-                canvas.line(&[view.at([back_x, value, z.1]), floor[0], floor[1]], grid);
-                canvas.words(outwards(floor[1], 16.0), &text, Anchor::Middle);
+                let floor = [view.project([back_x, value, z.0]), view.project([front_x, value, z.0])];
+                canvas.line(&[view.project([back_x, value, z.1]), floor[0], floor[1]], grid);
+                canvas.draw_text(outwards(floor[1], 16.0), &text, Anchor::Middle);
             }
             // Numbers of the third axis stand at the left one of the two edges beside.
             let edges = [[back_x, front_y], [front_x, back_y]];
-            let left = |edge: &[f64; 2]| view.at([edge[0], edge[1], z.0]).0;
+            let left = |edge: &[f64; 2]| view.project([edge[0], edge[1], z.0]).0;
             let edge = if left(&edges[0]) <= left(&edges[1]) { edges[0] } else { edges[1] };
             for (value, text) in ticks(z.0, z.1, count(2)) {
-                let corner = view.at([back_x, back_y, value]);
-                let (one, other) = (view.at([front_x, back_y, value]), view.at([back_x, front_y, value]));
+                let corner = view.project([back_x, back_y, value]);
+                let (one, other) =
+                    (view.project([front_x, back_y, value]), view.project([back_x, front_y, value]));
                 canvas.line(&[one, corner, other], grid);
-                let at = view.at([edge[0], edge[1], value]);
-                canvas.words((at.0 - 6.0, at.1 + 0.35 * LETTERS), &text, Anchor::End);
+                let at = view.project([edge[0], edge[1], value]);
+                canvas.draw_text((at.0 - 6.0, at.1 + 0.35 * FONT_HEIGHT), &text, Anchor::End);
             }
             let frame = Stroke::new(Colour(150, 150, 150), 1.0);
-            let corner = |x: f64, y: f64, z: f64| view.at([x, y, z]);
+            let corner = |x: f64, y: f64, z: f64| view.project([x, y, z]);
             let floor = [
                 (back_x, back_y),
                 (front_x, back_y),
@@ -238,10 +242,18 @@ impl Space {
                 canvas.line(&[corner(x, y, z.0), corner(x, y, z.1)], frame);
             }
             let middle = |range: (f64, f64)| 0.5 * (range.0 + range.1);
-            canvas.words(outwards(corner(middle(x), front_y, z.0), 38.0), &self.labels[0], Anchor::Middle);
-            canvas.words(outwards(corner(front_x, middle(y), z.0), 38.0), &self.labels[1], Anchor::Middle);
+            canvas.draw_text(
+                outwards(corner(middle(x), front_y, z.0), 38.0),
+                &self.labels[0],
+                Anchor::Middle,
+            );
+            canvas.draw_text(
+                outwards(corner(front_x, middle(y), z.0), 38.0),
+                &self.labels[1],
+                Anchor::Middle,
+            );
             let top = corner(edge[0], edge[1], z.1);
-            canvas.words((top.0, top.1 - 10.0), &self.labels[2], Anchor::Middle);
+            canvas.draw_text((top.0, top.1 - 10.0), &self.labels[2], Anchor::Middle);
         });
     }
 }

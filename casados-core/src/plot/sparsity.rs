@@ -1,7 +1,7 @@
 //! Matrices of a model: where they have entries, and of which kind.
 
 use super::draw::Area;
-use super::svg::{Anchor, Canvas, Colour, LETTERS, width};
+use super::svg::{Anchor, Canvas, Colour, FONT_HEIGHT, text_width};
 use crate::structure::Structure;
 use alloc::format;
 use alloc::string::String;
@@ -132,8 +132,8 @@ impl Sparsity {
                 );
                 // A block of one or two columns has no room for more than the name of the variable.
                 let short = name.rsplit('∂').next().unwrap_or(name);
-                let name = if width(name) > across { short } else { name };
-                canvas.words((start + 1.0, top - 6.0), name, Anchor::Start);
+                let name = if text_width(name) > across { short } else { name };
+                canvas.draw_text((start + 1.0, top - 6.0), name, Anchor::Start);
                 start += across;
             }
             let size = (cell - if cell > 4.0 { 1.0 } else { 0.0 }).max(0.5);
@@ -143,8 +143,8 @@ impl Sparsity {
             }
             for ((name, colour), across, row) in rows {
                 let (x, y) = (left + across, top + cell * self.rows as f64 + 14.0 + 18.0 * row);
-                canvas.rectangle((x, y), (LETTERS - 2.0, LETTERS - 2.0), Some(colour), None);
-                canvas.words((x + 16.0, y + LETTERS - 3.0), name, Anchor::Start);
+                canvas.rectangle((x, y), (FONT_HEIGHT - 2.0, FONT_HEIGHT - 2.0), Some(colour), None);
+                canvas.draw_text((x + 16.0, y + FONT_HEIGHT - 3.0), name, Anchor::Start);
             }
         });
     }
@@ -153,7 +153,7 @@ impl Sparsity {
     fn legend(&self, room: f64) -> Vec<(Kind, f64, f64)> {
         let (mut across, mut row) = (0.0, 0.0);
         let place = |&kind: &Kind| {
-            let wide = 30.0 + width(kind.0);
+            let wide = 30.0 + text_width(kind.0);
             if across > 0.0 && across + wide > room {
                 (across, row) = (0.0, row + 1.0);
             }

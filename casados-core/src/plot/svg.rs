@@ -56,16 +56,16 @@ impl Colour {
     /// From dark blue at 0 over green to yellow at 1.
     #[must_use]
     pub fn mix(share: f64) -> Self {
-        Self::between(&[Self(38, 60, 130), Self(60, 140, 140), Self(245, 200, 60)], share)
+        Self::interpolate(&[Self(38, 60, 130), Self(60, 140, 140), Self(245, 200, 60)], share)
     }
 
     /// From light at 0 to dark at 1.
     #[must_use]
     pub fn shade(share: f64) -> Self {
-        Self::between(&[Self(205, 205, 215), Self(15, 15, 90)], share)
+        Self::interpolate(&[Self(205, 205, 215), Self(15, 15, 90)], share)
     }
 
-    fn between(stops: &[Self], share: f64) -> Self {
+    fn interpolate(stops: &[Self], share: f64) -> Self {
         let position = share.clamp(0.0, 1.0) * (stops.len().max(2) - 2 + 1) as f64;
         let first = (position as usize).min(stops.len().saturating_sub(2));
         let weight = position - first as f64;
@@ -109,11 +109,11 @@ pub(super) enum Anchor {
 }
 
 /// The height of letters in pixels.
-pub(super) const LETTERS: f64 = 13.0;
+pub(super) const FONT_HEIGHT: f64 = 13.0;
 
 /// How wide a text is, about.
-pub(super) fn width(text: &str) -> f64 {
-    0.56 * LETTERS * text.chars().count() as f64
+pub(super) fn text_width(text: &str) -> f64 {
+    0.56 * FONT_HEIGHT * text.chars().count() as f64
 }
 
 /// A picture as it is drawn.
@@ -122,7 +122,7 @@ pub(super) struct Canvas {
 }
 
 /// With a tenth of a pixel, not farther from the picture than what programs read as a number.
-fn number(value: f64) -> String {
+fn coordinate_text(value: f64) -> String {
     const LARGEST_COORDINATE: f64 = 1e6;
     let value = if value.is_nan() { 0.0 } else { value.clamp(-LARGEST_COORDINATE, LARGEST_COORDINATE) };
     let text = format!("{value:.1}");
@@ -146,10 +146,10 @@ fn escape(text: &str) -> String {
 
 impl Canvas {
     pub fn new(width: f64, height: f64) -> Self {
-        let (width, height) = (number(width), number(height));
+        let (width, height) = (coordinate_text(width), coordinate_text(height));
         let text = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"{LETTERS}\" \
+             viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"{FONT_HEIGHT}\" \
              fill=\"{}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
             Colour::INK
         );
@@ -178,8 +178,9 @@ impl Canvas {
     }
 
     /// A rectangle out of which nothing is drawn.
-    pub fn inside(&mut self, at: Point, size: Point, draw: impl FnOnce(&mut Self)) {
-        let (x, y, w, h) = (number(at.0), number(at.1), number(size.0), number(size.1));
+    pub fn clipped(&mut self, at: Point, size: Point, draw: impl FnOnce(&mut Self)) {
+        let (x, y, w, h) =
+            (coordinate_text(at.0), coordinate_text(at.1), coordinate_text(size.0), coordinate_text(size.1));
         self.push(format_args!(
             "<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"
         ));
@@ -190,11 +191,11 @@ impl Canvas {
     /// A line through points; what is not finite interrupts it.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
         for piece in points.split(|point| !is_finite(point)) {
-            self.piece(piece, stroke);
+            self.polyline(piece, stroke);
         }
     }
 
-    fn piece(&mut self, points: &[Point], stroke: Stroke) {
+    fn polyline(&mut self, points: &[Point], stroke: Stroke) {
         let mut drawn = String::new();
         let mut last: Option<Point> = None;
         for (i, &point) in points.iter().enumerate() {
@@ -205,9 +206,9 @@ impl Canvas {
             if last.is_some() {
                 drawn.push(' ');
             }
-            drawn.push_str(&number(point.0));
+            drawn.push_str(&coordinate_text(point.0));
             drawn.push(',');
-            drawn.push_str(&number(point.1));
+            drawn.push_str(&coordinate_text(point.1));
             last = Some(point);
         }
         if points.len() < 2 {
@@ -218,7 +219,7 @@ impl Canvas {
             "<polyline points=\"{drawn}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" \
              stroke-linejoin=\"round\"{dashes}/>",
             stroke.colour,
-            number(stroke.width),
+            coordinate_text(stroke.width),
         ));
     }
 
@@ -226,10 +227,10 @@ impl Canvas {
     pub fn strokes(&mut self, strokes: &[[Point; 2]], stroke: Stroke) {
         let mut path = String::new();
         for [from, to] in strokes.iter().filter(|ends| ends.iter().all(is_finite)) {
-            let [x, y, end_x, end_y] = [from.0, from.1, to.0, to.1].map(number);
+            let [x, y, end_x, end_y] = [from.0, from.1, to.0, to.1].map(coordinate_text);
             let _ = write!(path, "M{x},{y}L{end_x},{end_y}");
         }
-        let (colour, width) = (stroke.colour, number(stroke.width));
+        let (colour, width) = (stroke.colour, coordinate_text(stroke.width));
         self.push(format_args!(
             "<path d=\"{path}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"
         ));
@@ -237,13 +238,14 @@ impl Canvas {
 
     pub fn dot(&mut self, at: Point, radius: f64, colour: Colour) {
         if is_finite(&at) {
-            let (x, y, r) = (number(at.0), number(at.1), number(radius));
+            let (x, y, r) = (coordinate_text(at.0), coordinate_text(at.1), coordinate_text(radius));
             self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{colour}\"/>"));
         }
     }
 
     pub fn rectangle(&mut self, at: Point, size: Point, fill: Option<Colour>, frame: Option<Colour>) {
-        let (x, y, w, h) = (number(at.0), number(at.1), number(size.0), number(size.1));
+        let (x, y, w, h) =
+            (coordinate_text(at.0), coordinate_text(at.1), coordinate_text(size.0), coordinate_text(size.1));
         let none = || "none".to_string();
         let fill = fill.map_or_else(none, |colour| colour.to_string());
         let frame = frame.map_or_else(none, |colour| colour.to_string());
@@ -252,22 +254,22 @@ impl Canvas {
         ));
     }
 
-    pub fn words(&mut self, at: Point, text: &str, anchor: Anchor) {
-        self.styled(at, text, anchor, "");
+    pub fn draw_text(&mut self, at: Point, text: &str, anchor: Anchor) {
+        self.styled_text(at, text, anchor, "");
     }
 
     /// Of a panel.
     pub fn heading(&mut self, at: Point, text: &str) {
-        self.styled(at, text, Anchor::Start, " font-size=\"15\" font-weight=\"bold\"");
+        self.styled_text(at, text, Anchor::Start, " font-size=\"15\" font-weight=\"bold\"");
     }
 
     /// Upwards.
-    pub fn upright(&mut self, at: Point, text: &str) {
-        let turn = format!(" transform=\"rotate(-90 {} {})\"", number(at.0), number(at.1));
-        self.styled(at, text, Anchor::Middle, &turn);
+    pub fn vertical_text(&mut self, at: Point, text: &str) {
+        let turn = format!(" transform=\"rotate(-90 {} {})\"", coordinate_text(at.0), coordinate_text(at.1));
+        self.styled_text(at, text, Anchor::Middle, &turn);
     }
 
-    fn styled(&mut self, at: Point, text: &str, anchor: Anchor, more: &str) {
+    fn styled_text(&mut self, at: Point, text: &str, anchor: Anchor, more: &str) {
         if text.is_empty() || !is_finite(&at) {
             return;
         }
@@ -276,7 +278,7 @@ impl Canvas {
             Anchor::Middle => " text-anchor=\"middle\"",
             Anchor::End => " text-anchor=\"end\"",
         };
-        let (x, y) = (number(at.0), number(at.1));
+        let (x, y) = (coordinate_text(at.0), coordinate_text(at.1));
         self.push(format_args!("<text x=\"{x}\" y=\"{y}\"{anchor}{more}>{}</text>", escape(text)));
     }
 }

@@ -5,17 +5,17 @@ use super::panel::Panel;
 use super::svg::Colour;
 use crate::ocp::{Kind, Trajectory, TrajectoryError};
 use crate::scalar::Real;
-use crate::structure::means;
+use crate::structure::name_matches;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
 /// Without multipliers a bound is active to this part of the span of the values.
-const AT_BOUND: f64 = 1e-4;
+const ACTIVE_BOUND_TOLERANCE: f64 = 1e-4;
 
 /// A value with what bounds it.
 #[derive(Clone, Copy)]
-struct Point {
+struct BoundedValue {
     time: f64,
     value: f64,
     bounds: [f64; 2],
@@ -23,7 +23,7 @@ struct Point {
     multipliers: Option<[f64; 2]>,
 }
 
-impl Point {
+impl BoundedValue {
     /// Whether it is given: its bounds are the same.
     fn is_given(&self) -> bool {
         self.bounds[0] >= self.bounds[1]
@@ -32,7 +32,7 @@ impl Point {
     /// Whether a bound holds it: of distance and multiplier, whose product vanishes at a solution,
     /// the multiplier is larger; without multipliers, whether it is there.
     fn is_active(&self, span: f64) -> bool {
-        let near = [AT_BOUND * span; 2];
+        let near = [ACTIVE_BOUND_TOLERANCE * span; 2];
         let forces = self.bounds.into_iter().zip(self.multipliers.unwrap_or(near));
         !self.is_given() && forces.into_iter().any(|(bound, force)| force > (self.value - bound).abs())
     }
@@ -52,7 +52,8 @@ impl Panel {
     /// # Errors
     /// [`TrajectoryError::Unknown`]
     pub fn trajectories<T: Real>(solution: &Trajectory<T>, name: &str) -> Result<Self, TrajectoryError> {
-        let found: Vec<_> = solution.series().iter().filter(|series| means(name, &series.name)).collect();
+        let found: Vec<_> =
+            solution.series().iter().filter(|series| name_matches(name, &series.name)).collect();
         if found.is_empty() {
             // The error that lists the names.
             solution.get(name)?;
@@ -66,7 +67,7 @@ impl Panel {
         }
         Ok(found.into_iter().enumerate().fold(panel, |panel, (i, series)| {
             let name = with_unit(&series.name, if is_common { "" } else { &series.unit });
-            drawn(solution, series, name, Colour::of(i)).into_iter().fold(panel, Self::with)
+            line_with_bounds(solution, series, name, Colour::of(i)).into_iter().fold(panel, Self::with)
         }))
     }
 }
@@ -76,13 +77,13 @@ fn with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.into() } else { format!("{name}, {unit}") }
 }
 
-fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> Vec<Point> {
+fn bounded_values<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> Vec<BoundedValue> {
     let times = solution.times();
     let of = |bounds: &[Option<T>], k: usize| bounds.get(k).copied().flatten().map(|bound| bound.to_f64());
-    let mut points: Vec<Point> = (series.values.iter().enumerate())
+    let mut points: Vec<BoundedValue> = (series.values.iter().enumerate())
         .map(|(k, value)| {
             let multipliers = series.lower_multipliers.get(k).zip(series.upper_multipliers.get(k));
-            Point {
+            BoundedValue {
                 time: times.get(series.first.saturating_add(k)).map_or(f64::NAN, |time| time.to_f64()),
                 value: value.to_f64(),
                 bounds: [
@@ -97,7 +98,7 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
         && let (Some(&last), Some(end)) = (points.last(), times.last())
     {
         // The last control is held until the end.
-        points.push(Point { time: end.to_f64(), ..last });
+        points.push(BoundedValue { time: end.to_f64(), ..last });
     }
     points
 }
@@ -108,14 +109,14 @@ fn is_piecewise_constant<T: Real>(solution: &Trajectory<T>, series: &crate::ocp:
 }
 
 /// A line with its bounds, and where they are active.
-fn drawn<T: Real>(
+fn line_with_bounds<T: Real>(
     solution: &Trajectory<T>,
     series: &crate::ocp::Series<T>,
     name: String,
     colour: Colour,
 ) -> Vec<Curve> {
-    let points = points(solution, series);
-    let over = |name: String, value: &dyn Fn(&Point) -> f64| {
+    let points = bounded_values(solution, series);
+    let over = |name: String, value: &dyn Fn(&BoundedValue) -> f64| {
         let line = points.iter().map(|point| (point.time, value(point)));
         let drawn = match series.kind {
             _ if is_piecewise_constant(solution, series) => Curve::steps(name, line),
@@ -124,13 +125,13 @@ fn drawn<T: Real>(
         };
         drawn.colour(colour)
     };
-    let (low, high) = super::draw::span(points.iter().map(|point| &point.value));
+    let (low, high) = super::draw::value_range(points.iter().map(|point| &point.value));
     let span = high - low;
     let is_near = |bound: f64| span <= 0.0 || (bound > low - 1.5 * span && bound < high + 1.5 * span);
-    let bound = |point: &Point, side: usize| {
+    let bound = |point: &BoundedValue, side: usize| {
         if point.is_given() || !is_near(point.bounds[side]) { f64::NAN } else { point.bounds[side] }
     };
-    let active = |point: &Point| if point.is_active(span) { point.value } else { f64::NAN };
+    let active = |point: &BoundedValue| if point.is_active(span) { point.value } else { f64::NAN };
     let mut drawn: Vec<Curve> = (0..2)
         .filter(|&side| points.iter().any(|point| bound(point, side).is_finite()))
         .map(|side| over(String::new(), &|point| bound(point, side)).width(1.0).dashed())

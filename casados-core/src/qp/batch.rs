@@ -3,9 +3,9 @@
 use super::error::QpError;
 use super::instance::QpInstance;
 use super::interior::{HeapInteriorPoint, InteriorPointOptions};
-use super::lanes::{self, Size, Together};
+use super::lanes::{self, LaneWorkspace, Size};
 use super::layout::take_mut;
-use super::memory::room;
+use super::memory::try_reserve;
 use super::queue::{each, threads};
 use super::solver::{QpSolver, QpStart};
 use super::statistics::QpStatistics;
@@ -73,7 +73,7 @@ pub struct BatchInteriorPoint<T: Real = f64> {
 #[derive(Clone, Debug)]
 struct Worker<T: Real> {
     solver: HeapInteriorPoint<T>,
-    together: Together<T>,
+    together: LaneWorkspace<T>,
 }
 
 impl<T: Real> Default for BatchInteriorPoint<T> {
@@ -105,18 +105,21 @@ impl<T: Real> BatchInteriorPoint<T> {
     pub fn solve(&mut self, instances: &mut [QpInstance<T>], start: QpStart) -> Result<&[Status], QpError> {
         let (count, threads) = (instances.len(), self.threads().min(instances.len()));
         self.statuses.clear();
-        room(&mut self.statuses, count)?;
+        try_reserve(&mut self.statuses, count)?;
         self.statuses.resize(count, Ok(QpStatistics::default()));
         let more = threads.saturating_sub(self.workers.len());
-        room(&mut self.workers, more)?;
+        try_reserve(&mut self.workers, more)?;
         while self.workers.len() < threads {
-            self.workers.push(Worker { solver: HeapInteriorPoint::new(), together: Together::default() });
+            self.workers
+                .push(Worker { solver: HeapInteriorPoint::new(), together: LaneWorkspace::default() });
         }
         let (options, together) = (self.options, self.together);
         let size_of = |instance: &QpInstance<T>| lanes::size(instance, &options).filter(|_| together);
         // A thread takes as many as registers are filled with, or one after the other.
         let portion = match instances.first().and_then(size_of) {
-            Some(_) => count.div_ceil(threads.max(1)).next_multiple_of(PORTION).min(PORTIONS),
+            Some(_) => {
+                count.div_ceil(threads.max(1)).next_multiple_of(CHUNK_GRANULARITY).min(MAX_GRANULES_PER_CHUNK)
+            }
             None => 1,
         };
         let workers = self.workers.get_mut(..threads).unwrap_or_default();
@@ -138,8 +141,8 @@ impl<T: Real> BatchInteriorPoint<T> {
 }
 
 /// Problems that a thread takes: a multiple of this many, whole registers, and no more than that.
-const PORTION: usize = 16;
-const PORTIONS: usize = 64;
+const CHUNK_GRANULARITY: usize = 16;
+const MAX_GRANULES_PER_CHUNK: usize = 64;
 
 impl<T: Real> Worker<T> {
     /// Solves problems: neighbours of one size together.
@@ -166,7 +169,7 @@ impl<T: Real> Worker<T> {
                 }
             };
             if solved {
-                together.alone().for_each(alone);
+                together.unsolved_indices().for_each(alone);
             } else {
                 (0..alike).for_each(&mut alone);
             }

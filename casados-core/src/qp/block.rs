@@ -4,7 +4,7 @@ use super::error::{QpError, QpField};
 
 /// Where the elements of a matrix lie.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct MatrixLayout {
     pub field: QpField,
     pub stage: usize,
     pub rows: usize,
@@ -15,7 +15,7 @@ pub(super) struct Shape {
     pub column: usize,
 }
 
-impl Shape {
+impl MatrixLayout {
     fn index(&self, row: usize, column: usize) -> Option<usize> {
         (row < self.rows && column < self.columns).then(|| row * self.row + column * self.column)
     }
@@ -46,7 +46,7 @@ impl Shape {
 #[derive(Clone, Copy, Debug)]
 pub struct Block<'a, T> {
     pub(super) data: &'a [T],
-    pub(super) shape: Shape,
+    pub(super) shape: MatrixLayout,
 }
 
 /// A matrix that can be read and written.
@@ -75,7 +75,7 @@ pub struct Block<'a, T> {
 #[derive(Debug)]
 pub struct BlockMut<'a, T> {
     pub(super) data: &'a mut [T],
-    pub(super) shape: Shape,
+    pub(super) shape: MatrixLayout,
 }
 
 impl<T: Copy> Block<'_, T> {
@@ -117,7 +117,7 @@ impl<T: Copy> BlockMut<'_, T> {
     /// # Errors
     /// [`QpError::Dimension`]
     pub fn copy_from_columns(&mut self, columns: &[T]) -> Result<(), QpError> {
-        let Shape { field, stage, rows, columns: width, row, column } = self.shape;
+        let MatrixLayout { field, stage, rows, columns: width, row, column } = self.shape;
         if columns.len() != rows * width {
             return Err(QpError::Dimension { field, stage, expected: rows * width, found: columns.len() });
         }

@@ -69,10 +69,10 @@ pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
 pub(super) fn check_all_bounds<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     for (k, stage) in qp.stages().enumerate() {
         // Only where some make none they are looked for.
-        if !make_sense(&stage.all_bounds()) {
-            find_bounds(QpField::StateBounds, k, &stage.x_bounds())?;
-            find_bounds(QpField::ControlBounds, k, &stage.u_bounds())?;
-            find_bounds(QpField::GeneralBounds, k, &stage.g_bounds())?;
+        if !are_valid_bounds(&stage.all_bounds()) {
+            report_invalid_bound(QpField::StateBounds, k, &stage.x_bounds())?;
+            report_invalid_bound(QpField::ControlBounds, k, &stage.u_bounds())?;
+            report_invalid_bound(QpField::GeneralBounds, k, &stage.g_bounds())?;
         }
     }
     Ok(())
@@ -88,7 +88,7 @@ fn finite<T: Real>(field: QpField, stage: usize, index: usize, value: T) -> Resu
 
 /// Whether there are numbers between two bounds.
 #[inline(always)]
-fn is_range<T: Real>(lower: T, upper: T) -> bool {
+fn is_nonempty_interval<T: Real>(lower: T, upper: T) -> bool {
     let infinity = T::from_f64(f64::INFINITY);
     (lower <= upper) & (lower < infinity) & (upper > -infinity)
 }
@@ -105,10 +105,10 @@ fn is_quadratic_penalty<T: Real>(penalty: T) -> bool {
 }
 
 /// Whether all bounds and penalties make sense, without a branch for each.
-fn make_sense<T: Real>(bounds: &Bounds<'_, T>) -> bool {
+fn are_valid_bounds<T: Real>(bounds: &Bounds<'_, T>) -> bool {
     let mut good = true;
     for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
-        good &= is_range(lower, upper);
+        good &= is_nonempty_interval(lower, upper);
     }
     for (&lower, &upper) in bounds.lower_linear.iter().zip(bounds.upper_linear) {
         good &= is_linear_penalty(lower) & is_linear_penalty(upper);
@@ -120,9 +120,13 @@ fn make_sense<T: Real>(bounds: &Bounds<'_, T>) -> bool {
 }
 
 /// The first that does not.
-fn find_bounds<T: Real>(field: QpField, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
+fn report_invalid_bound<T: Real>(
+    field: QpField,
+    stage: usize,
+    bounds: &Bounds<'_, T>,
+) -> Result<(), QpError> {
     for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
-        if is_range(lower, upper) {
+        if is_nonempty_interval(lower, upper) {
             continue;
         }
         let (l, u) = (lower.to_f64(), upper.to_f64());

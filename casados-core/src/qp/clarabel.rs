@@ -59,8 +59,8 @@ pub struct Clarabel {
 
 /// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
 /// size is not known beforehand, and the least that is asked for.
-const PART: f64 = 1e-3;
-const LEAST: f64 = 1e-13;
+const TOLERANCE_FRACTION: f64 = 1e-3;
+const MIN_TOLERANCE: f64 = 1e-13;
 
 /// A solver and the pattern that it is for.
 struct PreviousSolver {
@@ -128,7 +128,7 @@ impl Clarabel {
     /// is accepted where these are not reached.
     fn refined(&self) -> DefaultSettings<f64> {
         let mut settings = self.settings.clone();
-        let asked = (PART * self.needed).max(LEAST);
+        let asked = (TOLERANCE_FRACTION * self.needed).max(MIN_TOLERANCE);
         if asked < f64::INFINITY {
             let s = &mut settings;
             for (tolerance, reduced) in [
@@ -249,7 +249,7 @@ impl QpSolver<f64> for Clarabel {
         _: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError> {
         check(qp)?;
-        solution.fits(qp)?;
+        solution.check_dimensions(qp)?;
         self.check_settings()?;
         self.check_cones(qp)?;
         let is_refined = self.needed.is_finite();
@@ -296,7 +296,7 @@ impl QpSolver<f64> for Clarabel {
                 ..QpStatistics::default()
             }),
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
-                Err(infeasible(qp, &sparse, &found.z))
+                Err(infeasibility_error(qp, &sparse, &found.z))
             }
             SolverStatus::MaxIterations | SolverStatus::MaxTime => {
                 Err(QpError::MaxIterations { iterations, residuals })
@@ -307,7 +307,7 @@ impl QpSolver<f64> for Clarabel {
 }
 
 /// `Kᵀ z = 0` and `bᵀ z < 0` say that the largest violation is at least `−bᵀ z / Σ |z|`.
-fn infeasible(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
+fn infeasibility_error(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
     let product: f64 = sparse.b.iter().zip(z).map(|(b, z)| b * z).sum();
     let violation = -product / z.iter().map(|z| z.abs()).sum::<f64>();
     let mut largest = (0.0, 0, Side::Lower);
@@ -325,6 +325,6 @@ fn infeasible(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
     let (_, row, side) = largest;
     let place =
         Places::<f64>::new(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
-    let (field, index) = place.name(row - place.row);
+    let (field, index) = place.field_of_row(row - place.row);
     QpError::Infeasible { field, stage: place.stage, index, side, violation }
 }

@@ -49,12 +49,12 @@ impl<'a, T: Real> QpView<'a, T> {
     /// Whether there are periodic states or shared controls.
     #[must_use]
     pub fn is_coupled(&self) -> bool {
-        marked(self.marks).next().is_some()
+        marked_indices(self.marks).next().is_some()
     }
 }
 
 /// The indices of marks.
-pub(crate) fn marked<T: Real>(marks: &[T]) -> impl Iterator<Item = usize> + '_ {
+pub(crate) fn marked_indices<T: Real>(marks: &[T]) -> impl Iterator<Item = usize> + '_ {
     marks.iter().enumerate().filter(|(_, mark)| **mark != T::ZERO).map(|(i, _)| i)
 }
 

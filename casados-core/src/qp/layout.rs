@@ -40,7 +40,7 @@ impl StageDims {
 /// there are no registers an even number is enough, which tiles need: firmware has half the memory
 /// then, and nothing to compute with what is padding.
 #[must_use]
-pub(crate) const fn pad<T>(n: usize) -> usize {
+pub(crate) const fn padded_len<T>(n: usize) -> usize {
     let width = if REGISTERS { 64 / size_of::<T>() } else { 2 };
     n.div_ceil(width) * width
 }
@@ -84,7 +84,7 @@ pub(crate) struct StageOffsets {
 impl StageOffsets {
     const fn new<T>(stage: usize, dims: StageDims, next: usize) -> Self {
         let n = dims.nx + dims.nu;
-        let ld = pad::<T>(n);
+        let ld = padded_len::<T>(n);
         Self {
             stage,
             nx: dims.nx,
@@ -93,8 +93,8 @@ impl StageOffsets {
             next,
             n,
             ld,
-            ld_next: pad::<T>(next),
-            rows: ld + pad::<T>(dims.ng),
+            ld_next: padded_len::<T>(next),
+            rows: ld + padded_len::<T>(dims.ng),
             // The first state is eliminated like a control where it is not given.
             pivots: if stage == 0 { n } else { dims.nu },
             data: 0,
@@ -122,7 +122,7 @@ impl StageOffsets {
     }
     /// The same parts, behind those of `before`.
     #[cfg_attr(feature = "std", inline(always))]
-    const fn after(mut self, before: &Self) -> Self {
+    const fn placed_after(mut self, before: &Self) -> Self {
         self.data = before.data + before.data_len();
         self.v = before.v + before.ld;
         self.dynamics = before.dynamics + before.ld_next;
@@ -132,7 +132,7 @@ impl StageOffsets {
     }
     /// The same parts, before those of `after`.
     #[cfg_attr(feature = "std", inline(always))]
-    const fn before(mut self, after: &Self) -> Self {
+    const fn placed_before(mut self, after: &Self) -> Self {
         self.data = after.data.saturating_sub(self.data_len());
         self.v = after.v.saturating_sub(self.ld);
         self.dynamics = after.dynamics.saturating_sub(self.ld_next);
@@ -142,7 +142,7 @@ impl StageOffsets {
     }
     /// The place behind this one, of a stage that is empty: its begins are lengths.
     const fn end(&self) -> Self {
-        Self::new::<u8>(0, StageDims::new(0, 0, 0), 0).after(self)
+        Self::new::<u8>(0, StageDims::new(0, 0, 0), 0).placed_after(self)
     }
 }
 
@@ -174,7 +174,7 @@ impl<'a, T> Places<'a, T> {
         Self { dims, taken: 0, next: 0, number: PhantomData, front: StageOffsets::default(), back: None }
     }
     /// The same, for whoever knows [`end`] and goes backwards.
-    pub fn ending(dims: &'a [StageDims], end: StageOffsets) -> Self {
+    pub fn with_known_end(dims: &'a [StageDims], end: StageOffsets) -> Self {
         Self { back: Some(end), ..Self::new(dims) }
     }
 }
@@ -189,7 +189,7 @@ impl<T> Iterator for Places<'_, T> {
     fn next(&mut self) -> Option<StageOffsets> {
         let (&first, rest) = self.dims.split_first()?;
         let next = rest.first().map_or(self.next, |dims| dims.nx);
-        let place = StageOffsets::new::<T>(self.taken, first, next).after(&self.front);
+        let place = StageOffsets::new::<T>(self.taken, first, next).placed_after(&self.front);
         (self.dims, self.front, self.taken) = (rest, place, self.taken + 1);
         Some(place)
     }
@@ -205,9 +205,9 @@ impl<T> DoubleEndedIterator for Places<'_, T> {
         let (&last, rest) = self.dims.split_last()?;
         let back = match self.back {
             Some(back) => back,
-            None => behind::<T>(self.front, self.taken, self.dims),
+            None => place_after_stages::<T>(self.front, self.taken, self.dims),
         };
-        let place = StageOffsets::new::<T>(self.taken + rest.len(), last, self.next).before(&back);
+        let place = StageOffsets::new::<T>(self.taken + rest.len(), last, self.next).placed_before(&back);
         (self.dims, self.back, self.next) = (rest, Some(place), last.nx);
         Some(place)
     }
@@ -218,12 +218,12 @@ impl<T> FusedIterator for Places<'_, T> {}
 
 /// The place behind the last stage: its begins are the lengths of the arrays of the horizon.
 pub(crate) const fn end<T>(dims: &[StageDims]) -> StageOffsets {
-    behind::<T>(StageOffsets::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
+    place_after_stages::<T>(StageOffsets::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
 }
 
 /// Whether lengths of such a horizon are more than there is memory, and may be more than a `usize`
 /// holds.
-pub(crate) const fn is_absurd(dims: &[StageDims]) -> bool {
+pub(crate) const fn exceeds_memory(dims: &[StageDims]) -> bool {
     let (mut total, mut rest): (u128, _) = (0, dims);
     while let Some((&first, after)) = rest.split_first() {
         let next = match after.first() {
@@ -243,14 +243,18 @@ pub(crate) const fn is_absurd(dims: &[StageDims]) -> bool {
 }
 
 /// The place behind stages that follow a place, from that one on whose number is given.
-const fn behind<T>(mut place: StageOffsets, mut stage: usize, dims: &[StageDims]) -> StageOffsets {
+const fn place_after_stages<T>(
+    mut place: StageOffsets,
+    mut stage: usize,
+    dims: &[StageDims],
+) -> StageOffsets {
     let mut rest = dims;
     while let Some((&first, after)) = rest.split_first() {
         let next = match after.first() {
             Some(dims) => dims.nx,
             None => 0,
         };
-        place = StageOffsets::new::<T>(stage, first, next).after(&place);
+        place = StageOffsets::new::<T>(stage, first, next).placed_after(&place);
         stage += 1;
         rest = after;
     }
@@ -272,14 +276,14 @@ pub(crate) fn part_mut<T>(slice: &mut [T], begin: usize, length: usize) -> &mut 
 
 /// Copies what both have.
 #[inline(always)]
-pub(crate) fn assign<T: Copy>(target: &mut [T], source: &[T]) {
+pub(crate) fn copy_common<T: Copy>(target: &mut [T], source: &[T]) {
     for (target, &source) in target.iter_mut().zip(source) {
         *target = source;
     }
 }
 
 /// Copies a part of a slice to an earlier place.
-pub(crate) fn move_forward<T: Copy>(slice: &mut [T], from: usize, to: usize, length: usize) {
+pub(crate) fn move_to_front<T: Copy>(slice: &mut [T], from: usize, to: usize, length: usize) {
     for i in 0..length {
         let value = slice.get(from + i).copied();
         if let (Some(target), Some(value)) = (slice.get_mut(to + i), value) {
@@ -310,7 +314,7 @@ mod tests {
         assert_eq!(forwards, backwards);
         // From where it is known to end, and from both sides.
         let mut known: alloc::vec::Vec<_> =
-            Places::<f32>::ending(&dims, end::<f32>(&dims)).rev().map(parts).collect();
+            Places::<f32>::with_known_end(&dims, end::<f32>(&dims)).rev().map(parts).collect();
         known.reverse();
         assert_eq!(forwards, known);
         let mut places = Places::<f32>::new(&dims).map(parts);

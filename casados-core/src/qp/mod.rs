@@ -111,16 +111,16 @@ pub use stage::{Stage, StageMut};
 pub use statistics::{QpStatistics, Residuals};
 
 // What the optimal control problems write and read.
-pub(crate) use coupling::{is_marked, marked};
+pub(crate) use coupling::{is_marked, marked_indices};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{Places, assign, pad, part, part_mut, take_mut};
+pub(crate) use layout::{Places, copy_common, padded_len, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
-pub(crate) use memory::{reserve, room, zeros};
+pub(crate) use memory::{try_reserve, try_resize, zeros};
 #[cfg(feature = "alloc")]
 pub(crate) use queue::{each, threads};
 pub(crate) use residuals::bounds as bound_residuals;
 pub(crate) use stage::Arrays;
-pub(crate) use statistics::larger;
-pub(crate) use violation::{Violation, worst};
+pub(crate) use statistics::nan_max;
+pub(crate) use violation::{Violation, largest_violation};

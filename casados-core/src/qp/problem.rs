@@ -1,8 +1,8 @@
 //! The data of a QP.
 
 use super::error::{QpError, QpField};
-use super::layout::{Places, StageDims, assign, end, is_absurd, part, part_mut, take_mut};
-use super::stage::{Row, Stage, StageMut};
+use super::layout::{Places, StageDims, copy_common, end, exceeds_memory, part, part_mut, take_mut};
+use super::stage::{ConstraintVector, Stage, StageMut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -119,7 +119,7 @@ impl<T: Real, D, M> Qp<T, D, M> {
     /// How many numbers the data takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
-        if is_absurd(dims) { usize::MAX } else { end::<T>(dims).data + marks(dims) }
+        if exceeds_memory(dims) { usize::MAX } else { end::<T>(dims).data + coupling_mark_count(dims) }
     }
 }
 
@@ -150,11 +150,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     #[must_use]
     pub fn view(&self) -> QpView<'_, T> {
         let (dims, data) = (self.dims.as_ref(), self.memory.as_ref());
-        QpView { dims, data, marks: part(data, self.stages, marks(dims)) }
+        QpView { dims, data, marks: part(data, self.stages, coupling_mark_count(dims)) }
     }
     /// Periodic states and shared controls.
     pub(super) fn marks_mut(&mut self) -> &mut [T] {
-        part_mut(self.memory.as_mut(), self.stages, marks(self.dims.as_ref()))
+        part_mut(self.memory.as_mut(), self.stages, coupling_mark_count(self.dims.as_ref()))
     }
     /// The dimensions of the stages.
     #[must_use]
@@ -186,8 +186,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         if expected != found {
             return Err(QpError::Dimension { field: QpField::StateBounds, stage: 0, expected, found });
         }
-        assign(bounds.lower, x0);
-        assign(bounds.upper, x0);
+        copy_common(bounds.lower, x0);
+        copy_common(bounds.upper, x0);
         for penalties in [bounds.lower_linear, bounds.upper_linear] {
             penalties.fill(T::from_f64(f64::INFINITY));
         }
@@ -196,7 +196,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
 }
 
 /// States and controls of the first stage.
-const fn marks(dims: &[StageDims]) -> usize {
+const fn coupling_mark_count(dims: &[StageDims]) -> usize {
     match dims.first() {
         Some(first) => first.nx + first.nu,
         None => 0,
@@ -217,7 +217,10 @@ pub(super) fn clear<T: Real>(dims: &[StageDims], data: &mut [T]) {
     let infinity = T::from_f64(f64::INFINITY);
     let values = [-infinity, infinity, infinity, T::ZERO, infinity, T::ZERO];
     for stage in stages_mut(dims, data) {
-        let rows = stage.data.get_mut(stage.place.row_data(Row::Lower)..).unwrap_or_default();
+        let rows = stage
+            .data
+            .get_mut(stage.place.constraint_vector_begin(ConstraintVector::Lower)..)
+            .unwrap_or_default();
         for (row, value) in rows.chunks_exact_mut(stage.place.rows.max(1)).zip(values) {
             row.fill(value);
         }

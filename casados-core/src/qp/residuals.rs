@@ -4,12 +4,12 @@
 
 use super::block::Block;
 use super::bounds::Bounds;
-use super::coupling::{is_marked, marked};
+use super::coupling::{is_marked, marked_indices};
 use super::layout::StageDims;
 use super::problem::QpView;
 use super::solution::{Solution, SolutionStage};
 use super::stage::Stage;
-use super::statistics::{Residuals, larger, positive};
+use super::statistics::{Residuals, nan_max, positive};
 use crate::scalar::Real;
 
 /// How well a point satisfies the conditions of optimality of the QP, and its objective with
@@ -53,41 +53,41 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         let Some(point) = stages.next() else { break };
         let next = stages.peek().map_or(&[][..], |next| next.x);
         for i in 0..point.x.len() {
-            let (residual, cost) = of_state(&data, &point, arriving, i);
+            let (residual, cost) = state_gradient_and_cost(&data, &point, arriving, i);
             objective += cost;
             let is_end = k == 0 || k + 1 == qp.dims().len();
             if !(is_end && is_marked(qp.periodic(), i)) {
-                largest(&mut result.stationarity, residual);
+                update_largest(&mut result.stationarity, residual);
             }
         }
         for i in 0..point.u.len() {
-            let (residual, cost) = of_control(&data, &point, i);
+            let (residual, cost) = control_gradient_and_cost(&data, &point, i);
             objective += cost;
             if !is_marked(qp.shared(), i) {
-                largest(&mut result.stationarity, residual);
+                update_largest(&mut result.stationarity, residual);
             }
         }
         for (i, &next) in next.iter().enumerate() {
-            let mut sum = at(data.offset(), i) - next.to_f64();
+            let mut sum = element_as_f64(data.offset(), i) - next.to_f64();
             sum += row(&data.a(), i, point.x) + row(&data.b(), i, point.u);
-            largest(&mut result.dynamics, sum);
+            update_largest(&mut result.dynamics, sum);
         }
-        let x = |i| at(point.x, i);
-        let u = |i| at(point.u, i);
+        let x = |i| element_as_f64(point.x, i);
+        let u = |i| element_as_f64(point.u, i);
         let g = |i| row(&data.c(), i, point.x) + row(&data.d(), i, point.u);
         objective += bounds(&data.x_bounds(), x, point.x_lower, point.x_upper, &mut result);
         objective += bounds(&data.u_bounds(), u, point.u_lower, point.u_upper, &mut result);
         objective += bounds(&data.g_bounds(), g, point.g_lower, point.g_upper, &mut result);
         arriving = point.dynamics;
     }
-    joint_residuals(qp, solution, &mut result);
+    coupling_residuals(qp, solution, &mut result);
     (result, objective)
 }
 
-fn largest(of: &mut f64, value: f64) {
-    *of = larger(*of, value.abs());
+fn update_largest(of: &mut f64, value: f64) {
+    *of = nan_max(*of, value.abs());
 }
-fn at<T: Real>(vector: &[T], index: usize) -> f64 {
+fn element_as_f64<T: Real>(vector: &[T], index: usize) -> f64 {
     vector.get(index).map_or(0.0, |v| v.to_f64())
 }
 /// A row times a vector.
@@ -105,33 +105,43 @@ fn symmetric<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
 }
 
 /// The gradient of the Lagrangian in a state, and its part of `½ vᵀ H v + hᵀ v`.
-fn of_state<T: Real>(
+fn state_gradient_and_cost<T: Real>(
     data: &Stage<'_, T>,
     point: &SolutionStage<'_, T>,
     arriving: &[T],
     i: usize,
 ) -> (f64, f64) {
     let quadratic = symmetric(&data.q(), i, point.x) + column(&data.s(), i, point.u);
-    let linear = at(data.gradient_x(), i);
-    let dynamics = column(&data.a(), i, point.dynamics) - at(arriving, i);
-    let bounds = at(point.x_upper, i) - at(point.x_lower, i);
+    let linear = element_as_f64(data.gradient_x(), i);
+    let dynamics = column(&data.a(), i, point.dynamics) - element_as_f64(arriving, i);
+    let bounds = element_as_f64(point.x_upper, i) - element_as_f64(point.x_lower, i);
     let general = column(&data.c(), i, point.g_upper) - column(&data.c(), i, point.g_lower);
-    (quadratic + linear + dynamics + bounds + general, at(point.x, i) * (0.5 * quadratic + linear))
+    (
+        quadratic + linear + dynamics + bounds + general,
+        element_as_f64(point.x, i) * (0.5 * quadratic + linear),
+    )
 }
 
-/// As [`of_state`], in a control.
-fn of_control<T: Real>(data: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> (f64, f64) {
+/// As [`state_gradient_and_cost`], in a control.
+fn control_gradient_and_cost<T: Real>(
+    data: &Stage<'_, T>,
+    point: &SolutionStage<'_, T>,
+    i: usize,
+) -> (f64, f64) {
     let quadratic = symmetric(&data.r(), i, point.u) + row(&data.s(), i, point.x);
-    let linear = at(data.gradient_u(), i);
+    let linear = element_as_f64(data.gradient_u(), i);
     let dynamics = column(&data.b(), i, point.dynamics);
-    let bounds = at(point.u_upper, i) - at(point.u_lower, i);
+    let bounds = element_as_f64(point.u_upper, i) - element_as_f64(point.u_lower, i);
     let general = column(&data.d(), i, point.g_upper) - column(&data.d(), i, point.g_lower);
-    (quadratic + linear + dynamics + bounds + general, at(point.u, i) * (0.5 * quadratic + linear))
+    (
+        quadratic + linear + dynamics + bounds + general,
+        element_as_f64(point.u, i) * (0.5 * quadratic + linear),
+    )
 }
 
 /// Whether there are neither bounds nor multipliers: nothing can be wrong with either.
 #[inline(always)]
-fn is_free<T: Real>(bounds: &Bounds<'_, T>, lower: &[T], upper: &[T]) -> bool {
+fn is_unbounded<T: Real>(bounds: &Bounds<'_, T>, lower: &[T], upper: &[T]) -> bool {
     let infinity = T::from_f64(f64::INFINITY);
     let mut free = true;
     for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
@@ -152,45 +162,46 @@ pub(crate) fn bounds<T: Real>(
     residuals: &mut Residuals,
 ) -> f64 {
     let mut penalties = 0.0;
-    if is_free(bounds, lower, upper) {
+    if is_unbounded(bounds, lower, upper) {
         return penalties;
     }
     for i in 0..lower.len() {
         let value = value(i);
-        let hard = at(bounds.lower_linear, i).is_infinite() && at(bounds.upper_linear, i).is_infinite();
-        if hard && at(bounds.lower, i) == at(bounds.upper, i) {
+        let hard = element_as_f64(bounds.lower_linear, i).is_infinite()
+            && element_as_f64(bounds.upper_linear, i).is_infinite();
+        if hard && element_as_f64(bounds.lower, i) == element_as_f64(bounds.upper, i) {
             // An equation: its multiplier, the difference of two, has no sign and no slack.
-            largest(&mut residuals.inequalities, value - at(bounds.lower, i));
+            update_largest(&mut residuals.inequalities, value - element_as_f64(bounds.lower, i));
             continue;
         }
         let sides = [
             (
-                value - at(bounds.lower, i),
-                at(lower, i),
-                at(bounds.lower_linear, i),
-                at(bounds.lower_quadratic, i),
+                value - element_as_f64(bounds.lower, i),
+                element_as_f64(lower, i),
+                element_as_f64(bounds.lower_linear, i),
+                element_as_f64(bounds.lower_quadratic, i),
             ),
             (
-                at(bounds.upper, i) - value,
-                at(upper, i),
-                at(bounds.upper_linear, i),
-                at(bounds.upper_quadratic, i),
+                element_as_f64(bounds.upper, i) - value,
+                element_as_f64(upper, i),
+                element_as_f64(bounds.upper_linear, i),
+                element_as_f64(bounds.upper_quadratic, i),
             ),
         ];
         for (slack, multiplier, linear, quadratic) in sides {
-            largest(&mut residuals.inequalities, positive(-multiplier));
+            update_largest(&mut residuals.inequalities, positive(-multiplier));
             if slack == f64::INFINITY {
-                largest(&mut residuals.complementarity, multiplier);
+                update_largest(&mut residuals.complementarity, multiplier);
             } else if linear == f64::INFINITY {
-                largest(&mut residuals.inequalities, positive(-slack));
-                largest(&mut residuals.complementarity, positive(slack) * multiplier);
+                update_largest(&mut residuals.inequalities, positive(-slack));
+                update_largest(&mut residuals.complementarity, positive(slack) * multiplier);
             } else {
                 let violation = positive(-slack);
                 let force = linear + quadratic * violation;
                 penalties += violation * (linear + 0.5 * quadratic * violation);
-                largest(&mut residuals.inequalities, positive(multiplier - force));
-                largest(&mut residuals.complementarity, positive(slack) * multiplier);
-                largest(&mut residuals.complementarity, violation * positive(force - multiplier));
+                update_largest(&mut residuals.inequalities, positive(multiplier - force));
+                update_largest(&mut residuals.complementarity, positive(slack) * multiplier);
+                update_largest(&mut residuals.complementarity, violation * positive(force - multiplier));
             }
         }
     }
@@ -202,7 +213,7 @@ fn element<T: Real>(block: &Block<'_, T>, row: usize, column: usize) -> T {
 }
 
 /// Residuals of variables that are one: sums of gradients, and differences.
-fn joint_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn coupling_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     solution: &Solution<T, D, M>,
     result: &mut Residuals,
@@ -213,22 +224,23 @@ fn joint_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         return;
     };
     let arriving = solution.stages().rev().nth(1).map_or(&[][..], |before| before.dynamics);
-    for i in marked(qp.periodic()) {
-        let sum = of_state(&first.0, &first.1, &[], i).0 + of_state(&last.0, &last.1, arriving, i).0;
-        largest(&mut result.stationarity, sum);
+    for i in marked_indices(qp.periodic()) {
+        let sum = state_gradient_and_cost(&first.0, &first.1, &[], i).0
+            + state_gradient_and_cost(&last.0, &last.1, arriving, i).0;
+        update_largest(&mut result.stationarity, sum);
         let at = |x: &[T]| x.get(i).map_or(0.0, |x| x.to_f64());
-        largest(&mut result.dynamics, at(first.1.x) - at(last.1.x));
+        update_largest(&mut result.dynamics, at(first.1.x) - at(last.1.x));
     }
-    for j in marked(qp.shared()) {
+    for j in marked_indices(qp.shared()) {
         let at = |u: &[T]| u.get(j).map(|u| u.to_f64());
         let sum: f64 = pairs()
             .filter(|(_, point)| at(point.u).is_some())
-            .map(|(data, point)| of_control(&data, &point, j).0)
+            .map(|(data, point)| control_gradient_and_cost(&data, &point, j).0)
             .sum();
-        largest(&mut result.stationarity, sum);
+        update_largest(&mut result.stationarity, sum);
         let of_first = at(first.1.u).unwrap_or(0.0);
         pairs()
             .filter_map(|(_, point)| at(point.u))
-            .for_each(|u| largest(&mut result.dynamics, u - of_first));
+            .for_each(|u| update_largest(&mut result.dynamics, u - of_first));
     }
 }

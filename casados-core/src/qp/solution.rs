@@ -6,7 +6,7 @@ pub use stage::{SolutionStage, SolutionStageMut};
 
 use super::error::{QpError, QpField};
 use super::layout::{
-    Places, StageDims, StageOffsets, end, is_absurd, move_forward, part, part_mut, take_mut,
+    Places, StageDims, StageOffsets, end, exceeds_memory, move_to_front, part, part_mut, take_mut,
 };
 use super::problem::QpView;
 use crate::scalar::Real;
@@ -119,7 +119,7 @@ impl<T: Real, D, M> Solution<T, D, M> {
     /// How many numbers a solution takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
-        if is_absurd(dims) {
+        if exceeds_memory(dims) {
             return usize::MAX;
         }
         let end = end::<T>(dims);
@@ -129,14 +129,14 @@ impl<T: Real, D, M> Solution<T, D, M> {
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
     /// All `v`, and all `π`.
-    pub(crate) fn vectors(&self) -> (&[T], &[T]) {
+    pub(crate) fn variables_and_costates(&self) -> (&[T], &[T]) {
         let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
         (part(memory, 0, v), part(memory, v, dynamics))
     }
     /// All stages, in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
         let ([_, _, row], memory) = (self.lengths, self.memory.as_ref());
-        let (v, dynamics) = self.vectors();
+        let (v, dynamics) = self.variables_and_costates();
         let begin = v.len() + dynamics.len();
         let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
         Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
@@ -199,12 +199,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         [0, row].map(|side| part(self.memory.as_ref(), v + dynamics + side, row))
     }
     /// Everything, and what is padding.
-    pub(crate) fn numbers(&self) -> &[T] {
+    pub(crate) fn all_numbers(&self) -> &[T] {
         self.memory.as_ref()
     }
     /// Everything of another solution of the same dimensions.
     pub(crate) fn copy_from(&mut self, other: &Self) {
-        super::layout::assign(self.memory.as_mut(), other.memory.as_ref());
+        super::layout::copy_common(self.memory.as_mut(), other.memory.as_ref());
     }
     /// Everything as a function of two solutions of the same dimensions.
     pub(crate) fn combine(&mut self, a: &Self, b: &Self, f: impl Fn(T, T) -> T) {
@@ -256,12 +256,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let places = Places::<T>::new(dims);
         for (here, there) in places.clone().zip(places.skip(1)) {
             if (here.nx, here.nu, here.ng) == (there.nx, there.nu, there.ng) {
-                move_forward(v, there.v, here.v, there.ld);
-                move_forward(lower, there.row, here.row, there.rows);
-                move_forward(upper, there.row, here.row, there.rows);
+                move_to_front(v, there.v, here.v, there.ld);
+                move_to_front(lower, there.row, here.row, there.rows);
+                move_to_front(upper, there.row, here.row, there.rows);
             }
             if here.next == there.next {
-                move_forward(dynamics, there.dynamics, here.dynamics, there.ld_next);
+                move_to_front(dynamics, there.dynamics, here.dynamics, there.ld_next);
             }
         }
     }
@@ -292,7 +292,7 @@ impl<'a, T> SolutionView<'a, T> {
         }
     }
     /// Whether it is a solution of such a QP.
-    pub(super) fn fits(&self, qp: QpView<'_, T>) -> Result<(), QpError> {
+    pub(super) fn check_dimensions(&self, qp: QpView<'_, T>) -> Result<(), QpError> {
         let (expected, found) = (qp.dims.len(), self.dims.len());
         if expected != found {
             return Err(QpError::Dimension { field: QpField::Stages, stage: 0, expected, found });

@@ -2,7 +2,7 @@
 //! sides, then cones.
 
 use super::bounds::Bounds;
-use super::coupling::marked;
+use super::coupling::marked_indices;
 use super::layout::Places;
 use super::problem::QpView;
 use super::stage::Stage;
@@ -98,14 +98,14 @@ pub struct Sparse {
 }
 
 /// One row of a stage over its variables, before it has a sign and a right-hand side.
-struct Line<'a> {
+struct ConstraintRow<'a> {
     stage: &'a Stage<'a, f64>,
     column: usize,
     /// A variable, or `n` + a general constraint.
     index: usize,
 }
 
-impl Line<'_> {
+impl ConstraintRow<'_> {
     fn add(&self, k: &mut Triplets, row: usize, sign: f64) {
         let dims = self.stage.dims();
         let n = dims.nx + dims.nu;
@@ -122,14 +122,14 @@ impl Line<'_> {
 }
 
 /// The bounds of one row.
-struct Limits {
+struct RowBounds {
     lower: (f64, f64, f64),
     upper: (f64, f64, f64),
 }
 
-fn limits(bounds: &Bounds<'_, f64>, i: usize) -> Option<Limits> {
+fn row_bounds(bounds: &Bounds<'_, f64>, i: usize) -> Option<RowBounds> {
     let at = |slice: &[f64]| slice.get(i).copied();
-    Some(Limits {
+    Some(RowBounds {
         lower: (at(bounds.lower)?, at(bounds.lower_linear)?, at(bounds.lower_quadratic)?),
         upper: (at(bounds.upper)?, at(bounds.upper_linear)?, at(bounds.upper_quadratic)?),
     })
@@ -164,7 +164,7 @@ impl Sparse {
                 sparse.k.add(row, next.map_or(0, |next| next + i), -1.0);
             }
         }
-        sparse.couple(qp);
+        sparse.add_coupling_rows(qp);
         // Equations before inequalities, and these before cones.
         for pass in 0..2 {
             for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
@@ -182,8 +182,13 @@ impl Sparse {
                         continue;
                     }
                     let row = place.row + general.map_or(index, |general| place.ld + general);
-                    let Some(limits) = limits(bounds, i) else { continue };
-                    sparse.constraint(&Line { stage: &stage, column, index }, row, &limits, pass == 0);
+                    let Some(limits) = row_bounds(bounds, i) else { continue };
+                    sparse.constraint(
+                        &ConstraintRow { stage: &stage, column, index },
+                        row,
+                        &limits,
+                        pass == 0,
+                    );
                 }
             }
             if pass == 0 {
@@ -198,7 +203,11 @@ impl Sparse {
             for general in cone.first..cone.first + cone.count {
                 let lower = stage.g_bounds().lower.get(general).copied().unwrap_or(0.0);
                 let row = sparse.row(Origin::Cone(place.row + place.ld + general), -lower);
-                Line { stage: &stage, column, index: place.n + general }.add(&mut sparse.k, row, -1.0);
+                ConstraintRow { stage: &stage, column, index: place.n + general }.add(
+                    &mut sparse.k,
+                    row,
+                    -1.0,
+                );
             }
             sparse.cones.push(cone.count);
         }
@@ -206,7 +215,7 @@ impl Sparse {
     }
 
     /// Differences of variables that are one.
-    fn couple(&mut self, qp: QpView<'_, f64>) {
+    fn add_coupling_rows(&mut self, qp: QpView<'_, f64>) {
         let columns = self.columns.clone();
         let mut equal = |first: usize, other: usize| {
             let row = self.row(Origin::Coupling, 0.0);
@@ -215,8 +224,8 @@ impl Sparse {
         };
         let ends = (columns.first().copied(), columns.last().copied());
         let (Some(first), Some(last), Some(dims)) = (ends.0, ends.1, qp.dims().first()) else { return };
-        marked(qp.periodic()).for_each(|i| equal(first + i, last + i));
-        for j in marked(qp.shared()) {
+        marked_indices(qp.periodic()).for_each(|i| equal(first + i, last + i));
+        for j in marked_indices(qp.shared()) {
             for (dims_k, column) in qp.dims().iter().zip(&columns).skip(1).filter(|(dims, _)| j < dims.nu) {
                 equal(first + dims.nx + j, column + dims_k.nx + j);
             }
@@ -230,8 +239,8 @@ impl Sparse {
     }
 
     /// Two sides, or an equation.
-    fn constraint(&mut self, line: &Line<'_>, row: usize, limits: &Limits, equations: bool) {
-        let Limits { lower, upper } = limits;
+    fn constraint(&mut self, line: &ConstraintRow<'_>, row: usize, limits: &RowBounds, equations: bool) {
+        let RowBounds { lower, upper } = limits;
         let hard = lower.1.is_infinite() && upper.1.is_infinite();
         if hard && lower.0 == upper.0 {
             if equations {

@@ -1,6 +1,6 @@
 //! The data of one stage: matrices, vectors and bounds, read or written.
 
-use super::block::{Block, BlockMut, Shape};
+use super::block::{Block, BlockMut, MatrixLayout};
 use super::bounds::{Bounds, BoundsMut};
 use super::error::QpField;
 use super::layout::{StageDims, StageOffsets, part, part_mut, take_mut};
@@ -64,7 +64,7 @@ pub struct StageMut<'a, T> {
 
 /// What the six vectors over the constraints of a stage are.
 #[derive(Clone, Copy)]
-pub(super) enum Row {
+pub(super) enum ConstraintVector {
     Lower,
     Upper,
     LowerLinear,
@@ -83,10 +83,10 @@ impl StageOffsets {
         self.gradient() + self.ld
     }
     /// Begin of a vector over constraints.
-    pub(super) const fn row_data(&self, row: Row) -> usize {
+    pub(super) const fn constraint_vector_begin(&self, row: ConstraintVector) -> usize {
         self.offset() + self.ld_next + row as usize * self.rows
     }
-    fn shape(&self, field: QpField) -> (usize, Shape) {
+    fn shape(&self, field: QpField) -> (usize, MatrixLayout) {
         let Self { nx, nu, ng, next, ld, stage, .. } = *self;
         let (matrix, hessian) = (0, self.matrix());
         let (begin, rows, columns, row, column) = match field {
@@ -99,10 +99,10 @@ impl StageOffsets {
             // u's rows left of the diagonal
             _ => (hessian + nx, nu, nx, 1, ld),
         };
-        (begin, Shape { field, stage, rows, columns, row, column })
+        (begin, MatrixLayout { field, stage, rows, columns, row, column })
     }
     /// Where the constraints of a kind begin in vectors over constraints, and how many there are.
-    pub(super) const fn kind(&self, field: QpField) -> (usize, usize) {
+    pub(super) const fn constraint_range(&self, field: QpField) -> (usize, usize) {
         match field {
             QpField::StateBounds => (0, self.nx),
             QpField::ControlBounds => (self.nx, self.nu),
@@ -110,7 +110,7 @@ impl StageOffsets {
         }
     }
     /// What a row is.
-    pub(super) const fn name(&self, row: usize) -> (QpField, usize) {
+    pub(super) const fn field_of_row(&self, row: usize) -> (QpField, usize) {
         if row < self.nx {
             (QpField::StateBounds, row)
         } else if row < self.ld {
@@ -221,22 +221,22 @@ impl<'a, T: Real> Stage<'a, T> {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
     }
     fn bounds(&self, field: QpField) -> Bounds<'a, T> {
-        self.some_bounds(self.place.kind(field))
+        self.bounds_in_range(self.place.constraint_range(field))
     }
     /// Those of everything; what is padding is zero.
     pub(crate) fn all_bounds(&self) -> Bounds<'a, T> {
-        self.some_bounds((0, self.place.rows))
+        self.bounds_in_range((0, self.place.rows))
     }
     #[inline(always)]
-    fn some_bounds(&self, (begin, length): (usize, usize)) -> Bounds<'a, T> {
-        let rows = |row| part(self.data, self.place.row_data(row) + begin, length);
+    fn bounds_in_range(&self, (begin, length): (usize, usize)) -> Bounds<'a, T> {
+        let rows = |row| part(self.data, self.place.constraint_vector_begin(row) + begin, length);
         Bounds {
-            lower: rows(Row::Lower),
-            upper: rows(Row::Upper),
-            lower_linear: rows(Row::LowerLinear),
-            lower_quadratic: rows(Row::LowerQuadratic),
-            upper_linear: rows(Row::UpperLinear),
-            upper_quadratic: rows(Row::UpperQuadratic),
+            lower: rows(ConstraintVector::Lower),
+            upper: rows(ConstraintVector::Upper),
+            lower_linear: rows(ConstraintVector::LowerLinear),
+            lower_quadratic: rows(ConstraintVector::LowerQuadratic),
+            upper_linear: rows(ConstraintVector::UpperLinear),
+            upper_quadratic: rows(ConstraintVector::UpperQuadratic),
         }
     }
 }
@@ -248,8 +248,11 @@ impl<T: Real> StageMut<'_, T> {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
     }
     fn bounds_mut(&mut self, field: QpField) -> BoundsMut<'_, T> {
-        let (begin, length) = self.place.kind(field);
-        let rows = self.data.get_mut(self.place.row_data(Row::Lower)..).unwrap_or_default();
+        let (begin, length) = self.place.constraint_range(field);
+        let rows = self
+            .data
+            .get_mut(self.place.constraint_vector_begin(ConstraintVector::Lower)..)
+            .unwrap_or_default();
         let mut vectors = rows.chunks_exact_mut(self.place.rows.max(1));
         let mut next = || part_mut(vectors.next().unwrap_or_default(), begin, length);
         BoundsMut {

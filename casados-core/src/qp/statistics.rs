@@ -38,13 +38,13 @@ impl Residuals {
     #[must_use]
     pub fn largest(&self) -> f64 {
         let all = [self.stationarity, self.dynamics, self.inequalities, self.complementarity];
-        all.into_iter().fold(0.0, larger)
+        all.into_iter().fold(0.0, nan_max)
     }
 }
 
 /// The larger of two numbers; NaN if one of them is.
 #[inline(always)]
-pub(crate) fn larger<T: PartialOrd>(a: T, b: T) -> T {
+pub(crate) fn nan_max<T: PartialOrd>(a: T, b: T) -> T {
     // What is not equal to itself is NaN.
     #[allow(clippy::eq_op)]
     let keeps = b <= a || a != a;
@@ -54,7 +54,7 @@ pub(crate) fn larger<T: PartialOrd>(a: T, b: T) -> T {
 /// A number, or zero in place of a negative one; NaN stays.
 #[inline(always)]
 pub(crate) fn positive<T: PartialOrd + Default>(a: T) -> T {
-    larger(T::default(), a)
+    nan_max(T::default(), a)
 }
 
 impl fmt::Display for Residuals {

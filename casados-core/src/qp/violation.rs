@@ -3,7 +3,7 @@
 use super::error::{QpError, QpField, Side};
 use super::layout::{Places, StageOffsets, part};
 use super::problem::QpView;
-use super::stage::Row;
+use super::stage::ConstraintVector;
 use crate::scalar::Real;
 
 /// A bound, and by how much a point violates it.
@@ -26,7 +26,7 @@ impl From<Violation> for QpError {
 /// such violations as they are. Bounds are hard whose linear penalties are infinite: those of lower
 /// and upper bounds of states, controls and general constraints, stage by stage, as `penalties` has
 /// them.
-pub(crate) fn worst<T: Real>(
+pub(crate) fn largest_violation<T: Real>(
     qp: QpView<'_, T>,
     v: &[T],
     units: &[T],
@@ -43,8 +43,8 @@ pub(crate) fn worst<T: Real>(
                 let column = part(data, (place.next + row - place.ld) * place.ld, place.n);
                 column.iter().zip(v).map(|(c, v)| c.to_f64() * v.to_f64()).sum()
             };
-            let bound = |of| data.get(place.row_data(of) + row).map_or(0.0, |b| b.to_f64());
-            let excess = [bound(Row::Lower) - value, value - bound(Row::Upper)];
+            let bound = |of| data.get(place.constraint_vector_begin(of) + row).map_or(0.0, |b| b.to_f64());
+            let excess = [bound(ConstraintVector::Lower) - value, value - bound(ConstraintVector::Upper)];
             let sides = [Side::Lower, Side::Upper].into_iter().zip(excess);
             for ((side, violation), penalty) in sides.zip(penalties(&place, row)) {
                 if penalty.is_finite() || violation <= 0.0 {
@@ -55,7 +55,7 @@ pub(crate) fn worst<T: Real>(
                 let unit = unit.map_or(1.0, |unit| unit.to_f64());
                 if violation > most * unit {
                     most = violation / unit;
-                    let (field, index) = place.name(row);
+                    let (field, index) = place.field_of_row(row);
                     worst = Some(Violation { field, stage: place.stage, index, side, violation });
                 }
             }
@@ -67,6 +67,6 @@ pub(crate) fn worst<T: Real>(
 /// The linear penalties of a row.
 pub(crate) fn linear_penalties<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, row: usize) -> [T; 2] {
     let data = part(qp.data, place.data, place.data_len());
-    [Row::LowerLinear, Row::UpperLinear]
-        .map(|of| data.get(place.row_data(of) + row).copied().unwrap_or(T::ZERO))
+    [ConstraintVector::LowerLinear, ConstraintVector::UpperLinear]
+        .map(|of| data.get(place.constraint_vector_begin(of) + row).copied().unwrap_or(T::ZERO))
 }

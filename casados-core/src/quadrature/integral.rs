@@ -7,7 +7,7 @@ use crate::finite::check_output;
 use crate::function::{ArrayY, Function, MatrixYP, MatrixYU, MatrixYX, VectorY};
 use crate::linalg::axpy;
 use crate::model::Dae;
-use crate::result::split;
+use crate::result::write_row;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, plain};
 use bytemuck::Zeroable;
@@ -160,7 +160,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
     fn finish(&mut self) -> Result<(), Error> {
         let Self { q, dq, dq_dx0, dq_du, dq_dp, .. } = self;
         for (output, row) in dq.as_ref().iter().enumerate() {
-            split(row.as_ref(), output, dq_dx0, dq_du, dq_dp);
+            write_row(row.as_ref(), output, dq_dx0, dq_du, dq_dp);
         }
         check_output(q.as_slice(), 0)?;
         check_output(dq_dx0.as_slice(), 0)?;

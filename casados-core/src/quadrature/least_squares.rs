@@ -106,7 +106,7 @@ impl<F: Function, T: Real> LeastSquares<F, T> {
     }
 
     /// `μ = W r`, and `½ rᵀ W r`.
-    fn multiply(&mut self) -> T {
+    fn weigh_residuals(&mut self) -> T {
         let Self { weights, memory: Memory { y, mu, .. }, .. } = self;
         let mut square = T::ZERO;
         for (k, mu) in mu.as_mut().iter_mut().enumerate() {
@@ -137,13 +137,13 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
 
     fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
         self.memory.value(at)?;
-        self.value = self.value + weight * self.multiply();
+        self.value = self.value + weight * self.weigh_residuals();
         Ok(())
     }
 
     fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error> {
         self.memory.forward(at)?;
-        self.value = self.value + weight * self.multiply();
+        self.value = self.value + weight * self.weigh_residuals();
         let Self { weights, gradient, sum, row, memory, .. } = self;
         let dy = memory.dy.as_ref();
         for (k, (dr, mu)) in dy.iter().zip(memory.mu.as_ref()).enumerate() {
@@ -165,7 +165,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
 
     fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
         self.memory.value(at)?;
-        self.multiply();
+        self.weigh_residuals();
         Ok(self.memory.adjoint(weight))
     }
 
@@ -191,12 +191,12 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
 
     fn density(&mut self, at: Place) -> Result<T, Error> {
         self.memory.value(at)?;
-        Ok(self.multiply())
+        Ok(self.weigh_residuals())
     }
 
     fn prolong(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
         self.memory.value(at)?;
-        let half = self.multiply();
+        let half = self.weigh_residuals();
         axpy(weight * half, time.as_ref(), self.gradient.as_mut());
         Ok(())
     }
@@ -212,9 +212,9 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
         symmetric(&mut self.h_xx, rows, 0);
         symmetric(&mut self.h_uu, rows, nx);
         symmetric(&mut self.h_pp, rows, nx + nu);
-        transposed(&mut self.h_xu, rows, [0, nx]);
-        transposed(&mut self.h_xp, rows, [0, nx + nu]);
-        transposed(&mut self.h_up, rows, [nx, nx + nu]);
+        mirror_block(&mut self.h_xu, rows, [0, nx]);
+        mirror_block(&mut self.h_xp, rows, [0, nx + nu]);
+        mirror_block(&mut self.h_up, rows, [nx, nx + nu]);
         // The exact Hessian has these terms too.
         for (second, row) in self.memory.second.as_mut().iter_mut().zip(rows) {
             axpy(T::ONE, row.as_ref(), second.as_mut());
@@ -229,7 +229,11 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
 }
 
 /// A block above the diagonal, from the lower triangle.
-fn transposed<T: Plain, R: AsRef<[T]>, A: Matrix<T>>(block: &mut A, lower: &[R], [row, column]: [usize; 2]) {
+fn mirror_block<T: Plain, R: AsRef<[T]>, A: Matrix<T>>(
+    block: &mut A,
+    lower: &[R],
+    [row, column]: [usize; 2],
+) {
     for c in 0..A::COLUMNS {
         for r in 0..A::ROWS {
             block[(r, c)] = lower[column + c].as_ref()[row + r];

@@ -1,8 +1,8 @@
 //! A function at a stage, and the products of its derivatives with those of its variables.
 
-use super::product::Subtract;
+use super::product::CongruenceUpdate;
 use crate::error::{Error, Place};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::linalg::{axpy, dispatch};
 use crate::scalar::Real;
@@ -88,7 +88,7 @@ impl<F: Function, T: Real> Memory<F, T> {
             // What is subtracted below.
             *entry = [-(weight * *value)];
         }
-        dispatch(Subtract {
+        dispatch(CongruenceUpdate {
             pattern: F::STRUCTURE.hessian,
             curved: F::STRUCTURE.variables,
             entries: entries.as_ref(),
@@ -100,7 +100,7 @@ impl<F: Function, T: Real> Memory<F, T> {
     }
 
     fn check(&self, at: Place) -> Result<(), Error> {
-        match not_finite(self.y.as_ref()) {
+        match find_non_finite(self.y.as_ref()) {
             None => Ok(()),
             Some((output, value)) => {
                 Err(Error::NonFiniteFunction { function: F::STRUCTURE.name, output, value, at })

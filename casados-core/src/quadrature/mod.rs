@@ -23,15 +23,15 @@
 
 mod integral;
 // What the derive of `Zeroable` writes about a field of type `T`.
+mod chained_integrands;
 #[allow(clippy::multiple_bound_locations)]
 mod least_squares;
 mod memory;
 mod product;
-mod wrapped;
 
+pub(crate) use chained_integrands::{AdjointOnlyIntegrand, ChainRuleIntegrand};
 pub use integral::Quadrature;
 pub use least_squares::LeastSquares;
-pub(crate) use wrapped::{Backwards, Chained};
 
 use crate::error::{Error, Place};
 use crate::model::{ArrayW, Dae};
@@ -158,13 +158,15 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
 /// An integrand, or none.
 pub(crate) type OptionalIntegrand<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
-pub(crate) fn begin<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) {
+pub(crate) fn reset_integrand<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) {
     if let Some(integrand) = along {
         integrand.begin();
     }
 }
 
-pub(crate) fn finish<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) -> Result<(), Error> {
+pub(crate) fn finish_integrand<M: Dae, T: Real>(
+    along: &mut OptionalIntegrand<'_, '_, M, T>,
+) -> Result<(), Error> {
     along.as_mut().map_or(Ok(()), |integrand| integrand.finish())
 }
 

@@ -6,7 +6,7 @@ use crate::scalar::Lanes;
 use crate::shape::Array;
 
 /// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
-pub(crate) struct Subtract<'a, E, R, const S: usize> {
+pub(crate) struct CongruenceUpdate<'a, E, R, const S: usize> {
     pub pattern: Pattern,
     pub curved: &'static [u32],
     pub entries: &'a [[E; S]],
@@ -16,7 +16,7 @@ pub(crate) struct Subtract<'a, E, R, const S: usize> {
     pub sum: &'a mut [R],
 }
 
-impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
+impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]

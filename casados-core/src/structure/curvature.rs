@@ -71,18 +71,18 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
             next[column] += 1;
         }
     }
-    interleaved(&terms, &next)
+    interleave_rows(&terms, &next)
 }
 
 /// Terms row by row, given where each row ends, such that those of rows with the same columns
 /// alternate.
-const fn interleaved<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
+const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
     // Rows with the same columns are near each other, if there are any.
-    const NEAR: usize = 8;
+    const MAX_LOOKAHEAD_ROWS: usize = 8;
     let (mut terms, mut place, mut done, mut row) = (*by_row, 0, [false; C], 0);
     while row < C {
         let (mut rows, mut count, mut other) = ([row; MOST_ROWS], 0, row);
-        while other < C && other < row + NEAR && count < MOST_ROWS && !done[row] {
+        while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MOST_ROWS && !done[row] {
             if !done[other] && have_same_columns(by_row, range(ends, row), range(ends, other)) {
                 rows[count] = other;
                 count += 1;
@@ -129,19 +129,19 @@ const fn have_same_columns(terms: &[Term], [begin, end]: [usize; 2], [other, las
 /// as they are.
 #[must_use]
 pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin: usize) -> [u32; N] {
-    sorted::<V, N, true>(jacobian, begin)
+    sort_entries::<V, N, true>(jacobian, begin)
 }
 
 /// The first `N` entries of a Jacobian, by rows, of which there are `R`, and within each as they
 /// are.
 #[must_use]
 pub const fn by_row<const R: usize, const N: usize>(jacobian: &Pattern) -> [u32; N] {
-    sorted::<R, N, false>(jacobian, 0)
+    sort_entries::<R, N, false>(jacobian, 0)
 }
 
 /// Entries by columns, or else by rows, of which there are `K`: counted first, so that each goes to
 /// its place at once.
-const fn sorted<const K: usize, const N: usize, const COLUMNS: bool>(
+const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
     jacobian: &Pattern,
     begin: usize,
 ) -> [u32; N] {

@@ -8,7 +8,7 @@ const WIDTH: usize = 96;
 /// Where the words of a line begin.
 const INDENT: usize = 15;
 /// More words than this of one list are not written.
-const WORDS: usize = 64;
+const MAX_WORDS: usize = 64;
 /// Numbers of stages for which the cost is listed.
 const STAGES: [usize; 4] = [1, 2, 3, 4];
 
@@ -25,20 +25,20 @@ impl Display for Structure {
             (false, _) => "differential-algebraic, f(ẋ, x, z, u, p, t) = 0",
         };
         writeln!(f, "{}: {kind}\n", self.name)?;
-        names(f, "states x", self.x)?;
-        names(f, "algebraic z", self.z)?;
-        names(f, "controls u", self.u)?;
-        names(f, "parameters p", self.p)?;
+        fmt_names(f, "states x", self.x)?;
+        fmt_names(f, "algebraic z", self.z)?;
+        fmt_names(f, "controls u", self.u)?;
+        fmt_names(f, "parameters p", self.p)?;
         writeln!(f)?;
-        self.equations(f)?;
+        self.fmt_equations(f)?;
         if let Some(reduction) = self.reduction {
             writeln!(f, "{reduction}")?;
         }
-        self.sparsity(f)?;
+        self.fmt_sparsity(f)?;
         writeln!(f)?;
-        self.elimination(f)?;
+        self.fmt_elimination(f)?;
         writeln!(f)?;
-        self.costs(f)
+        self.fmt_costs(f)
     }
 }
 
@@ -68,7 +68,7 @@ impl Structure {
         self.variable(if index < nx { index } else { index + nx })
     }
 
-    fn equations(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    fn fmt_equations(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let equations = self.linear.len() as u32;
         let trivial = |row: &u32| self.trivial.contains(row);
         let linear = |row: &u32| self.linear.get(*row as usize) == Some(&true);
@@ -79,7 +79,11 @@ impl Structure {
                 return Ok(());
             }
             let rows = Ranges((0..equations).filter(list).peekable());
-            words(f, title, [Span::Count(count)].into_iter().chain(rows).chain([Span::Note(note)]))
+            fmt_words(
+                f,
+                title,
+                [NumberRange::Count(count)].into_iter().chain(rows).chain([NumberRange::Note(note)]),
+            )
         };
         line(f, "trivial", &trivial, "c ẋ + c′ v + c″(t) = 0")?;
         line(f, "linear", &|row| linear(row) && !trivial(row), "linear in (ẋ, x, z, u, p)")?;
@@ -87,7 +91,7 @@ impl Structure {
         line(f, "constant", &constant, "rows of the Newton matrix that never change")?;
         if !self.quadratures.is_empty() {
             let states = self.quadratures.iter().filter_map(|&state| self.x.get(state as usize));
-            words(f, "quadratures", states.map(|name| Item::Name(name)))?;
+            fmt_words(f, "quadratures", states.map(|name| NameRun::Name(name)))?;
         }
         if self.linear_in_state {
             let matrix = if self.constant_matrix { "; its matrix serves a whole interval" } else { "" };
@@ -96,16 +100,16 @@ impl Structure {
         writeln!(f)
     }
 
-    fn sparsity(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    fn fmt_sparsity(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let blocks = ["ẋ", "x", "z", "u", "p"];
         let present: [bool; 5] = [true, true, !self.z.is_empty(), !self.u.is_empty(), !self.p.is_empty()];
-        title(f, "non-zeros")?;
+        fmt_title(f, "non-zeros")?;
         for (name, _) in blocks.iter().zip(present).filter(|(_, present)| *present) {
             write!(f, "    f_{name}")?;
         }
         writeln!(f, "    all")?;
         let row = |f: &mut Formatter<'_>, name: &str, constant: bool| {
-            title(f, name)?;
+            fmt_title(f, name)?;
             let count = |begin: usize, end: usize| match constant {
                 false => end - begin,
                 true => self.constant.get(begin..end).unwrap_or_default().iter().filter(|c| **c).count(),
@@ -120,7 +124,7 @@ impl Structure {
         writeln!(f, " of {}", self.linear.len() * variables)?;
         row(f, "  constant", true)?;
         writeln!(f)?;
-        title(f, "  Hessian")?;
+        fmt_title(f, "  Hessian")?;
         writeln!(
             f,
             "{} of {} in the lower triangle, of {} of {variables} variables",
@@ -128,10 +132,10 @@ impl Structure {
             variables * (variables + 1) / 2,
             self.curved.len() + self.diagonal_controls.len(),
         )?;
-        title(f, "directions")?;
+        fmt_title(f, "directions")?;
         let directions = self.x.len() + self.u.len() + self.p.len();
         writeln!(f, "{} of {directions} of (x₀, u, p) have any influence", self.directions.len())?;
-        title(f, "operations")?;
+        fmt_title(f, "operations")?;
         let operations = &self.operations;
         if *operations == Default::default() {
             return writeln!(f, "not known");
@@ -143,9 +147,9 @@ impl Structure {
         )
     }
 
-    fn elimination(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    fn fmt_elimination(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Elimination { pivots, slots, kinematic, .. } = self.elimination;
-        title(f, "elimination")?;
+        fmt_title(f, "elimination")?;
         if pivots.is_empty() {
             return writeln!(f, "no plan: the whole matrix is pivoted");
         }
@@ -161,23 +165,23 @@ impl Structure {
             pivots.len(),
         )?;
         if kinematic().count() > 0 {
-            title(f, "  kinematic")?;
+            fmt_title(f, "  kinematic")?;
             writeln!(f, "each follows from the variable of its equation, and is no unknown")?;
             let states = kinematic().map(|(state, of)| Assignment {
                 unknown: self.unknown(state),
                 equation: of.equation as usize,
             });
-            words(f, "", states)?;
+            fmt_words(f, "", states)?;
         }
         let order = pivots
             .iter()
             .map(|pivot| Assignment { unknown: self.unknown(pivot.slot), equation: pivot.equation as usize });
-        title(f, "  order")?;
+        fmt_title(f, "  order")?;
         writeln!(f, "each unknown ← the equation that it is found from")?;
-        words(f, "", order)
+        fmt_words(f, "", order)
     }
 
-    fn costs(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    fn fmt_costs(&self, f: &mut Formatter<'_>) -> fmt::Result {
         const TITLE: usize = 38;
         write!(f, "{:TITLE$}", "operations of a step, s stages")?;
         for s in STAGES {
@@ -186,7 +190,7 @@ impl Structure {
         writeln!(f)?;
         let costs = STAGES.map(|s| self.cost(s));
         let row = |f: &mut Formatter<'_>, title: &dyn Display, value: fn(&Cost) -> u64| {
-            let mut length = Length(0);
+            let mut length = CharacterCount(0);
             write!(length, "{title}")?;
             write!(f, "  {title}{:1$}", "", TITLE.saturating_sub(2 + length.0))?;
             for cost in &costs {
@@ -236,13 +240,13 @@ impl<N: Display> Display for Assignment<N> {
 }
 
 /// Numbers that follow each other; before them how many there are, after them what they are.
-enum Span {
+enum NumberRange {
     Count(usize),
     Numbers(u32, u32),
     Note(&'static str),
 }
 
-impl Display for Span {
+impl Display for NumberRange {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Count(count) => write!(f, "{count}:"),
@@ -257,46 +261,46 @@ impl Display for Span {
 struct Ranges<I: Iterator<Item = u32>>(core::iter::Peekable<I>);
 
 impl<I: Iterator<Item = u32>> Iterator for Ranges<I> {
-    type Item = Span;
+    type Item = NumberRange;
     fn next(&mut self) -> Option<Self::Item> {
         let first = self.0.next()?;
         let mut last = first;
         while self.0.next_if(|&next| next == last + 1).is_some() {
             last += 1;
         }
-        Some(Span::Numbers(first, last))
+        Some(NumberRange::Numbers(first, last))
     }
 }
 
 /// Counts characters: nothing is allocated to find out how long a word is.
-struct Length(usize);
+struct CharacterCount(usize);
 
-impl Write for Length {
+impl Write for CharacterCount {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         self.0 += text.chars().count();
         Ok(())
     }
 }
 
-pub(super) fn title(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
+pub(super) fn fmt_title(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
     write!(f, "{title:INDENT$}")
 }
 
-fn names(f: &mut Formatter<'_>, title: &str, names: &[&str]) -> fmt::Result {
+fn fmt_names(f: &mut Formatter<'_>, title: &str, names: &[&str]) -> fmt::Result {
     if names.is_empty() {
         return Ok(());
     }
-    words(f, title, [Item::Count(names.len())].into_iter().chain(Runs(names)))
+    fmt_words(f, title, [NameRun::Count(names.len())].into_iter().chain(NameRuns(names)))
 }
 
 /// How many there are, one of them, or several whose indices follow each other.
-enum Item<'a> {
+enum NameRun<'a> {
     Count(usize),
     Name(&'a str),
     Run(&'a str, &'a str),
 }
 
-impl Display for Item<'_> {
+impl Display for NameRun<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Count(count) => write!(f, "{count}:"),
@@ -307,12 +311,12 @@ impl Display for Item<'_> {
 }
 
 /// Names, with `x[0] .. x[9]` in the place of more than three.
-struct Runs<'a>(&'a [&'a str]);
+struct NameRuns<'a>(&'a [&'a str]);
 
-impl<'a> Iterator for Runs<'a> {
-    type Item = Item<'a>;
-    fn next(&mut self) -> Option<Item<'a>> {
-        let follows = |pair: &[&str]| match (indexed(pair[0]), indexed(pair[1])) {
+impl<'a> Iterator for NameRuns<'a> {
+    type Item = NameRun<'a>;
+    fn next(&mut self) -> Option<NameRun<'a>> {
+        let follows = |pair: &[&str]| match (split_index(pair[0]), split_index(pair[1])) {
             (Some((a, i)), Some((b, j))) => a == b && i + 1 == j,
             _ => false,
         };
@@ -321,33 +325,33 @@ impl<'a> Iterator for Runs<'a> {
         match self.0.get(run - 1) {
             Some(last) if run > 3 => {
                 self.0 = self.0.get(run..).unwrap_or_default();
-                Some(Item::Run(first, last))
+                Some(NameRun::Run(first, last))
             }
             _ => {
                 self.0 = rest;
-                Some(Item::Name(first))
+                Some(NameRun::Name(first))
             }
         }
     }
 }
 
 /// `("x", 3)` of `x[3]`.
-fn indexed(name: &str) -> Option<(&str, u32)> {
+fn split_index(name: &str) -> Option<(&str, u32)> {
     let (head, index) = name.strip_suffix(']')?.rsplit_once('[')?;
     Some((head, index.parse().ok()?))
 }
 
 /// A title and words beside it, in lines; many are cut.
-fn words<W: Display>(f: &mut Formatter<'_>, title: &str, words: impl Iterator<Item = W>) -> fmt::Result {
-    self::title(f, title)?;
+fn fmt_words<W: Display>(f: &mut Formatter<'_>, title: &str, words: impl Iterator<Item = W>) -> fmt::Result {
+    self::fmt_title(f, title)?;
     let mut column = INDENT;
     let mut left_out = 0;
     for (index, word) in words.enumerate() {
-        if index >= WORDS {
+        if index >= MAX_WORDS {
             left_out += 1;
             continue;
         }
-        let mut length = Length(0);
+        let mut length = CharacterCount(0);
         write!(length, "{word}")?;
         if column > INDENT && column + 2 + length.0 > WIDTH {
             write!(f, "\n{:INDENT$}", "")?;

@@ -71,7 +71,7 @@ impl Elimination {
     }
 
     /// How many products of `s×s` blocks the updates of a factorisation cost.
-    pub(crate) const fn products(&self) -> f64 {
+    pub(crate) const fn block_product_count(&self) -> f64 {
         let (mut products, mut index) = (0.0, 0);
         while index < self.pivots.len() {
             let pivot = &self.pivots[index];

@@ -3,7 +3,7 @@
 use super::{Pattern, Structure};
 
 /// So many words have a bit for each state.
-const WORDS: usize = 64;
+const MAX_STATE_WORDS: usize = 64;
 
 impl Structure {
     /// Whether every equation has one derivative of its own, with a constant coefficient, and there
@@ -19,16 +19,16 @@ impl Structure {
             return false;
         }
         // The derivatives that were met.
-        let mut met = [0_u64; WORDS];
+        let mut met = [0_u64; MAX_STATE_WORDS];
         let mut row = 0;
         while row < nx {
             let column = columns[row] as usize;
             let (word, bit) = (column / 64, 1_u64 << (column % 64));
-            let first = if word < WORDS { met[word] & bit == 0 } else { column == row };
+            let first = if word < MAX_STATE_WORDS { met[word] & bit == 0 } else { column == row };
             if rows[row] as usize != row || !self.constant[row] || !first {
                 return false;
             }
-            if word < WORDS {
+            if word < MAX_STATE_WORDS {
                 met[word] |= bit;
             }
             row += 1;

@@ -18,7 +18,7 @@ pub use reduction::Reduction;
 pub use units::Units;
 
 /// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
-pub(crate) fn means(name: &str, variable: &str) -> bool {
+pub(crate) fn name_matches(name: &str, variable: &str) -> bool {
     variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
 }
 

@@ -1,6 +1,6 @@
 //! What `#[dae(index_reduction)]` did.
 
-use super::describe::title;
+use super::describe::fmt_title;
 use core::fmt::{self, Display, Formatter};
 
 /// Equations that were differentiated in time until the model had index 1.
@@ -44,7 +44,7 @@ impl Reduction {
 
 impl Display for Reduction {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        title(f, "reduced")?;
+        fmt_title(f, "reduced")?;
         // Neighbours that were differentiated as often are one entry.
         let alike = |a: &(u32, u32), b: &(u32, u32)| b.0 == a.0 + 1 && b.1 == a.1;
         for (place, run) in self.differentiated.chunk_by(alike).enumerate() {
@@ -61,9 +61,9 @@ impl Display for Reduction {
             }
         }
         writeln!(f)?;
-        title(f, "  invariants")?;
+        fmt_title(f, "  invariants")?;
         writeln!(f, "{}: what was differentiated, and its lower derivatives", self.invariants())?;
-        title(f, "  stabilised")?;
+        fmt_title(f, "  stabilised")?;
         match self.rates {
             [] if self.projection => writeln!(f, "by the projection of `Projected`")?,
             [] => writeln!(f, "no: errors of a constraint grow with time")?,
@@ -75,7 +75,7 @@ impl Display for Reduction {
         }
         let [singular, points] = self.singular;
         if singular > 0 {
-            title(f, "  rank")?;
+            fmt_title(f, "  rank")?;
             writeln!(
                 f,
                 "full at {} of {points} sample points, which need not satisfy the constraints",

@@ -6,17 +6,17 @@
 use super::{Tableau, TableauError};
 
 /// Trees up to this order are checked: 1205 of them up to order 10, milliseconds.
-const LARGEST_TREE: usize = 10;
+const MAX_TREE_ORDER: usize = 10;
 
 /// A sum with the sum of the absolute values of its terms, which scales its rounding error.
 #[derive(Clone, Copy)]
-struct Sum {
+struct TreeSum {
     value: f64,
     absolute: f64,
 }
 
-impl Sum {
-    const ONE: Self = Self { value: 1.0, absolute: 1.0 };
+impl TreeSum {
+    const UNIT_SUM: Self = Self { value: 1.0, absolute: 1.0 };
 
     fn of(terms: impl Iterator<Item = f64>) -> Self {
         terms.fold(Self { value: 0.0, absolute: 0.0 }, |s, t| Self {
@@ -41,34 +41,34 @@ impl<const S: usize> Tableau<S> {
             return Err(TableauError::NotFinite);
         }
         for (stage, (row, &node)) in self.a.iter().zip(&self.c).enumerate() {
-            let sum = Sum::of(row.iter().copied());
+            let sum = TreeSum::of(row.iter().copied());
             if !sum.equals(node, S + 1) {
                 return Err(TableauError::RowSum { stage, sum: sum.value, node });
             }
         }
-        let sum = Sum::of(self.b.iter().copied());
+        let sum = TreeSum::of(self.b.iter().copied());
         if sum.equals(1.0, S + 1) { Ok(()) } else { Err(TableauError::WeightSum { sum: sum.value }) }
     }
 
     /// The order: by trees as far as they are checked, beyond that by `B(p), C(q), D(r)` with
     /// `p ≤ q + r + 1` and `p ≤ 2q + 2`.
     pub(super) fn computed_order(&self) -> usize {
-        let by_trees = (1..=LARGEST_TREE).take_while(|&n| self.satisfies_trees(n)).count();
-        if by_trees < LARGEST_TREE {
+        let by_trees = (1..=MAX_TREE_ORDER).take_while(|&n| self.satisfies_trees(n)).count();
+        if by_trees < MAX_TREE_ORDER {
             return by_trees;
         }
-        let (p, q, r) = (self.quadrature_order(), self.largest_c(), self.largest_d());
+        let (p, q, r) = (self.quadrature_order(), self.stage_order_c(), self.stage_order_d());
         by_trees.max(p.min(q + r + 1).min(2 * q + 2))
     }
 
     pub(super) fn computed_stage_order(&self) -> usize {
-        self.largest_c().min(self.quadrature_order())
+        self.stage_order_c().min(self.quadrature_order())
     }
 
     /// The largest `p` with `B(p)`: `Σ_i b_i c_i^{k−1} = 1/k` for `k ≤ p`. At most `2S`.
     fn quadrature_order(&self) -> usize {
         let holds = |k: usize| {
-            let sum = Sum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1)));
+            let sum = TreeSum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1)));
             sum.equals(1.0 / k as f64, S + 2 * k)
         };
         (1..=2 * S).take_while(|&k| holds(k)).count()
@@ -76,10 +76,10 @@ impl<const S: usize> Tableau<S> {
 
     /// The largest `q` with `C(q)`: `Σ_j a_ij c_j^{k−1} = c_i^k / k` for all `i`, `k ≤ q`. At most
     /// `S`.
-    fn largest_c(&self) -> usize {
+    fn stage_order_c(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|i| {
-                let sum = Sum::of((0..S).map(|j| self.a[i][j] * power(self.c[j], k - 1)));
+                let sum = TreeSum::of((0..S).map(|j| self.a[i][j] * power(self.c[j], k - 1)));
                 sum.equals(power(self.c[i], k) / k as f64, S + 2 * k)
             })
         };
@@ -88,13 +88,13 @@ impl<const S: usize> Tableau<S> {
 
     /// The largest `r` with `D(r)`: `Σ_i b_i c_i^{k−1} a_ij = b_j (1 − c_j^k) / k` for all `j`,
     /// `k ≤ r`.
-    fn largest_d(&self) -> usize {
+    fn stage_order_d(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|j| {
-                let sum = Sum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1) * self.a[i][j]));
+                let sum = TreeSum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1) * self.a[i][j]));
                 // The right-hand side cancels: its rounding error has the scale of b_j / k.
                 let exact = self.b[j] * (1.0 - power(self.c[j], k)) / k as f64;
-                let scaled = Sum { absolute: sum.absolute + self.b[j].abs() / k as f64, ..sum };
+                let scaled = TreeSum { absolute: sum.absolute + self.b[j].abs() / k as f64, ..sum };
                 scaled.equals(exact, S + 2 * k + 1)
             })
         };
@@ -110,37 +110,37 @@ impl<const S: usize> Tableau<S> {
             if !weight.equals(1.0 / density, nodes * (S + 2)) {
                 return false;
             }
-            if !tree.advance() {
+            if !tree.next_tree() {
                 return true;
             }
         }
     }
 
     /// The elementary weight `Σ_i b_i Φ_i(t)` and the density `γ(t)`.
-    fn elementary_weight(&self, tree: &Tree) -> (Sum, f64) {
+    fn elementary_weight(&self, tree: &Tree) -> (TreeSum, f64) {
         // Of the nodes at each level that wait for their parent: the product of their vectors A Φ,
         // and the number of nodes below it. Reversed, a node comes after all its descendants.
-        let mut product = [[Sum::ONE; S]; LARGEST_TREE + 1];
-        let mut size = [0usize; LARGEST_TREE + 1];
+        let mut product = [[TreeSum::UNIT_SUM; S]; MAX_TREE_ORDER + 1];
+        let mut size = [0usize; MAX_TREE_ORDER + 1];
         let mut density = 1.0;
         for &level in tree.levels[1..tree.nodes].iter().rev() {
-            let phi = core::mem::replace(&mut product[level + 1], [Sum::ONE; S]);
+            let phi = core::mem::replace(&mut product[level + 1], [TreeSum::UNIT_SUM; S]);
             let nodes = 1 + core::mem::take(&mut size[level + 1]);
             density *= nodes as f64;
             size[level] += nodes;
             for (product, row) in product[level].iter_mut().zip(&self.a) {
-                let factor = contract(row, &phi);
+                let factor = weighted_row_sum(row, &phi);
                 product.value *= factor.value;
                 product.absolute *= factor.absolute;
             }
         }
-        (contract(&self.b, &product[1]), density * tree.nodes as f64)
+        (weighted_row_sum(&self.b, &product[1]), density * tree.nodes as f64)
     }
 }
 
 /// `Σ_j row_j φ_j`
-fn contract<const S: usize>(row: &[f64; S], phi: &[Sum; S]) -> Sum {
-    row.iter().zip(phi).fold(Sum { value: 0.0, absolute: 0.0 }, |s, (a, phi)| Sum {
+fn weighted_row_sum<const S: usize>(row: &[f64; S], phi: &[TreeSum; S]) -> TreeSum {
+    row.iter().zip(phi).fold(TreeSum { value: 0.0, absolute: 0.0 }, |s, (a, phi)| TreeSum {
         value: s.value + a * phi.value,
         absolute: s.absolute + a.abs() * phi.absolute,
     })
@@ -154,7 +154,7 @@ fn power(base: f64, n: usize) -> f64 {
 /// A rooted tree: the level of each node in preorder, the root at level 0, canonical (largest)
 /// among all orders of the children.
 struct Tree {
-    levels: [usize; LARGEST_TREE],
+    levels: [usize; MAX_TREE_ORDER],
     nodes: usize,
 }
 
@@ -166,7 +166,7 @@ impl Tree {
 
     /// The next one, if there is one. T. Beyer, S. M. Hedetniemi, Constant time generation of
     /// rooted trees, SIAM J. Comput. 9 (1980).
-    fn advance(&mut self) -> bool {
+    fn next_tree(&mut self) -> bool {
         let levels = &mut self.levels;
         let Some(p) = (1..self.nodes).rev().find(|&i| levels[i] > 1) else { return false };
         let Some(parent) = (0..p).rev().find(|&i| levels[i] + 1 == levels[p]) else { return false };

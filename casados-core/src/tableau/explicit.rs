@@ -13,7 +13,7 @@ use super::{Method, Tableau};
 pub struct Euler;
 
 impl Method<1> for Euler {
-    const TABLEAU: Tableau<1> = Tableau::known("explicit Euler", 1, 1, [[0.0]], [1.0], [0.0]);
+    const TABLEAU: Tableau<1> = Tableau::published("explicit Euler", 1, 1, [[0.0]], [1.0], [0.0]);
 }
 
 /// The explicit midpoint rule of Runge, order 2.
@@ -28,7 +28,7 @@ pub struct Midpoint;
 
 impl Method<2> for Midpoint {
     const TABLEAU: Tableau<2> =
-        Tableau::known("explicit midpoint", 2, 1, [[0.0, 0.0], [0.5, 0.0]], [0.0, 1.0], [0.0, 0.5]);
+        Tableau::published("explicit midpoint", 2, 1, [[0.0, 0.0], [0.5, 0.0]], [0.0, 1.0], [0.0, 0.5]);
 }
 
 /// The method of Heun (explicit trapezoidal rule), order 2.
@@ -43,7 +43,7 @@ pub struct Heun;
 
 impl Method<2> for Heun {
     const TABLEAU: Tableau<2> =
-        Tableau::known("Heun", 2, 1, [[0.0, 0.0], [1.0, 0.0]], [0.5, 0.5], [0.0, 1.0]);
+        Tableau::published("Heun", 2, 1, [[0.0, 0.0], [1.0, 0.0]], [0.5, 0.5], [0.0, 1.0]);
 }
 
 /// The classical Runge-Kutta method, order 4.
@@ -58,7 +58,7 @@ impl Method<2> for Heun {
 pub struct Rk4;
 
 impl Method<4> for Rk4 {
-    const TABLEAU: Tableau<4> = Tableau::known(
+    const TABLEAU: Tableau<4> = Tableau::published(
         "classical Runge-Kutta",
         4,
         1,
@@ -83,7 +83,7 @@ impl Method<4> for Rk4 {
 pub struct DormandPrince5;
 
 impl Method<6> for DormandPrince5 {
-    const TABLEAU: Tableau<6> = Tableau::known(
+    const TABLEAU: Tableau<6> = Tableau::published(
         "Dormand-Prince 5",
         5,
         1,
@@ -113,7 +113,7 @@ impl Method<6> for DormandPrince5 {
 pub struct Butcher6;
 
 impl Method<7> for Butcher6 {
-    const TABLEAU: Tableau<7> = Tableau::known(
+    const TABLEAU: Tableau<7> = Tableau::published(
         "Butcher 6",
         6,
         1,
@@ -145,7 +145,7 @@ impl Method<7> for Butcher6 {
 pub struct DormandPrince8;
 
 impl Method<12> for DormandPrince8 {
-    const TABLEAU: Tableau<12> = Tableau::known(
+    const TABLEAU: Tableau<12> = Tableau::published(
         "Dormand-Prince 8",
         8,
         1,

@@ -18,11 +18,11 @@ use super::{Method, Tableau};
 pub struct Gauss<const S: usize>;
 
 impl Method<1> for Gauss<1> {
-    const TABLEAU: Tableau<1> = Tableau::known("Gauss-Legendre, s = 1", 2, 1, [[0.5]], [1.0], [0.5]);
+    const TABLEAU: Tableau<1> = Tableau::published("Gauss-Legendre, s = 1", 2, 1, [[0.5]], [1.0], [0.5]);
 }
 
 impl Method<2> for Gauss<2> {
-    const TABLEAU: Tableau<2> = Tableau::known(
+    const TABLEAU: Tableau<2> = Tableau::published(
         "Gauss-Legendre, s = 2",
         4,
         2,
@@ -33,7 +33,7 @@ impl Method<2> for Gauss<2> {
 }
 
 impl Method<3> for Gauss<3> {
-    const TABLEAU: Tableau<3> = Tableau::known(
+    const TABLEAU: Tableau<3> = Tableau::published(
         "Gauss-Legendre, s = 3",
         6,
         3,
@@ -48,7 +48,7 @@ impl Method<3> for Gauss<3> {
 }
 
 impl Method<4> for Gauss<4> {
-    const TABLEAU: Tableau<4> = Tableau::known(
+    const TABLEAU: Tableau<4> = Tableau::published(
         "Gauss-Legendre, s = 4",
         8,
         4,
@@ -64,7 +64,7 @@ impl Method<4> for Gauss<4> {
 }
 
 impl Method<5> for Gauss<5> {
-    const TABLEAU: Tableau<5> = Tableau::known(
+    const TABLEAU: Tableau<5> = Tableau::published(
         "Gauss-Legendre, s = 5",
         10,
         5,
@@ -117,7 +117,7 @@ impl Method<5> for Gauss<5> {
 }
 
 impl Method<6> for Gauss<6> {
-    const TABLEAU: Tableau<6> = Tableau::known(
+    const TABLEAU: Tableau<6> = Tableau::published(
         "Gauss-Legendre, s = 6",
         12,
         6,
@@ -191,7 +191,7 @@ impl Method<6> for Gauss<6> {
 }
 
 impl Method<7> for Gauss<7> {
-    const TABLEAU: Tableau<7> = Tableau::known(
+    const TABLEAU: Tableau<7> = Tableau::published(
         "Gauss-Legendre, s = 7",
         14,
         7,
@@ -282,7 +282,7 @@ impl Method<7> for Gauss<7> {
 }
 
 impl Method<8> for Gauss<8> {
-    const TABLEAU: Tableau<8> = Tableau::known(
+    const TABLEAU: Tableau<8> = Tableau::published(
         "Gauss-Legendre, s = 8",
         16,
         8,
@@ -392,7 +392,7 @@ impl Method<8> for Gauss<8> {
 }
 
 impl Method<9> for Gauss<9> {
-    const TABLEAU: Tableau<9> = Tableau::known(
+    const TABLEAU: Tableau<9> = Tableau::published(
         "Gauss-Legendre, s = 9",
         18,
         9,

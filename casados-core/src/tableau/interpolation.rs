@@ -28,9 +28,13 @@ fn lagrange(nodes: &[f64], theta: f64, values: &mut [f64]) {
 #[cfg_attr(feature = "std", inline(never))]
 #[cfg_attr(not(feature = "std"), inline(always))]
 fn integrals(nodes: &[f64], theta: f64, values: &mut [f64]) {
-    const FEW: Tableau<5> = Gauss::<5>::TABLEAU;
-    const MANY: Tableau<9> = Gauss::<9>::TABLEAU;
-    let (b, c): (&[f64], &[f64]) = if nodes.len() <= 10 { (&FEW.b, &FEW.c) } else { (&MANY.b, &MANY.c) };
+    const TABLEAU_5_STAGES: Tableau<5> = Gauss::<5>::TABLEAU;
+    const TABLEAU_9_STAGES: Tableau<9> = Gauss::<9>::TABLEAU;
+    let (b, c): (&[f64], &[f64]) = if nodes.len() <= 10 {
+        (&TABLEAU_5_STAGES.b, &TABLEAU_5_STAGES.c)
+    } else {
+        (&TABLEAU_9_STAGES.b, &TABLEAU_9_STAGES.c)
+    };
     for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
         let mut sum = 0.0;
         for (weight, node) in b.iter().zip(c) {

@@ -88,7 +88,7 @@ pub struct Tableau<const S: usize> {
 
 impl<const S: usize> Tableau<S> {
     /// A published tableau with its published orders; tests check them.
-    const fn known(
+    const fn published(
         name: &'static str,
         order: usize,
         stage_order: usize,

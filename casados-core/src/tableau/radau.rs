@@ -17,11 +17,11 @@ use super::{Method, Tableau};
 pub struct RadauIIA<const S: usize>;
 
 impl Method<1> for RadauIIA<1> {
-    const TABLEAU: Tableau<1> = Tableau::known("Radau IIA, s = 1", 1, 1, [[1.0]], [1.0], [1.0]);
+    const TABLEAU: Tableau<1> = Tableau::published("Radau IIA, s = 1", 1, 1, [[1.0]], [1.0], [1.0]);
 }
 
 impl Method<2> for RadauIIA<2> {
-    const TABLEAU: Tableau<2> = Tableau::known(
+    const TABLEAU: Tableau<2> = Tableau::published(
         "Radau IIA, s = 2",
         3,
         2,
@@ -32,7 +32,7 @@ impl Method<2> for RadauIIA<2> {
 }
 
 impl Method<3> for RadauIIA<3> {
-    const TABLEAU: Tableau<3> = Tableau::known(
+    const TABLEAU: Tableau<3> = Tableau::published(
         "Radau IIA, s = 3",
         5,
         3,
@@ -47,7 +47,7 @@ impl Method<3> for RadauIIA<3> {
 }
 
 impl Method<4> for RadauIIA<4> {
-    const TABLEAU: Tableau<4> = Tableau::known(
+    const TABLEAU: Tableau<4> = Tableau::published(
         "Radau IIA, s = 4",
         7,
         4,
@@ -63,7 +63,7 @@ impl Method<4> for RadauIIA<4> {
 }
 
 impl Method<5> for RadauIIA<5> {
-    const TABLEAU: Tableau<5> = Tableau::known(
+    const TABLEAU: Tableau<5> = Tableau::published(
         "Radau IIA, s = 5",
         9,
         5,
@@ -104,7 +104,7 @@ impl Method<5> for RadauIIA<5> {
 }
 
 impl Method<6> for RadauIIA<6> {
-    const TABLEAU: Tableau<6> = Tableau::known(
+    const TABLEAU: Tableau<6> = Tableau::published(
         "Radau IIA, s = 6",
         11,
         6,
@@ -178,7 +178,7 @@ impl Method<6> for RadauIIA<6> {
 }
 
 impl Method<7> for RadauIIA<7> {
-    const TABLEAU: Tableau<7> = Tableau::known(
+    const TABLEAU: Tableau<7> = Tableau::published(
         "Radau IIA, s = 7",
         13,
         7,
@@ -269,7 +269,7 @@ impl Method<7> for RadauIIA<7> {
 }
 
 impl Method<8> for RadauIIA<8> {
-    const TABLEAU: Tableau<8> = Tableau::known(
+    const TABLEAU: Tableau<8> = Tableau::published(
         "Radau IIA, s = 8",
         15,
         8,
@@ -379,7 +379,7 @@ impl Method<8> for RadauIIA<8> {
 }
 
 impl Method<9> for RadauIIA<9> {
-    const TABLEAU: Tableau<9> = Tableau::known(
+    const TABLEAU: Tableau<9> = Tableau::published(
         "Radau IIA, s = 9",
         17,
         9,

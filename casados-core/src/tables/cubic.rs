@@ -43,7 +43,7 @@ pub fn weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
 
 /// What holds at the first and the last point of a spline.
 #[derive(Clone, Copy)]
-pub enum Ends {
+pub enum EndConditions {
     /// The second derivative is zero.
     Natural,
     /// These are the slopes.
@@ -61,25 +61,27 @@ pub enum Ends {
 ///
 /// The matrix is tridiagonal, and no pivots have to be looked for: it is diagonally dominant, but
 /// for the rows of ends that are no knots, whose pivots are positive too.
-pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends) -> [f64; N] {
+pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
     let slopes = solve(points, values, ends);
     check_slopes(&slopes);
     slopes
 }
 
-const fn solve<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends) -> [f64; N] {
-    if let (Ends::NotAKnot, 3) = (ends, N) {
+const fn solve<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
+    if let (EndConditions::NotAKnot, 3) = (ends, N) {
         return parabola(points, values);
     }
     let (mut upper, mut slopes) = ([0.0; N], [0.0; N]);
     let mut i = 0;
     while i < N {
         let [lower, mut diagonal, above, mut right] = match ends {
-            Ends::Slopes([first, _]) if i == 0 => [0.0, 1.0, 0.0, first],
-            Ends::Slopes([_, last]) if i + 1 == N => [0.0, 1.0, 0.0, last],
-            Ends::NotAKnot if N > 3 && i == 0 => not_a_knot(points, values, [0, 1, 2]),
-            Ends::NotAKnot if N > 3 && i + 1 == N => not_a_knot(points, values, [N - 1, N - 2, N - 3]),
-            _ => smooth(points, values, i),
+            EndConditions::Slopes([first, _]) if i == 0 => [0.0, 1.0, 0.0, first],
+            EndConditions::Slopes([_, last]) if i + 1 == N => [0.0, 1.0, 0.0, last],
+            EndConditions::NotAKnot if N > 3 && i == 0 => not_a_knot(points, values, [0, 1, 2]),
+            EndConditions::NotAKnot if N > 3 && i + 1 == N => {
+                not_a_knot(points, values, [N - 1, N - 2, N - 3])
+            }
+            _ => smoothness_row(points, values, i),
         };
         if i > 0 {
             diagonal -= lower * upper[i - 1];
@@ -98,7 +100,7 @@ const fn solve<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends)
 
 /// The row of a point: below, on and above the diagonal, and the right-hand side. The second
 /// derivatives of both sides are equal, or zero where there is one side only.
-const fn smooth<const N: usize>(points: &[f64; N], values: &[f64; N], i: usize) -> [f64; 4] {
+const fn smoothness_row<const N: usize>(points: &[f64; N], values: &[f64; N], i: usize) -> [f64; 4] {
     let [mut lower, mut diagonal, mut above, mut right] = [0.0; 4];
     if i > 0 {
         let h = points[i] - points[i - 1];

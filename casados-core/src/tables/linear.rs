@@ -1,6 +1,6 @@
 //! Linear tables.
 
-use super::points::{check, check_lines, check_values, interval, pair};
+use super::points::{check, check_linear_slopes, check_values, interval, pair};
 use super::{KINKS, Table, cell};
 use crate::scalar::{Real, Rows, Scalar};
 
@@ -30,7 +30,7 @@ impl<const N: usize> Linear<N> {
     pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
         check_values(&values);
-        check_lines(&points, &values);
+        check_linear_slopes(&points, &values);
         Self { points, values }
     }
 
@@ -99,7 +99,7 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
         let mut i = 0;
         while i < N {
             check_values(&values[i]);
-            check_lines(&y, &values[i]);
+            check_linear_slopes(&y, &values[i]);
             i += 1;
         }
         let mut j = 0;
@@ -110,7 +110,7 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
                 column[i] = values[i][j];
                 i += 1;
             }
-            check_lines(&x, &column);
+            check_linear_slopes(&x, &column);
             j += 1;
         }
         Self { x, y, values }

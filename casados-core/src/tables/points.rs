@@ -23,7 +23,7 @@ pub const fn check_values<const N: usize>(values: &[f64; N]) {
 }
 
 /// Stops the compiler where slopes of straight lines between points are not finite.
-pub const fn check_lines<const N: usize>(points: &[f64; N], values: &[f64; N]) {
+pub const fn check_linear_slopes<const N: usize>(points: &[f64; N], values: &[f64; N]) {
     let mut slopes = [0.0; N];
     let mut i = 1;
     while i < N {
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn intervals_are_found_by_counting() {
-        fn hold<const N: usize>() {
+        fn check_interval_search<const N: usize>() {
             let points: [f64; N] = core::array::from_fn(|i| (i * i) as f64);
             for step in -20..(2 * N * N) as i32 {
                 let x = 0.5 * f64::from(step);
@@ -86,11 +86,11 @@ mod tests {
             assert_eq!(interval(&points, f64::NAN), 0);
             assert_eq!(interval(&points, f64::INFINITY), N - 2);
         }
-        hold::<2>();
-        hold::<3>();
-        hold::<4>();
-        hold::<5>();
-        hold::<8>();
-        hold::<17>();
+        check_interval_search::<2>();
+        check_interval_search::<3>();
+        check_interval_search::<4>();
+        check_interval_search::<5>();
+        check_interval_search::<8>();
+        check_interval_search::<17>();
     }
 }

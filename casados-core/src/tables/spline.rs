@@ -1,6 +1,6 @@
 //! Cubic splines.
 
-use super::cubic::{Ends, slopes, weights};
+use super::cubic::{EndConditions, slopes, weights};
 use super::points::{check, check_values, interval, pair};
 use super::{KNOTS, Table, cell};
 use crate::scalar::{Real, Rows, Scalar};
@@ -50,7 +50,7 @@ impl<const N: usize> Spline<N> {
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
         check_values(&values);
-        Self::new(points, values, Ends::Natural)
+        Self::new(points, values, EndConditions::Natural)
     }
 
     /// The spline through values at increasing points whose first and last slope are given: of all
@@ -63,7 +63,7 @@ impl<const N: usize> Spline<N> {
         check(&points);
         check_values(&values);
         check_values(&slopes);
-        Self::new(points, values, Ends::Slopes(slopes))
+        Self::new(points, values, EndConditions::Slopes(slopes))
     }
 
     /// The spline through values at increasing points of which the first two pieces are one
@@ -77,11 +77,11 @@ impl<const N: usize> Spline<N> {
     pub const fn not_a_knot(points: [f64; N], values: [f64; N]) -> Self {
         check(&points);
         check_values(&values);
-        Self::new(points, values, Ends::NotAKnot)
+        Self::new(points, values, EndConditions::NotAKnot)
     }
 
     /// Points are checked by the callers: so the compiler names them.
-    const fn new(points: [f64; N], values: [f64; N], ends: Ends) -> Self {
+    const fn new(points: [f64; N], values: [f64; N], ends: EndConditions) -> Self {
         let slopes = slopes(&points, &values, ends);
         let mut nodes = [[0.0; 2]; N];
         let mut i = 0;
@@ -161,7 +161,7 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check(&x);
         check(&y);
-        Self::new(x, y, values, Ends::Natural)
+        Self::new(x, y, values, EndConditions::Natural)
     }
 
     /// The spline through values on a grid of increasing points, as [`Spline::not_a_knot`] in each
@@ -173,10 +173,10 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     pub const fn not_a_knot(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
         check(&x);
         check(&y);
-        Self::new(x, y, values, Ends::NotAKnot)
+        Self::new(x, y, values, EndConditions::NotAKnot)
     }
 
-    const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N], ends: Ends) -> Self {
+    const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N], ends: EndConditions) -> Self {
         let mut along_x = [[0.0; M]; N];
         let mut j = 0;
         while j < M {

@@ -17,33 +17,33 @@ const G: [[f64; 4]; 6] = [
     [2.1, 0.4, -0.9, 0.2],
     [-0.5, 1.0, 0.3, 1.7],
 ];
-const SPLINE: Spline<6> = Spline::natural(X, F);
+const NATURAL: Spline<6> = Spline::natural(X, F);
 const CLAMPED: Spline<6> = Spline::clamped(X, F, SLOPES);
 const SLOPES: [f64; 2] = [1.3, -2.1];
-const FREE: Spline<6> = Spline::not_a_knot(X, F);
+const NOT_A_KNOT: Spline<6> = Spline::not_a_knot(X, F);
 const LINEAR: Linear<6> = Linear::new(X, F);
-const SPLINE2: Spline2<6, 4> = Spline2::natural(X, Y, G);
-const FREE2: Spline2<6, 4> = Spline2::not_a_knot(X, Y, G);
-const LINEAR2: Linear2<6, 4> = Linear2::new(X, Y, G);
+const NATURAL_2D: Spline2<6, 4> = Spline2::natural(X, Y, G);
+const NOT_A_KNOT_2D: Spline2<6, 4> = Spline2::not_a_knot(X, Y, G);
+const LINEAR_2D: Linear2<6, 4> = Linear2::new(X, Y, G);
 
 fn close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * (1.0 + expected.abs()), "{found} is not {expected}");
 }
 
 /// Inside and outside of the points, none of them a point.
-fn places() -> impl Iterator<Item = f64> {
+fn sample_points() -> impl Iterator<Item = f64> {
     (0..60).map(|k| -3.017 + 0.1501 * f64::from(k))
 }
 
 #[test]
 fn values_at_the_points_are_kept_to_the_last_bit() {
     for (x, f) in X.into_iter().zip(F) {
-        assert_eq!((SPLINE.value(x), LINEAR.value(x)), (f, f));
-        assert_eq!((CLAMPED.value(x), FREE.value(x)), (f, f));
+        assert_eq!((NATURAL.value(x), LINEAR.value(x)), (f, f));
+        assert_eq!((CLAMPED.value(x), NOT_A_KNOT.value(x)), (f, f));
     }
     for (x, row) in X.into_iter().zip(G) {
         for (y, f) in Y.into_iter().zip(row) {
-            assert_eq!((SPLINE2.value(x, y), LINEAR2.value(x, y), FREE2.value(x, y)), (f, f, f));
+            assert_eq!((NATURAL_2D.value(x, y), LINEAR_2D.value(x, y), NOT_A_KNOT_2D.value(x, y)), (f, f, f));
         }
     }
 }
@@ -88,7 +88,7 @@ fn the_least_spline_has_its_closed_form() {
 fn cubic_polynomials_are_kept() {
     let cubic =
         |x: f64| [((0.3 * x - 0.7) * x + 1.1) * x + 0.4, (0.9 * x - 1.4) * x + 1.1, 1.8 * x - 1.4, 1.8];
-    fn on<const N: usize>(points: [f64; N], cubic: impl Fn(f64) -> [f64; 4]) {
+    fn check_on_points<const N: usize>(points: [f64; N], cubic: impl Fn(f64) -> [f64; 4]) {
         let values = points.map(|x| cubic(x)[0]);
         let slopes = [points[0], points[N - 1]].map(|x| cubic(x)[1]);
         let mut splines = std::vec![Spline::clamped(points, values, slopes)];
@@ -102,10 +102,10 @@ fn cubic_polynomials_are_kept() {
             }
         }
     }
-    on([-0.5, 1.5], cubic);
-    on([-0.5, 1.0, 1.5], cubic);
-    on([-0.5, 0.0, 1.0, 1.5], cubic);
-    on(X, cubic);
+    check_on_points([-0.5, 1.5], cubic);
+    check_on_points([-0.5, 1.0, 1.5], cubic);
+    check_on_points([-0.5, 0.0, 1.0, 1.5], cubic);
+    check_on_points(X, cubic);
     let product = |x: f64, y: f64| cubic(x)[0] * cubic(0.1 * y)[0];
     let of_two = Spline2::not_a_knot(X, Y, X.map(|x| Y.map(|y| product(x, y))));
     close(of_two.value(0.9, 13.0), product(0.9, 13.0), 1e-12);
@@ -153,14 +153,14 @@ fn errors_at_the_ends_have_their_orders() {
 
 /// What holds at the ends of the splines of the tests.
 #[derive(Clone, Copy)]
-enum At {
+enum TestEnds {
     Natural,
     Slopes,
     NotAKnot,
 }
 
 /// The same spline by its second derivatives at the points, from a dense system.
-fn by_moments(ends: At, points: &[f64], values: &[f64], x: f64) -> f64 {
+fn by_moments(ends: TestEnds, points: &[f64], values: &[f64], x: f64) -> f64 {
     let n = points.len();
     let h = |i: usize| points[i + 1] - points[i];
     let slope = |i: usize| (values[i + 1] - values[i]) / h(i);
@@ -173,15 +173,15 @@ fn by_moments(ends: At, points: &[f64], values: &[f64], x: f64) -> f64 {
         right[i] = slope(i) - slope(i - 1);
     }
     match ends {
-        At::Natural => {}
-        At::Slopes => {
+        TestEnds::Natural => {}
+        TestEnds::Slopes => {
             for (end, next, piece, sign) in [(0, 1, 0, 1.0), (n - 1, n - 2, n - 2, -1.0)] {
                 matrix[(end, end)] = h(piece) / 3.0;
                 matrix[(end, next)] = h(piece) / 6.0;
                 right[end] = sign * (slope(piece) - SLOPES[usize::from(end > 0)]);
             }
         }
-        At::NotAKnot => {
+        TestEnds::NotAKnot => {
             for (end, first) in [(0, 0), (n - 1, n - 3)] {
                 let (h, k) = (h(first), h(first + 1));
                 let row = [1.0 / h, -1.0 / h - 1.0 / k, 1.0 / k];
@@ -202,12 +202,14 @@ fn by_moments(ends: At, points: &[f64], values: &[f64], x: f64) -> f64 {
 
 #[test]
 fn splines_are_those_of_second_derivatives() {
-    for x in places().filter(|x| (X[0]..X[5]).contains(x)) {
-        close(SPLINE.value(x), by_moments(At::Natural, &X, &F, x), 1e-14);
-        close(CLAMPED.value(x), by_moments(At::Slopes, &X, &F, x), 1e-13);
-        close(FREE.value(x), by_moments(At::NotAKnot, &X, &F, x), 1e-13);
+    for x in sample_points().filter(|x| (X[0]..X[5]).contains(x)) {
+        close(NATURAL.value(x), by_moments(TestEnds::Natural, &X, &F, x), 1e-14);
+        close(CLAMPED.value(x), by_moments(TestEnds::Slopes, &X, &F, x), 1e-13);
+        close(NOT_A_KNOT.value(x), by_moments(TestEnds::NotAKnot, &X, &F, x), 1e-13);
         for y in [10.3, 12.9, 16.0, 19.99] {
-            for (spline, ends, tolerance) in [(SPLINE2, At::Natural, 1e-14), (FREE2, At::NotAKnot, 1e-13)] {
+            for (spline, ends, tolerance) in
+                [(NATURAL_2D, TestEnds::Natural, 1e-14), (NOT_A_KNOT_2D, TestEnds::NotAKnot, 1e-13)]
+            {
                 let rows: Vec<f64> = G.iter().map(|row| by_moments(ends, &Y, row, y)).collect();
                 close(spline.value(x, y), by_moments(ends, &X, &rows, x), tolerance);
             }
@@ -219,14 +221,14 @@ fn splines_are_those_of_second_derivatives() {
 fn ends_are_as_they_are_given() {
     assert_eq!([X[0], X[5]].map(|x| CLAMPED.derivative(x)), SLOPES);
     assert_eq!([X[0] - 3.0, X[5] + 2.0].map(|x| CLAMPED.derivative(x)), SLOPES);
-    for spline in [CLAMPED, FREE] {
+    for spline in [CLAMPED, NOT_A_KNOT] {
         for x in &X[1..5] {
             let sides = [x - 1e-9, x + 1e-9].map(|x| spline.partial([x], [2]));
             close(sides[0], sides[1], 1e-6);
         }
     }
     for x in [X[1], X[4]] {
-        let sides = [x - 1e-9, x + 1e-9].map(|x| FREE.partial([x], [3]));
+        let sides = [x - 1e-9, x + 1e-9].map(|x| NOT_A_KNOT.partial([x], [3]));
         close(sides[0], sides[1], 1e-12);
     }
 }
@@ -236,17 +238,17 @@ fn splines_are_twice_continuously_differentiable_everywhere() {
     let step = 1e-9;
     for x in X {
         for order in 0..3 {
-            let sides = [x - step, x + step].map(|x| SPLINE.partial([x], [order]));
+            let sides = [x - step, x + step].map(|x| NATURAL.partial([x], [order]));
             close(sides[0], sides[1], 1e-7);
             for (y, other) in Y.into_iter().flat_map(|y| (0..3).map(move |other| (y, other))) {
-                let sides = [x - step, x + step].map(|x| SPLINE2.partial([x, y], [order, other]));
+                let sides = [x - step, x + step].map(|x| NATURAL_2D.partial([x, y], [order, other]));
                 close(sides[0], sides[1], 1e-7);
-                let sides = [y - step, y + step].map(|y| SPLINE2.partial([x, y], [order, other]));
+                let sides = [y - step, y + step].map(|y| NATURAL_2D.partial([x, y], [order, other]));
                 close(sides[0], sides[1], 1e-7);
             }
         }
     }
-    let third = [0.4, 0.6].map(|x| SPLINE.partial([x], [3]));
+    let third = [0.4, 0.6].map(|x| NATURAL.partial([x], [3]));
     assert!((third[0] - third[1]).abs() > 1.0, "but not three times");
 }
 
@@ -254,18 +256,18 @@ fn splines_are_twice_continuously_differentiable_everywhere() {
 fn all_tables_are_continued_linearly() {
     for (end, away) in [(X[0], -2.0), (X[5], 3.0)] {
         let x = end + away;
-        close(SPLINE.value(x), SPLINE.value(end) + away * SPLINE.derivative(end), 1e-14);
+        close(NATURAL.value(x), NATURAL.value(end) + away * NATURAL.derivative(end), 1e-14);
         close(LINEAR.value(x), LINEAR.value(end) + away * LINEAR.derivative(end), 1e-14);
-        assert_eq!([2, 3].map(|order| SPLINE.partial([x], [order])), [0.0; 2]);
-        let inside = SPLINE2.value(end, 11.0) + away * SPLINE2.gradient(end, 11.0)[0];
-        close(SPLINE2.value(x, 11.0), inside, 1e-14);
+        assert_eq!([2, 3].map(|order| NATURAL.partial([x], [order])), [0.0; 2]);
+        let inside = NATURAL_2D.value(end, 11.0) + away * NATURAL_2D.gradient(end, 11.0)[0];
+        close(NATURAL_2D.value(x, 11.0), inside, 1e-14);
         // Beyond a corner the function is bilinear.
-        let corner = |i, j| SPLINE2.partial([end, Y[3]], [i, j]);
+        let corner = |i, j| NATURAL_2D.partial([end, Y[3]], [i, j]);
         let expected = corner(0, 0) + away * corner(1, 0) + 4.0 * corner(0, 1) + 4.0 * away * corner(1, 1);
-        close(SPLINE2.value(x, Y[3] + 4.0), expected, 1e-14);
+        close(NATURAL_2D.value(x, Y[3] + 4.0), expected, 1e-14);
     }
-    assert!(SPLINE.value(f64::NAN).is_nan() && LINEAR2.value(0.0, f64::NAN).is_nan());
-    assert!(SPLINE.value(1e300_f64).is_finite());
+    assert!(NATURAL.value(f64::NAN).is_nan() && LINEAR_2D.value(0.0, f64::NAN).is_nan());
+    assert!(NATURAL.value(1e300_f64).is_finite());
 }
 
 /// Derivatives of lower order, differentiated by hyper-dual numbers, by complex numbers, and by
@@ -298,18 +300,18 @@ fn check_derivatives<const K: usize>(table: &impl Table<K>, orders: [u32; K], at
 
 #[test]
 fn derivatives_agree_three_ways() {
-    for x in places() {
+    for x in sample_points() {
         for order in 0..3 {
-            check_derivatives(&SPLINE, [order], [x]);
+            check_derivatives(&NATURAL, [order], [x]);
             check_derivatives(&CLAMPED, [order], [x]);
-            check_derivatives(&FREE, [order], [x]);
+            check_derivatives(&NOT_A_KNOT, [order], [x]);
             check_derivatives(&LINEAR, [order], [x]);
         }
         for y in [7.0, 10.1, 14.0, 19.0, 25.0] {
             for orders in [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]] {
-                check_derivatives(&SPLINE2, orders, [x, y]);
-                check_derivatives(&FREE2, orders, [x, y]);
-                check_derivatives(&LINEAR2, orders, [x, y]);
+                check_derivatives(&NATURAL_2D, orders, [x, y]);
+                check_derivatives(&NOT_A_KNOT_2D, orders, [x, y]);
+                check_derivatives(&LINEAR_2D, orders, [x, y]);
             }
         }
     }
@@ -317,25 +319,25 @@ fn derivatives_agree_three_ways() {
 
 #[test]
 fn registers_have_the_bits_of_numbers() {
-    let list: Vec<f64> = places().collect();
+    let list: Vec<f64> = sample_points().collect();
     for pair in list.windows(2) {
         let x = F64x2::<2>::load(&[pair[0], pair[1]]);
         let y = F64x2::<2>::load(&[11.0, 18.5]);
         for order in 0..4 {
-            let lanes = SPLINE.partial([x], [order]).to_array();
-            assert_eq!(lanes, [pair[0], pair[1]].map(|x| SPLINE.partial([x], [order])));
-            let lanes = SPLINE2.partial([x, y], [order, 1]).to_array();
-            assert_eq!(lanes[0], SPLINE2.partial([pair[0], 11.0], [order, 1]));
-            assert_eq!(lanes[1], SPLINE2.partial([pair[1], 18.5], [order, 1]));
+            let lanes = NATURAL.partial([x], [order]).to_array();
+            assert_eq!(lanes, [pair[0], pair[1]].map(|x| NATURAL.partial([x], [order])));
+            let lanes = NATURAL_2D.partial([x, y], [order, 1]).to_array();
+            assert_eq!(lanes[0], NATURAL_2D.partial([pair[0], 11.0], [order, 1]));
+            assert_eq!(lanes[1], NATURAL_2D.partial([pair[1], 18.5], [order, 1]));
         }
-        assert_eq!(LINEAR2.value(x, y).to_array()[1], LINEAR2.value(pair[1], 18.5));
+        assert_eq!(LINEAR_2D.value(x, y).to_array()[1], LINEAR_2D.value(pair[1], 18.5));
     }
     for four in list.windows(4) {
         let x = [four[0], four[1], four[2], four[3]].map(|x| x as f32);
-        let lanes = SPLINE.value(F32x4::<4>::load(&x)).to_array();
-        assert_eq!(lanes, x.map(|x| SPLINE.value(x)));
+        let lanes = NATURAL.value(F32x4::<4>::load(&x)).to_array();
+        assert_eq!(lanes, x.map(|x| NATURAL.value(x)));
         for (single, x) in lanes.into_iter().zip(x) {
-            close(f64::from(single), SPLINE.value(f64::from(x)), 1e-5);
+            close(f64::from(single), NATURAL.value(f64::from(x)), 1e-5);
         }
     }
 }

@@ -42,18 +42,18 @@ impl Bounded {
 
     /// A function of one argument, its value and the size of its derivative.
     fn function(self, value: f64, derivative: f64) -> Self {
-        Self { value, error: carried(derivative, self.error) + FUNCTION * value.abs() }
+        Self { value, error: propagated_error(derivative, self.error) + FUNCTION * value.abs() }
     }
 }
 
 /// What an argument's error becomes; an exact argument stays exact where the derivative is
 /// infinite.
-fn carried(derivative: f64, error: f64) -> f64 {
+fn propagated_error(derivative: f64, error: f64) -> f64 {
     if error == 0.0 { 0.0 } else { derivative.abs() * error }
 }
 
 /// The bound of a rounding: zero where nothing was lost, so that exact numbers stay exact.
-fn rounding(value: f64, lost: f64) -> f64 {
+fn rounding_error(value: f64, lost: f64) -> f64 {
     if lost == 0.0 { 0.0 } else { U * value.abs() }
 }
 
@@ -64,7 +64,7 @@ impl Add for Bounded {
         // What the sum has rounded (Knuth's TwoSum).
         let other_part = value - self.value;
         let lost = (self.value - (value - other_part)) + (other.value - other_part);
-        Self { value, error: self.error + other.error + rounding(value, lost) }
+        Self { value, error: self.error + other.error + rounding_error(value, lost) }
     }
 }
 
@@ -82,7 +82,7 @@ impl Mul for Bounded {
         let carried =
             self.value.abs() * other.error + other.value.abs() * self.error + self.error * other.error;
         let lost = self.value.mul_add(other.value, -value);
-        Self { value, error: carried + rounding(value, lost) }
+        Self { value, error: carried + rounding_error(value, lost) }
     }
 }
 
@@ -94,7 +94,7 @@ impl Div for Bounded {
         let carried = self.error + value.abs() * other.error;
         let carried = if carried == 0.0 { 0.0 } else { carried / left };
         let lost = value.mul_add(-other.value, self.value);
-        Self { value, error: carried + rounding(value, lost) }
+        Self { value, error: carried + rounding_error(value, lost) }
     }
 }
 
@@ -166,8 +166,8 @@ impl Scalar for Bounded {
         let square = self.value * self.value + other.value * other.value;
         Self {
             value,
-            error: carried(other.value / square, self.error)
-                + carried(self.value / square, other.error)
+            error: propagated_error(other.value / square, self.error)
+                + propagated_error(self.value / square, other.error)
                 + FUNCTION * value.abs(),
         }
     }
@@ -179,12 +179,15 @@ impl Scalar for Bounded {
     fn powi(self, n: i32) -> Self {
         let value = self.value.powi(n);
         let derivative = f64::from(n) * self.value.powi(n - 1);
-        Self { value, error: carried(derivative, self.error) + f64::from(n.unsigned_abs()) * U * value.abs() }
+        Self {
+            value,
+            error: propagated_error(derivative, self.error) + f64::from(n.unsigned_abs()) * U * value.abs(),
+        }
     }
     fn powf(self, other: Self) -> Self {
         let value = self.value.powf(other.value);
-        let error = carried(other.value * self.value.powf(other.value - 1.0), self.error)
-            + carried(value * self.value.ln(), other.error);
+        let error = propagated_error(other.value * self.value.powf(other.value - 1.0), self.error)
+            + propagated_error(value * self.value.ln(), other.error);
         Self { value, error: error + FUNCTION * value.abs() }
     }
     fn abs(self) -> Self {

@@ -91,7 +91,7 @@ pub fn convergence<E: fmt::Display>(
 
 impl Convergence {
     /// Order between two successive rows: `log(e₁/e₂) / log(n₂/n₁)`.
-    fn between(a: (usize, f64), b: (usize, f64)) -> f64 {
+    fn observed_order(a: (usize, f64), b: (usize, f64)) -> f64 {
         (a.1 / b.1).ln() / (b.0 as f64 / a.0 as f64).ln()
     }
 
@@ -151,7 +151,7 @@ impl fmt::Display for Convergence {
         for (i, &(steps, error)) in self.rows.iter().enumerate() {
             write!(f, "{steps:>8} {error:>12.3e}")?;
             if i > 0 && error > self.floor && error.is_finite() {
-                write!(f, " {:>8.2}", Self::between(self.rows[i - 1], (steps, error)))?;
+                write!(f, " {:>8.2}", Self::observed_order(self.rows[i - 1], (steps, error)))?;
             }
             writeln!(f)?;
         }

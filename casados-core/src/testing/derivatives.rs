@@ -1,6 +1,6 @@
 //! The derivatives of a model against independent ones.
 
-use super::evaluate::{self, Estimate, variables};
+use super::evaluate::{self, BoundedMatrix, derivative_variable_count};
 use super::facts;
 use super::points::{Points, Random};
 use super::report::{Entry, Report};
@@ -103,7 +103,7 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
 /// ```
 pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("patterns of {}", type_name::<M>()));
-    let n = variables::<M>();
+    let n = derivative_variable_count::<M>();
     let mut declared = DMatrix::from_element(M::Shape::NK, n, false);
     for entry in 0..M::STRUCTURE.jacobian.len() {
         declared[M::STRUCTURE.jacobian.at(entry)] = true;
@@ -115,7 +115,7 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
         declared_twice[(j, i)] = true;
     }
     for (number, v, mu) in samples(points) {
-        let outside = |declared: &DMatrix<bool>, found: &Estimate| -> Vec<(usize, Entry)> {
+        let outside = |declared: &DMatrix<bool>, found: &BoundedMatrix| -> Vec<(usize, Entry)> {
             (0..found.value.len())
                 .filter(|&i| !declared[i])
                 .map(|i| (i, Entry { value: 0.0, expected: found.value[i], tolerance: found.error[i] }))
@@ -123,11 +123,11 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
         };
         let found = evaluate::difference_jacobian::<M>(&v);
         let entries = outside(&declared, &found);
-        let (scale, name) = (largest(&found.value), |i| jacobian_entry::<M>(i));
+        let (scale, name) = (largest(&found.value), |i| jacobian_entry_name::<M>(i));
         report.compare("Jacobian outside", "differences", number, scale, entries.into_iter(), name);
         let found = evaluate::difference_hessian::<M>(&v, &mu);
         let entries = outside(&declared_twice, &found);
-        let (scale, name) = (largest(&found.value), |i| hessian_entry::<M>(i));
+        let (scale, name) = (largest(&found.value), |i| hessian_entry_name::<M>(i));
         report.compare("Hessian outside", "differences", number, scale, entries.into_iter(), name);
     }
     let points: Vec<_> = samples(points).collect();
@@ -164,13 +164,13 @@ fn check_linear<M: Dae>(report: &mut Report, number: usize, v: &ArrayV<M, f64>) 
         let mu: Vec<f64> = (0..M::Shape::NK).map(|r| f64::from(u8::from(r == row))).collect();
         let found = evaluate::hessian::<M, f64>(v, &mu);
         let entries = found.iter().map(|&value| Entry { value, expected: 0.0, tolerance: 0.0 });
-        let name = |i| format!("of equation {row} {}", hessian_entry::<M>(i));
+        let name = |i| format!("of equation {row} {}", hessian_entry_name::<M>(i));
         report.compare("Hessian, linear rows", "zero", number, 0.0, entries.enumerate(), name);
     }
 }
 
 /// `Jᵀ μ` with bounds, and a zero for `t`.
-fn transposed_product(jacobian: &Estimate, mu: &[f64]) -> Estimate {
+fn transposed_product(jacobian: &BoundedMatrix, mu: &[f64]) -> BoundedMatrix {
     let (rows, columns) = jacobian.value.shape();
     let (mut value, mut error) = (DMatrix::zeros(columns + 1, 1), DMatrix::zeros(columns + 1, 1));
     for j in 0..columns {
@@ -181,29 +181,29 @@ fn transposed_product(jacobian: &Estimate, mu: &[f64]) -> Estimate {
             error[j] += mu.abs() * jacobian.error[(r, j)] + rows as f64 * f64::EPSILON * product.abs();
         }
     }
-    Estimate { value, error }
+    BoundedMatrix { value, error }
 }
 
 fn compare_jacobian<M: Dae>(
     report: &mut Report,
     reference: &'static str,
     point: usize,
-    own: &Estimate,
-    other: &Estimate,
+    own: &BoundedMatrix,
+    other: &BoundedMatrix,
 ) {
     let scale = largest(&own.value);
-    report.compare("Jacobian", reference, point, scale, entries(own, other), |i| jacobian_entry::<M>(i));
+    report.compare("Jacobian", reference, point, scale, entries(own, other), |i| jacobian_entry_name::<M>(i));
 }
 
 fn compare_adjoint<M: Dae>(
     report: &mut Report,
     reference: &'static str,
     point: usize,
-    own: &Estimate,
-    other: &Estimate,
+    own: &BoundedMatrix,
+    other: &BoundedMatrix,
 ) {
     let scale = largest(&own.value);
-    let name = |i| format!("by {}", variable::<M>(i));
+    let name = |i| format!("by {}", variable_name::<M>(i));
     report.compare("adjoint", reference, point, scale, entries(own, other), name);
 }
 
@@ -211,15 +211,18 @@ fn compare_hessian<M: Dae>(
     report: &mut Report,
     reference: &'static str,
     point: usize,
-    own: &Estimate,
-    other: &Estimate,
+    own: &BoundedMatrix,
+    other: &BoundedMatrix,
 ) {
     let scale = largest(&own.value);
-    report.compare("Hessian", reference, point, scale, entries(own, other), |i| hessian_entry::<M>(i));
+    report.compare("Hessian", reference, point, scale, entries(own, other), |i| hessian_entry_name::<M>(i));
 }
 
 /// Entries in column-major order.
-fn entries<'a>(own: &'a Estimate, other: &'a Estimate) -> impl Iterator<Item = (usize, Entry)> + 'a {
+fn entries<'a>(
+    own: &'a BoundedMatrix,
+    other: &'a BoundedMatrix,
+) -> impl Iterator<Item = (usize, Entry)> + 'a {
     (0..own.value.len()).map(|i| {
         let tolerance = own.error[i] + other.error[i];
         (i, Entry { value: own.value[i], expected: other.value[i], tolerance })
@@ -230,18 +233,18 @@ fn largest(values: &DMatrix<f64>) -> f64 {
     values.iter().fold(0.0, |a, b| if b.is_finite() { f64::max(a, b.abs()) } else { a })
 }
 
-fn jacobian_entry<M: Dae>(i: usize) -> String {
+fn jacobian_entry_name<M: Dae>(i: usize) -> String {
     let (row, column) = (i % M::Shape::NK, i / M::Shape::NK);
-    format!("of equation {row} by {}", variable::<M>(column))
+    format!("of equation {row} by {}", variable_name::<M>(column))
 }
 
-fn hessian_entry<M: Dae>(i: usize) -> String {
-    let (row, column) = (i % variables::<M>(), i / variables::<M>());
-    format!("by {} and {}", variable::<M>(row), variable::<M>(column))
+fn hessian_entry_name<M: Dae>(i: usize) -> String {
+    let (row, column) = (i % derivative_variable_count::<M>(), i / derivative_variable_count::<M>());
+    format!("by {} and {}", variable_name::<M>(row), variable_name::<M>(column))
 }
 
 /// The name of a variable of the model.
-fn variable<M: Dae>(index: usize) -> String {
+fn variable_name<M: Dae>(index: usize) -> String {
     let structure = &M::STRUCTURE;
     let mut i = index;
     if let Some(name) = structure.x.get(i) {

@@ -14,7 +14,7 @@ const STEPS: core::ops::RangeInclusive<i32> = 2..=12;
 /// By how much two successive differences between estimates must shrink, unless they are rounding:
 /// 256 where the order is reached. At a kink, or where the function is not resolved, they do not,
 /// and nothing is known.
-const SHRINK: f64 = 16.0;
+const MIN_SHRINK_FACTOR: f64 = 16.0;
 
 /// The derivative of each output at `a`, with its error: that of rounding (carried through the
 /// function by running error analysis) and that of truncation (the difference between two
@@ -59,7 +59,7 @@ pub(super) fn derivative(
             let latest = (now.value - value).abs();
             let error = now.error + latest;
             // A NaN has left the domain of the function and passes no comparison.
-            let converges = latest <= now.error || latest * SHRINK <= change;
+            let converges = latest <= now.error || latest * MIN_SHRINK_FACTOR <= change;
             if converges && error < best[i].error {
                 best[i] = Bounded { value: now.value, error };
             }
@@ -108,7 +108,7 @@ mod tests {
 
     /// Outside of the domain there is no derivative, rather than a wrong one.
     #[test]
-    fn outside_of_the_domain() {
+    fn no_estimate_outside_domain() {
         let d = derivative(-5.0, 1, |x| vec![x.ln()]);
         assert!(d[0].value.is_nan());
     }

@@ -11,27 +11,27 @@ use num_dual::{Dual64, HyperDual64};
 use std::vec::Vec;
 
 /// The complex step, about `1e-200`; a power of two, so that multiplying by it rounds nothing.
-const STEP: f64 = f64::from_bits((1023 - 664) << 52);
+const COMPLEX_STEP: f64 = f64::from_bits((1023 - 664) << 52);
 
 /// How many operations of a reference stand against one of [`Forward`]: a complex
 /// division rounds three times in each part.
-const REFERENCE: f64 = 4.0;
+const REFERENCE_ERROR_FACTOR: f64 = 4.0;
 
 /// Values, and bounds of their errors.
 #[derive(Clone, Debug)]
-pub(super) struct Estimate {
+pub(super) struct BoundedMatrix {
     pub value: DMatrix<f64>,
     pub error: DMatrix<f64>,
 }
 
-impl Estimate {
+impl BoundedMatrix {
     fn of(values: &DMatrix<Bounded>, factor: f64) -> Self {
         Self { value: values.map(|b| b.value), error: values.map(|b| factor * b.error) }
     }
 }
 
 /// Variables that derivatives are taken by: all but `t`.
-pub(super) const fn variables<M: Dae>() -> usize {
+pub(super) const fn derivative_variable_count<M: Dae>() -> usize {
     M::Shape::NV - 1
 }
 
@@ -57,7 +57,7 @@ pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (Array
     let mut values = filled::<S, M::Jacobian<S>>(f64::NAN);
     M::jacobian_constants::<S>(&mut values);
     M::residual_jacobian::<S>(&lift::<M, S>(v), &mut f, &mut values);
-    let mut dense = DMatrix::from_element(M::Shape::NK, variables::<M>(), S::from_f64(0.0));
+    let mut dense = DMatrix::from_element(M::Shape::NK, derivative_variable_count::<M>(), S::from_f64(0.0));
     for entry in 0..M::STRUCTURE.jacobian.len() {
         dense[M::STRUCTURE.jacobian.at(entry)] = values[entry];
     }
@@ -77,7 +77,11 @@ pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
     let mut values = filled::<S, M::Hessian<S>>(f64::NAN);
     M::hessian::<S>(&lift::<M, S>(v), &mu, &mut values);
-    let mut dense = DMatrix::from_element(variables::<M>(), variables::<M>(), S::from_f64(0.0));
+    let mut dense = DMatrix::from_element(
+        derivative_variable_count::<M>(),
+        derivative_variable_count::<M>(),
+        S::from_f64(0.0),
+    );
     for entry in 0..M::STRUCTURE.hessian.len() {
         let (i, j) = M::STRUCTURE.hessian.at(entry);
         dense[(i, j)] = values[entry];
@@ -87,25 +91,25 @@ pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]
 }
 
 /// The model's own values with bounds of their rounding.
-pub(super) fn own_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> Estimate {
+pub(super) fn own_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
     let bounds = jacobian::<M, Bounded>(v).1;
-    Estimate { value: jacobian::<M, f64>(v).1, error: bounds.map(|b| b.error) }
+    BoundedMatrix { value: jacobian::<M, f64>(v).1, error: bounds.map(|b| b.error) }
 }
 
 /// The model's own gradient as one column, with bounds.
-pub(super) fn own_adjoint<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+pub(super) fn own_adjoint<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let bounds = adjoint::<M, Bounded>(&lift::<M, Bounded>(v), mu);
     let values = adjoint::<M, f64>(v, mu);
-    Estimate {
+    BoundedMatrix {
         value: DMatrix::from_fn(M::Shape::NV, 1, |i, _| values[i]),
         error: DMatrix::from_fn(M::Shape::NV, 1, |i, _| bounds[i].error),
     }
 }
 
 /// The model's own Hessian with bounds.
-pub(super) fn own_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+pub(super) fn own_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let bounds = hessian::<M, Bounded>(v, mu);
-    Estimate { value: hessian::<M, f64>(v, mu), error: bounds.map(|b| b.error) }
+    BoundedMatrix { value: hessian::<M, f64>(v, mu), error: bounds.map(|b| b.error) }
 }
 
 /// A function of a point in another arithmetic, at `v` in the direction of variable `j`.
@@ -126,41 +130,41 @@ fn forward_seed(j: usize) -> impl Fn(usize, f64) -> Forward<Bounded> {
 }
 
 /// The Jacobian by `num-dual`.
-pub(super) fn dual_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> Estimate {
-    let value = by_columns(variables::<M>(), M::Shape::NK, |j| {
+pub(super) fn dual_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
+    let value = matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
         let seed = |i, value| Dual64::new(value, f64::from(u8::from(i == j)));
         at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Dual64>).iter().map(|f| f.eps).collect()
     });
-    Estimate { value, error: jacobian_bounds::<M>(v) }
+    BoundedMatrix { value, error: jacobian_bounds::<M>(v) }
 }
 
 /// The Jacobian by the complex step.
-pub(super) fn complex_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> Estimate {
-    let value = by_columns(variables::<M>(), M::Shape::NK, |j| {
+pub(super) fn complex_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
+    let value = matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
         at(v.as_ref(), M::Shape::NK, complex_seed(j), M::residual_of::<Complex64>)
             .iter()
-            .map(|f| f.im / STEP)
+            .map(|f| f.im / COMPLEX_STEP)
             .collect()
     });
-    Estimate { value, error: jacobian_bounds::<M>(v) }
+    BoundedMatrix { value, error: jacobian_bounds::<M>(v) }
 }
 
 fn complex_seed(j: usize) -> impl Fn(usize, f64) -> Complex64 {
-    move |i, value| Complex64::new(value, if i == j { STEP } else { 0.0 })
+    move |i, value| Complex64::new(value, if i == j { COMPLEX_STEP } else { 0.0 })
 }
 
 fn jacobian_bounds<M: GraphDae>(v: &ArrayV<M, f64>) -> DMatrix<f64> {
-    by_columns(variables::<M>(), M::Shape::NK, |j| {
+    matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
         at(v.as_ref(), M::Shape::NK, forward_seed(j), M::residual_of::<Forward<Bounded>>)
             .iter()
-            .map(|f| REFERENCE * f.d.error)
+            .map(|f| REFERENCE_ERROR_FACTOR * f.d.error)
             .collect()
     })
 }
 
 /// The Hessian of `μᵀ f` by the hyper-duals of `num-dual`.
-pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
-    let n = variables::<M>();
+pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
+    let n = derivative_variable_count::<M>();
     let (mut value, mut error) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
     let is = |i: usize, j: usize| f64::from(u8::from(i == j));
     for i in 0..n {
@@ -181,53 +185,54 @@ pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estim
                 }
             }
             (value[(i, j)], value[(j, i)]) = (sum.value, sum.value);
-            (error[(i, j)], error[(j, i)]) = (REFERENCE * sum.error, REFERENCE * sum.error);
+            (error[(i, j)], error[(j, i)]) =
+                (REFERENCE_ERROR_FACTOR * sum.error, REFERENCE_ERROR_FACTOR * sum.error);
         }
     }
-    Estimate { value, error }
+    BoundedMatrix { value, error }
 }
 
 /// The Hessian of `μᵀ f` by the complex step through the model's gradient.
-pub(super) fn complex_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
-    let n = variables::<M>();
+pub(super) fn complex_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
+    let n = derivative_variable_count::<M>();
     fn seeds<S: Scalar>(mu: &[f64]) -> Vec<S> {
         mu.iter().map(|&mu| S::from_f64(mu)).collect()
     }
-    let value = by_columns(n, n, |j| {
+    let value = matrix_from_columns(n, n, |j| {
         let gradient = |v: &[Complex64], g: &mut [Complex64]| M::adjoint_of(v, &seeds(mu), g);
         let column = at(v.as_ref(), M::Shape::NV, complex_seed(j), gradient);
-        column[..n].iter().map(|g| g.im / STEP).collect()
+        column[..n].iter().map(|g| g.im / COMPLEX_STEP).collect()
     });
-    let error = by_columns(n, n, |j| {
+    let error = matrix_from_columns(n, n, |j| {
         let gradient = |v: &[Forward<Bounded>], g: &mut [Forward<Bounded>]| {
             M::adjoint_of(v, &seeds(mu), g);
         };
         let column = at(v.as_ref(), M::Shape::NV, forward_seed(j), gradient);
-        column[..n].iter().map(|g| REFERENCE * g.d.error).collect()
+        column[..n].iter().map(|g| REFERENCE_ERROR_FACTOR * g.d.error).collect()
     });
-    Estimate { value, error }
+    BoundedMatrix { value, error }
 }
 
 /// The Jacobian by differences of the residual.
-pub(super) fn difference_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> Estimate {
-    by_differences::<M>(v, M::Shape::NK, |v| residual::<M, Bounded>(v).as_ref().to_vec())
+pub(super) fn difference_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
+    difference_matrix::<M>(v, M::Shape::NK, |v| residual::<M, Bounded>(v).as_ref().to_vec())
 }
 
 /// The Hessian by differences of the model's gradient.
-pub(super) fn difference_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
-    by_differences::<M>(v, variables::<M>(), |v| {
-        adjoint::<M, Bounded>(v, mu).as_ref()[..variables::<M>()].to_vec()
+pub(super) fn difference_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
+    difference_matrix::<M>(v, derivative_variable_count::<M>(), |v| {
+        adjoint::<M, Bounded>(v, mu).as_ref()[..derivative_variable_count::<M>()].to_vec()
     })
 }
 
 /// Derivatives of a function of the point by each variable.
-fn by_differences<M: Dae>(
+fn difference_matrix<M: Dae>(
     v: &ArrayV<M, f64>,
     outputs: usize,
     function: impl Fn(&ArrayV<M, Bounded>) -> Vec<Bounded>,
-) -> Estimate {
+) -> BoundedMatrix {
     let point = lift::<M, Bounded>(v);
-    let columns: Vec<Vec<Bounded>> = (0..variables::<M>())
+    let columns: Vec<Vec<Bounded>> = (0..derivative_variable_count::<M>())
         .map(|j| {
             super::differences::derivative(v[j], outputs, |value| {
                 let mut moved = point;
@@ -237,10 +242,10 @@ fn by_differences<M: Dae>(
         })
         .collect();
     let dense = DMatrix::from_fn(outputs, columns.len(), |i, j| columns[j][i]);
-    Estimate::of(&dense, 1.0)
+    BoundedMatrix::of(&dense, 1.0)
 }
 
-fn by_columns(columns: usize, rows: usize, column: impl Fn(usize) -> Vec<f64>) -> DMatrix<f64> {
+fn matrix_from_columns(columns: usize, rows: usize, column: impl Fn(usize) -> Vec<f64>) -> DMatrix<f64> {
     let values: Vec<Vec<f64>> = (0..columns).map(column).collect();
     DMatrix::from_fn(rows, columns, |i, j| values[j][i])
 }

@@ -1,8 +1,8 @@
 //! An integrator against an exact solution.
 
-use super::integrator::Interval;
+use super::integrator::CheckedInterval;
 use super::names::{direction_name, second_name, state_name};
-use super::noise::{DEVIATIONS, largest, noise};
+use super::noise::{MAX_DEVIATIONS, largest, noise};
 use super::report::{Entry, Report};
 use super::sensitivities::warn;
 use crate::error::Error;
@@ -81,7 +81,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
     h: f64,
     exact: &Exact,
 ) -> Result<Report, Error> {
-    let interval = Interval::new::<M>(x0, u, p, h);
+    let interval = CheckedInterval::new::<M>(x0, u, p, h);
     let (nx, nw) = (M::Shape::NX, M::Shape::NW);
     let mut report = Report::new(format!("{} against the exact solution", type_name::<I>()));
     // Elimination is stable in norm only: of a small entry beside large ones no more can be asked
@@ -107,7 +107,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
                            name: &dyn Fn(usize) -> String| {
             let floor = 4.0 * f64::EPSILON * scale;
             let entries = exact.iter().enumerate().map(|(k, &expected)| {
-                let tolerance = (own[k] - rough[k]).abs() + DEVIATIONS * noise[k] + floor;
+                let tolerance = (own[k] - rough[k]).abs() + MAX_DEVIATIONS * noise[k] + floor;
                 (k, Entry { value: own[k], expected, tolerance })
             });
             report.compare(quantity, "exact", 0, largest(exact), entries, name);

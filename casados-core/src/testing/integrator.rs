@@ -12,12 +12,12 @@ use std::vec::Vec;
 
 /// One interval: `w = (x₀, u, p)` and its length.
 #[derive(Clone, Debug)]
-pub(super) struct Interval {
+pub(super) struct CheckedInterval {
     pub w: Vec<f64>,
     pub h: f64,
 }
 
-impl Interval {
+impl CheckedInterval {
     pub fn new<M: Dae>(x0: &VectorX<M, f64>, u: &VectorU<M, f64>, p: &VectorP<M, f64>, h: f64) -> Self {
         Self { w: [x0.as_slice(), u.as_slice(), p.as_slice()].concat(), h }
     }
@@ -52,7 +52,7 @@ impl Interval {
     ) -> Result<(Vec<f64>, DMatrix<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
         let forward = integrator.forward(&x0, &u, self.h)?;
-        Ok((states(forward), derivatives(forward)))
+        Ok((states(forward), matrix_of_forward(forward)))
     }
 
     /// `(x, z, z0)` and the gradient by `w`.
@@ -72,24 +72,26 @@ impl Interval {
         &self,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
         lambda: &[f64],
-    ) -> Result<Answer, Error> {
+    ) -> Result<CallResults, Error> {
         let (x0, u) = self.prepare(integrator)?;
         let result = integrator.hessian(&x0, &u, self.h, &vector(lambda))?;
         let gradient = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
         // The upper blocks are given; inside of the diagonal blocks, both triangles.
-        let element = |i: usize, j: usize| match (place(i, nx, nu), place(j, nx, nu)) {
-            ((0, i), (0, j)) => result.h_xx[(i, j)],
-            ((0, i), (1, j)) => result.h_xu[(i, j)],
-            ((0, i), (_, j)) => result.h_xp[(i, j)],
-            ((1, i), (1, j)) => result.h_uu[(i, j)],
-            ((1, i), (_, j)) => result.h_up[(i, j)],
-            ((_, i), (_, j)) => result.h_pp[(i, j)],
-        };
-        let below = |i: usize, j: usize| i > j && place(i, nx, nu).0 != place(j, nx, nu).0;
-        Ok(Answer {
+        let element =
+            |i: usize, j: usize| match (block_and_position(i, nx, nu), block_and_position(j, nx, nu)) {
+                ((0, i), (0, j)) => result.h_xx[(i, j)],
+                ((0, i), (1, j)) => result.h_xu[(i, j)],
+                ((0, i), (_, j)) => result.h_xp[(i, j)],
+                ((1, i), (1, j)) => result.h_uu[(i, j)],
+                ((1, i), (_, j)) => result.h_up[(i, j)],
+                ((_, i), (_, j)) => result.h_pp[(i, j)],
+            };
+        let below =
+            |i: usize, j: usize| i > j && block_and_position(i, nx, nu).0 != block_and_position(j, nx, nu).0;
+        Ok(CallResults {
             states: states(result),
-            derivatives: derivatives(result),
+            derivatives: matrix_of_forward(result),
             gradient: gradient.concat(),
             hessian: DMatrix::from_fn(nw, nw, |i, j| if below(i, j) { element(j, i) } else { element(i, j) }),
         })
@@ -98,7 +100,7 @@ impl Interval {
 
 /// All that an integrator can say about an interval.
 #[derive(Clone, Debug)]
-pub(super) struct Answer {
+pub(super) struct CallResults {
     /// `(x, z, z0)`
     pub states: Vec<f64>,
     /// `∂(x, z, z0)/∂w`
@@ -110,7 +112,7 @@ pub(super) struct Answer {
 }
 
 /// Block of a direction of `w`, and its place there.
-const fn place(i: usize, nx: usize, nu: usize) -> (usize, usize) {
+const fn block_and_position(i: usize, nx: usize, nu: usize) -> (usize, usize) {
     if i < nx {
         (0, i)
     } else if i < nx + nu {
@@ -130,10 +132,10 @@ fn states<M: Dae>(nominal: &Nominal<M>) -> Vec<f64> {
     [nominal.x.as_slice(), nominal.z.as_slice(), nominal.z0.as_slice()].concat()
 }
 
-fn derivatives<M: Dae>(f: &Forward<M>) -> DMatrix<f64> {
+fn matrix_of_forward<M: Dae>(f: &Forward<M>) -> DMatrix<f64> {
     let (nx, nz, nu) = (M::Shape::NX, M::Shape::NZ, M::Shape::NU);
     DMatrix::from_fn(nx + 2 * nz, M::Shape::NW, |row, column| {
-        match (place(row, nx, nz), place(column, nx, nu)) {
+        match (block_and_position(row, nx, nz), block_and_position(column, nx, nu)) {
             ((0, i), (0, j)) => f.dx_dx0[(i, j)],
             ((0, i), (1, j)) => f.dx_du[(i, j)],
             ((0, i), (_, j)) => f.dx_dp[(i, j)],

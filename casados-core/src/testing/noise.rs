@@ -6,7 +6,7 @@
 //! condition times epsilon of that very entry.
 
 use super::bounded::Bounded;
-use super::integrator::{Answer, Interval};
+use super::integrator::{CallResults, CheckedInterval};
 use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
@@ -22,17 +22,17 @@ const SAMPLES: usize = 8;
 /// Deviations that a difference of two results may have. The largest of eight samples is below one
 /// standard deviation once in twenty entries and below a quarter once in four hundred thousand: 32
 /// of it are at least eight standard deviations.
-pub(super) const DEVIATIONS: f64 = 32.0;
+pub(super) const MAX_DEVIATIONS: f64 = 32.0;
 
 /// The largest deviation of each entry over samples.
 pub(super) fn noise<M: Dae>(
     integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
-    interval: &Interval,
+    interval: &CheckedInterval,
     lambda: &[f64],
-    center: &Answer,
-) -> Result<Answer, Error> {
+    center: &CallResults,
+) -> Result<CallResults, Error> {
     let mut random = Random::new(3);
-    let mut noise = Answer {
+    let mut noise = CallResults {
         states: center.states.iter().map(|_| 0.0).collect(),
         derivatives: center.derivatives.map(|_| 0.0),
         gradient: center.gradient.iter().map(|_| 0.0).collect(),
@@ -40,7 +40,8 @@ pub(super) fn noise<M: Dae>(
     };
     for _ in 0..SAMPLES {
         let mut change = |value: f64| value * (1.0 + f64::EPSILON * [-2.0, -1.0, 1.0, 2.0][random.below(4)]);
-        let sample = Interval { w: interval.w.iter().map(|&w| change(w)).collect(), h: change(interval.h) };
+        let sample =
+            CheckedInterval { w: interval.w.iter().map(|&w| change(w)).collect(), h: change(interval.h) };
         let answer = sample.hessian(integrator, lambda)?;
         let widen = |noise: &mut [f64], sample: &[f64], center: &[f64]| {
             for ((noise, sample), center) in noise.iter_mut().zip(sample).zip(center) {
@@ -56,7 +57,7 @@ pub(super) fn noise<M: Dae>(
 }
 
 /// Two results of the same quantity within the noise.
-pub(super) fn agree(
+pub(super) fn compare_results(
     report: &mut Report,
     quantity: &'static str,
     reference: &'static str,
@@ -68,12 +69,12 @@ pub(super) fn agree(
     let entries = values.iter().zip(expected).zip(noise).map(|((&value, &expected), &noise)| Entry {
         value,
         expected,
-        tolerance: DEVIATIONS * noise + 4.0 * f64::EPSILON * expected.abs(),
+        tolerance: MAX_DEVIATIONS * noise + 4.0 * f64::EPSILON * expected.abs(),
     });
     report.compare(quantity, reference, 0, largest(expected), entries.enumerate(), name);
 }
 
-pub(super) fn against_differences(
+pub(super) fn compare_with_differences(
     report: &mut Report,
     quantity: &'static str,
     values: &[f64],
@@ -84,18 +85,21 @@ pub(super) fn against_differences(
     let entries = values.iter().zip(differences).zip(noise).map(|((&value, d), &noise)| Entry {
         value,
         expected: d.value,
-        tolerance: d.error + DEVIATIONS * noise + 4.0 * f64::EPSILON * value.abs(),
+        tolerance: d.error + MAX_DEVIATIONS * noise + 4.0 * f64::EPSILON * value.abs(),
     });
     report.compare(quantity, "differences", 0, largest(values), entries.enumerate(), name);
 }
 
 /// Values with their noise; NaN where the integrator failed, which differences leave out.
-pub(super) fn attach(values: Option<Vec<f64>>, noise: &[f64]) -> Vec<Bounded> {
+pub(super) fn values_with_noise(values: Option<Vec<f64>>, noise: &[f64]) -> Vec<Bounded> {
     match values {
         Some(values) => values
             .iter()
             .zip(noise)
-            .map(|(&value, &noise)| Bounded { value, error: DEVIATIONS * noise + f64::EPSILON * value.abs() })
+            .map(|(&value, &noise)| Bounded {
+                value,
+                error: MAX_DEVIATIONS * noise + f64::EPSILON * value.abs(),
+            })
             .collect(),
         None => noise.iter().map(|_| Bounded { value: f64::NAN, error: f64::INFINITY }).collect(),
     }

@@ -79,41 +79,41 @@ impl<M: Dae> Points<M> {
     #[must_use]
     #[track_caller]
     pub fn xdot(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.element("xdot", (0, M::Shape::NX), i, &range)
+        self.set_range("xdot", (0, M::Shape::NX), i, &range)
     }
     /// The range of `x[i]`.
     #[must_use]
     #[track_caller]
     pub fn x(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.element("x", (M::Shape::NX, M::Shape::NX), i, &range)
+        self.set_range("x", (M::Shape::NX, M::Shape::NX), i, &range)
     }
     /// The range of `z[i]`.
     #[must_use]
     #[track_caller]
     pub fn z(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.element("z", (2 * M::Shape::NX, M::Shape::NZ), i, &range)
+        self.set_range("z", (2 * M::Shape::NX, M::Shape::NZ), i, &range)
     }
     /// The range of `u[i]`.
     #[must_use]
     #[track_caller]
     pub fn u(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.element("u", (2 * M::Shape::NX + M::Shape::NZ, M::Shape::NU), i, &range)
+        self.set_range("u", (2 * M::Shape::NX + M::Shape::NZ, M::Shape::NU), i, &range)
     }
     /// The range of `p[i]`.
     #[must_use]
     #[track_caller]
     pub fn p(self, i: usize, range: RangeInclusive<f64>) -> Self {
         let first = 2 * M::Shape::NX + M::Shape::NZ + M::Shape::NU;
-        self.element("p", (first, M::Shape::NP), i, &range)
+        self.set_range("p", (first, M::Shape::NP), i, &range)
     }
     /// The range of `t`.
     #[must_use]
     pub fn t(self, range: RangeInclusive<f64>) -> Self {
-        self.element("t", (M::Shape::NV - 1, 1), 0, &range)
+        self.set_range("t", (M::Shape::NV - 1, 1), 0, &range)
     }
 
     #[track_caller]
-    fn element(
+    fn set_range(
         mut self,
         name: &str,
         (first, count): (usize, usize),

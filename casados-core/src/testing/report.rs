@@ -5,7 +5,7 @@ use std::string::String;
 use std::vec::Vec;
 
 /// How many wrong entries are listed by name.
-const LISTED: usize = 12;
+const MAX_LISTED_ENTRIES: usize = 12;
 
 /// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything
 /// is wrong.
@@ -195,9 +195,9 @@ impl Report {
                 }
             } else {
                 row.wrong += 1;
-                row.difference = worst(row.difference, difference);
-                row.ratio = worst(row.ratio, difference / tolerance);
-                if self.wrong.len() < LISTED {
+                row.difference = nan_max(row.difference, difference);
+                row.ratio = nan_max(row.ratio, difference / tolerance);
+                if self.wrong.len() < MAX_LISTED_ENTRIES {
                     self.wrong.push(Deviation {
                         quantity,
                         reference,
@@ -214,7 +214,7 @@ impl Report {
 }
 
 /// The larger one; NaN is the worst.
-fn worst(a: f64, b: f64) -> f64 {
+fn nan_max(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 

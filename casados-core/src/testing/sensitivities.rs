@@ -2,9 +2,11 @@
 
 use super::bounded::Bounded;
 use super::differences;
-use super::integrator::{Answer, Interval};
+use super::integrator::{CallResults, CheckedInterval};
 use super::names::{derivative_name, direction_name, second_name, state_name};
-use super::noise::{DEVIATIONS, against_differences, agree, attach, largest, noise};
+use super::noise::{
+    MAX_DEVIATIONS, compare_results, compare_with_differences, largest, noise, values_with_noise,
+};
 use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
@@ -54,7 +56,7 @@ pub fn check_sensitivities<
     p: &VectorP<M, f64>,
     h: f64,
 ) -> Result<Report, Error> {
-    let interval = Interval::new::<M>(x0, u, p, h);
+    let interval = CheckedInterval::new::<M>(x0, u, p, h);
     let mut random = Random::new(7);
     let lambda: Vec<f64> = (0..M::Shape::NX).map(|_| random.symmetric()).collect();
     let mut report = Report::new(format!("sensitivities of {}", type_name::<I>()));
@@ -65,20 +67,34 @@ pub fn check_sensitivities<
     let (adjoint_states, gradient) = interval.adjoint(integrator, &lambda)?;
     let all = interval.hessian(integrator, &lambda)?;
 
-    let first = Calls { solved: &solved, derivatives: &derivatives, gradient: &gradient, all: &all };
-    first.repeat(&mut report, integrator, &interval, &lambda)?;
+    let first = CallRecord { solved: &solved, derivatives: &derivatives, gradient: &gradient, all: &all };
+    first.check_repeated_calls(&mut report, integrator, &interval, &lambda)?;
 
     let noise = noise(integrator, &interval, &lambda, &all)?;
     let state = |i| state_name::<M>(i);
-    agree(&mut report, "state", "solve", &states, &solved, &noise.states, state);
-    agree(&mut report, "state of adjoint", "solve", &adjoint_states, &solved, &noise.states, state);
-    agree(&mut report, "state of hessian", "solve", &all.states, &solved, &noise.states, state);
+    compare_results(&mut report, "state", "solve", &states, &solved, &noise.states, state);
+    compare_results(&mut report, "state of adjoint", "solve", &adjoint_states, &solved, &noise.states, state);
+    compare_results(&mut report, "state of hessian", "solve", &all.states, &solved, &noise.states, state);
     let entry = |i| derivative_name::<M>(i);
     let (values, bounds) = (all.derivatives.as_slice(), noise.derivatives.as_slice());
-    agree(&mut report, "forward of hessian", "forward", values, derivatives.as_slice(), bounds, entry);
-    agree(&mut report, "adjoint of hessian", "adjoint", &all.gradient, &gradient, &noise.gradient, |i| {
-        format!("by {}", direction_name::<M>(i))
-    });
+    compare_results(
+        &mut report,
+        "forward of hessian",
+        "forward",
+        values,
+        derivatives.as_slice(),
+        bounds,
+        entry,
+    );
+    compare_results(
+        &mut report,
+        "adjoint of hessian",
+        "adjoint",
+        &all.gradient,
+        &gradient,
+        &noise.gradient,
+        |i| format!("by {}", direction_name::<M>(i)),
+    );
 
     // λᵀ S, with the noise of both sides.
     let nx = M::Shape::NX;
@@ -96,9 +112,15 @@ pub fn check_sensitivities<
         .zip(&noise.gradient)
         .map(|((magnitude, forward), adjoint)| nx as f64 * f64::EPSILON * magnitude + forward + adjoint)
         .collect();
-    agree(&mut report, "adjoint", "forward", &gradient, &product(&derivatives, false), &rounding, |i| {
-        format!("by {}", direction_name::<M>(i))
-    });
+    compare_results(
+        &mut report,
+        "adjoint",
+        "forward",
+        &gradient,
+        &product(&derivatives, false),
+        &rounding,
+        |i| format!("by {}", direction_name::<M>(i)),
+    );
 
     let transposed = all.hessian.transpose();
     let entries = all.hessian.iter().zip(transposed.iter()).map(|(&value, &expected)| Entry {
@@ -109,25 +131,25 @@ pub fn check_sensitivities<
     let scale = largest(all.hessian.as_slice());
     report.compare("Hessian", "its transpose", 0, scale, entries.enumerate(), second_name::<M>);
 
-    first.against_differences(&mut report, integrator, &interval, (&lambda, &noise));
+    first.check_differences(&mut report, integrator, &interval, (&lambda, &noise));
     Ok(report)
 }
 
 /// What the calls have given.
-struct Calls<'a> {
+struct CallRecord<'a> {
     solved: &'a [f64],
     derivatives: &'a DMatrix<f64>,
     gradient: &'a [f64],
-    all: &'a Answer,
+    all: &'a CallResults,
 }
 
-impl Calls<'_> {
+impl CallRecord<'_> {
     /// The same calls once more, which give the same bits.
-    fn repeat<M: Dae>(
+    fn check_repeated_calls<M: Dae>(
         &self,
         report: &mut Report,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
-        interval: &Interval,
+        interval: &CheckedInterval,
         lambda: &[f64],
     ) -> Result<(), Error> {
         let same = |report: &mut Report, quantity, a: &[f64], b: &[f64]| {
@@ -154,30 +176,30 @@ impl Calls<'_> {
     }
 
     /// Differences of states and of gradients, in some directions.
-    fn against_differences<M: Dae>(
+    fn check_differences<M: Dae>(
         &self,
         report: &mut Report,
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
-        interval: &Interval,
-        (lambda, noise): (&[f64], &Answer),
+        interval: &CheckedInterval,
+        (lambda, noise): (&[f64], &CallResults),
     ) {
         for direction in directions::<M>(interval) {
-            let moved = |value: Bounded| Interval {
+            let moved = |value: Bounded| CheckedInterval {
                 w: interval.w.iter().zip(&direction.seed).map(|(w, d)| w + value.value * d).collect(),
                 h: interval.h,
             };
             let by_solve = differences::derivative(0.0, self.solved.len(), |value| {
-                attach(moved(value).solve(integrator).ok(), &noise.states)
+                values_with_noise(moved(value).solve(integrator).ok(), &noise.states)
             });
             let (own, bounds) = direction.of(self.derivatives, &noise.derivatives);
-            against_differences(report, "forward", &own, &by_solve, &bounds, |i| {
+            compare_with_differences(report, "forward", &own, &by_solve, &bounds, |i| {
                 format!("{} by {}", state_name::<M>(i), direction.name)
             });
             let by_adjoint = differences::derivative(0.0, M::Shape::NW, |value| {
-                attach(moved(value).adjoint(integrator, lambda).ok().map(|a| a.1), &noise.gradient)
+                values_with_noise(moved(value).adjoint(integrator, lambda).ok().map(|a| a.1), &noise.gradient)
             });
             let (own, bounds) = direction.of(&self.all.hessian, &noise.hessian);
-            against_differences(report, "Hessian", &own, &by_adjoint, &bounds, |i| {
+            compare_with_differences(report, "Hessian", &own, &by_adjoint, &bounds, |i| {
                 format!("by {} and {}", direction_name::<M>(i), direction.name)
             });
         }
@@ -208,11 +230,11 @@ struct Direction {
 
 /// The unit vectors, if they are few; for large models random directions, in which every entry
 /// takes part.
-fn directions<M: Dae>(interval: &Interval) -> Vec<Direction> {
-    const UNITS: usize = 12;
+fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
+    const MAX_UNIT_DIRECTIONS: usize = 12;
     const RANDOM: usize = 4;
     let size = |w: f64| w.abs().max(1.0);
-    if M::Shape::NW <= UNITS {
+    if M::Shape::NW <= MAX_UNIT_DIRECTIONS {
         return (0..M::Shape::NW)
             .map(|j| Direction {
                 name: direction_name::<M>(j),
@@ -240,7 +262,7 @@ impl Direction {
             .map(|i| {
                 let value = sum(&|j, d| matrix[(i, j)] * d);
                 let bound = sum(&|j, d| {
-                    let rounding = n * f64::EPSILON * (matrix[(i, j)] * d).abs() / DEVIATIONS;
+                    let rounding = n * f64::EPSILON * (matrix[(i, j)] * d).abs() / MAX_DEVIATIONS;
                     noise[(i, j)] * d.abs() + rounding
                 });
                 (value, bound)

@@ -2,7 +2,7 @@
 //! linear time, and a debug build the whole stack. Values that cross a cut go through an array, in
 //! which a slot is reused as soon as its value has been read for the last time.
 
-use super::schedule::{Step, is_leaf};
+use super::schedule::{Statement, is_leaf};
 use crate::graph::{Graph, Node, Op};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -26,28 +26,30 @@ pub struct Chunk {
 }
 
 /// What a statement computes.
-pub fn computed(step: Step) -> impl Iterator<Item = Node> {
+pub fn computed(step: Statement) -> impl Iterator<Item = Node> {
     let list = match step {
-        Step::Compute(node) => [Some((node, None)), None, None, None],
-        Step::SinCos(sin, cos) => [Some((sin, Some(cos))), None, None, None],
-        Step::Together(values) => values,
-        Step::Store(_) => [None; 4],
+        Statement::Compute(node) => [Some((node, None)), None, None, None],
+        Statement::SinCos(sin, cos) => [Some((sin, Some(cos))), None, None, None],
+        Statement::Together(values) => values,
+        Statement::Store(_) => [None; 4],
     };
     list.into_iter().flatten().flat_map(|(node, other)| [node].into_iter().chain(other))
 }
 
 /// What a statement reads, leaves included.
-pub fn read(graph: &Graph, outputs: &[Node], step: Step) -> impl Iterator<Item = Node> {
+pub fn read(graph: &Graph, outputs: &[Node], step: Statement) -> impl Iterator<Item = Node> {
     let (stored, ops) = match step {
-        Step::Compute(node) | Step::SinCos(node, _) => (None, [Some(graph.op(node)), None, None, None]),
-        Step::Together(values) => (None, values.map(|values| values.map(|(node, _)| graph.op(node)))),
-        Step::Store(output) => (Some(outputs[output]), [None; 4]),
+        Statement::Compute(node) | Statement::SinCos(node, _) => {
+            (None, [Some(graph.op(node)), None, None, None])
+        }
+        Statement::Together(values) => (None, values.map(|values| values.map(|(node, _)| graph.op(node)))),
+        Statement::Store(output) => (Some(outputs[output]), [None; 4]),
     };
     stored.into_iter().chain(ops.into_iter().flatten().flat_map(Op::operands))
 }
 
 /// Cuts a function into pieces of at most `limit` statements.
-pub fn plan(graph: &Graph, outputs: &[Node], steps: &[Step], limit: usize) -> Plan {
+pub fn plan(graph: &Graph, outputs: &[Node], steps: &[Statement], limit: usize) -> Plan {
     // First and last statement that a value occurs in.
     let mut life: HashMap<Node, (usize, usize)> = HashMap::new();
     for (position, &step) in steps.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! What the implementations for a model and for a function have in common: a module with the
 //! functions that compute.
 
-use super::routine::{Outside, Routine};
+use super::routine::{OuterConstants, Routine};
 use crate::graph::Node;
 use crate::language::{Model, Table, Variables};
 use crate::structure::Derivatives;
@@ -29,7 +29,7 @@ pub const FUNCTION: Names =
     Names { value: "value", value_jacobian: "value_jacobian", output: "y", symbol: "y" };
 
 /// The type, with the values of its const parameters.
-pub fn ty(model: &Model) -> TokenStream {
+pub fn model_type(model: &Model) -> TokenStream {
     let Model { name, instance, .. } = model;
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) }
@@ -43,7 +43,7 @@ pub fn module(
     more: Option<Routine>,
 ) -> syn::Result<TokenStream> {
     let Model { krate, variables, graph, .. } = model;
-    let mut text = text(model, derivatives, names);
+    let mut text = functions_as_text(model, derivatives, names);
     if let Some(routine) = more {
         text += &routine.write(graph, variables, of(model));
     }
@@ -59,13 +59,13 @@ pub fn module(
     })
 }
 
-fn of(model: &Model) -> Outside<'_> {
-    Outside { constants: model.opaque.len(), tables: &model.tables }
+fn of(model: &Model) -> OuterConstants<'_> {
+    OuterConstants { constants: model.opaque.len(), tables: &model.tables }
 }
 
 /// What the functions that compute are given from outside: the module of the code sees no name of
 /// the user's.
-pub fn given(model: &Model) -> Option<TokenStream> {
+pub fn outer_arguments(model: &Model) -> Option<TokenStream> {
     let constants = (!model.opaque.is_empty()).then(|| quote!(&C,));
     let tables = (0..model.tables.len()).map(type_of_table);
     (constants.is_some() || !model.tables.is_empty()).then(|| quote!(#constants #(#tables,)*))
@@ -140,7 +140,7 @@ fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> Tok
 
 /// The functions that compute, as text: they are long and simple, and a parser is faster than a
 /// quote.
-fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
+fn functions_as_text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
     let Model { variables, graph, residual, .. } = model;
     let [_, nv, ..] = dimensions(variables);

@@ -85,7 +85,7 @@ mod tests {
     }
 
     /// Any number of moderate size.
-    fn number(state: &mut u64) -> f64 {
+    fn random_number(state: &mut u64) -> f64 {
         let (bits, exponent) = (random(state), random(state) % 200);
         f64::from_bits(bits & (1 << 63 | ((1 << 52) - 1)) | (923 + exponent) << 52)
     }
@@ -95,12 +95,12 @@ mod tests {
         let mut state = 0x9E37_79B9_7F4A_7C15;
         let mut kept = 0;
         for _ in 0..2000 {
-            let c = number(&mut state);
+            let c = random_number(&mut state);
             let Some([high, low]) = reciprocal(c) else { continue };
             kept += 1;
             assert!(high.abs() <= (1.0 / c).abs() && low * c >= 0.0, "{c:e}");
             for _ in 0..200 {
-                let x = number(&mut state);
+                let x = random_number(&mut state);
                 assert_eq!(x.mul_add(high, x * low).to_bits(), (x / c).to_bits(), "{x:e} / {c:e}");
             }
         }
@@ -119,7 +119,7 @@ mod tests {
     fn hard_cases_are_hard_and_others_are_not() {
         let mut state = 0x2545_F491_4F6C_DD1D;
         for _ in 0..200 {
-            let c = number(&mut state).abs();
+            let c = random_number(&mut state).abs();
             let digits = u128::from(c.to_bits() & ((1 << 52) - 1) | 1 << 52);
             let distance = |x: u128| {
                 [53, 54].map(|k| ((x << k) % digits).min(digits - (x << k) % digits)).into_iter().min()

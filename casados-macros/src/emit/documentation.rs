@@ -5,7 +5,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 /// The user's text, then what is known about the model: one row of a table for each instance.
-pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
+pub fn type_documentation(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
     let Some(first) = models.first() else {
         return TokenStream::new();
     };
@@ -42,7 +42,7 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
         let instance = model.instance.iter().map(|instance| instance.value.to_string());
         lines.push(row(&instance.chain(numbers.map(|n| n.to_string())).collect::<Vec<_>>()));
     }
-    if let Some(text) = of_reduction(first) {
+    if let Some(text) = reduction_documentation(first) {
         lines.extend([String::new(), text]);
     }
     let lines = lines.into_iter().map(|line| if line.is_empty() { line } else { format!(" {line}") });
@@ -54,7 +54,7 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
 }
 
 /// What was differentiated, and where the result is singular.
-fn of_reduction(analysis: &Analysis) -> Option<String> {
+fn reduction_documentation(analysis: &Analysis) -> Option<String> {
     let reduction = analysis.reduction.as_ref()?;
     let list = reduction.differentiated.iter();
     let list: Vec<String> =
@@ -77,7 +77,7 @@ fn of_reduction(analysis: &Analysis) -> Option<String> {
 }
 
 /// The user's text, then what is known about the function.
-pub fn of_function<'a>(functions: impl Iterator<Item = &'a FunctionAnalysis>) -> TokenStream {
+pub fn function_documentation<'a>(functions: impl Iterator<Item = &'a FunctionAnalysis>) -> TokenStream {
     let functions: Vec<_> = functions.collect();
     let Some(first) = functions.first() else {
         return TokenStream::new();

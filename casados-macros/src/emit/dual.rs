@@ -30,7 +30,7 @@ pub fn documentation(model: &Model) -> TokenStream {
 }
 
 /// Numbers of a dense model.
-struct Sizes {
+struct DenseSizes {
     nx: usize,
     nz: usize,
     nu: usize,
@@ -47,7 +47,7 @@ struct Sizes {
     nh: usize,
 }
 
-impl Sizes {
+impl DenseSizes {
     fn of(Variables { x, z, u, p }: &Variables) -> Self {
         let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
         let (nk, nv, nw) = (nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np);
@@ -65,7 +65,7 @@ impl Sizes {
 /// Writes the implementations for one model.
 pub fn write(model: &Model) -> TokenStream {
     let Model { form, name, instance, variables, krate, .. } = model;
-    let sizes = Sizes::of(variables);
+    let sizes = DenseSizes::of(variables);
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
     let (dual_model, dae) = (dual_model(model, &sizes, &ty), dae(model, &sizes, &ty));
@@ -84,9 +84,9 @@ pub fn write(model: &Model) -> TokenStream {
 }
 
 /// The call of the function, over any dual number.
-fn dual_model(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
+fn dual_model(model: &Model, sizes: &DenseSizes, ty: &TokenStream) -> TokenStream {
     let Model { form, function, krate, generics, .. } = model;
-    let &Sizes { nx, nz, nu, nv, .. } = sizes;
+    let &DenseSizes { nx, nz, nu, nv, .. } = sizes;
     let starts = [0, nx, 2 * nx, 2 * nx + nz, 2 * nx + nz + nu, nv - 1];
     let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
     let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
@@ -120,9 +120,9 @@ fn dual_model(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
     }
 }
 
-fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
+fn dae(model: &Model, sizes: &DenseSizes, ty: &TokenStream) -> TokenStream {
     let Model { variables, krate, .. } = model;
-    let &Sizes { nk, nv, nj, nh, .. } = sizes;
+    let &DenseSizes { nk, nv, nj, nh, .. } = sizes;
     let [lk, lv, lj, lh] = [nk, nv, nj, nh].map(Literal::usize_unsuffixed);
     let shape = sizes.shape(krate);
     let domain = domain::write(krate, variables, &model.samplings, |_| true);
@@ -187,9 +187,9 @@ fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
 }
 
 /// The structure of a model of which nothing is known: everything is dense.
-fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
+fn structure(model: &Model, sizes: &DenseSizes) -> TokenStream {
     let Model { name, variables, krate, .. } = model;
-    let &Sizes { nx, nz, nu, np, nk, nv, nw, nj, .. } = sizes;
+    let &DenseSizes { nx, nz, nu, np, nk, nv, nw, nj, .. } = sizes;
     let mut begin = 0;
     let blocks = [nx, nx, nz, nu, np, 0].map(|width| {
         let block = Literal::usize_unsuffixed(begin);

@@ -1,21 +1,22 @@
 //! The constant `Structure::elimination`: the tables by which the Newton matrix is eliminated,
 //! printed.
 
-use super::structure::numbers;
-use crate::structure::tables::{Assembly, Dependent, Pivot, Tables, Update};
+use super::structure::index_literals;
+use crate::structure::tables::{Assembly, KinematicDependence, Pivot, Tables, Update};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 /// The value of `Structure::elimination`.
 pub fn write(krate: &syn::Path, tables: &Tables) -> TokenStream {
     let pivots = tables.pivots.iter().map(pivot);
-    let left = tables.left.iter().map(|pair| row("left", pair));
+    let left = tables.left.iter().map(|pair| constructor_call("left", pair));
     let updates = tables.updates.iter().map(update);
     let assembly = tables.assembly.iter().map(assembly);
-    let supernodes = tables.supernodes.iter().map(|pair| row("supernode", pair));
-    let kinematic = tables.kinematic.iter().map(|state| row("kinematic", state));
+    let supernodes = tables.supernodes.iter().map(|pair| constructor_call("supernode", pair));
+    let kinematic = tables.kinematic.iter().map(|state| constructor_call("kinematic", state));
     let dependents = tables.dependents.iter().map(dependent);
-    let [slots, slot_of_equation] = [&tables.slots, &tables.slot_of_equation].map(|table| numbers(table));
+    let [slots, slot_of_equation] =
+        [&tables.slots, &tables.slot_of_equation].map(|table| index_literals(table));
     let constructors = constructors();
     quote! {{
         use #krate::__private::{Assembly, Dependent, Kinematic, Left, Pivot, Supernode, Update};
@@ -67,9 +68,9 @@ fn constructors() -> TokenStream {
 }
 
 /// A call with numbers only.
-fn row(constructor: &str, values: &[u32]) -> TokenStream {
+fn constructor_call(constructor: &str, values: &[u32]) -> TokenStream {
     let constructor = quote::format_ident!("{constructor}");
-    let values = numbers(values);
+    let values = index_literals(values);
     quote!(#constructor(#(#values),*))
 }
 
@@ -92,8 +93,8 @@ fn assembly(assembly: &Assembly) -> TokenStream {
     quote!(assembly(#block, #entry, #by, #order, #first))
 }
 
-fn dependent(dependent: &Dependent) -> TokenStream {
-    let &Dependent { entry, state, first, last } = dependent;
+fn dependent(dependent: &KinematicDependence) -> TokenStream {
+    let &KinematicDependence { entry, state, first, last } = dependent;
     let [entry, state] = [entry, state].map(Literal::u32_unsuffixed);
     quote!(dependent(#entry, #state, #first, #last))
 }

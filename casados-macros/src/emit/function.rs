@@ -1,6 +1,6 @@
 //! The implementations of `Function` and `GraphFunction` for one function.
 
-use super::code::{self, FUNCTION, dimensions, ty};
+use super::code::{self, FUNCTION, dimensions, model_type};
 use super::routine::Routine;
 use super::{structure, units};
 use crate::language::{Model, Variables};
@@ -20,7 +20,7 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
         stores: time.iter().map(|&(row, node)| (rate, row as usize, node)).collect(),
     };
     let code = code::module(model, derivatives, &FUNCTION, Some(routine))?;
-    let c = code::given(model);
+    let c = code::outer_arguments(model);
     let (function, graph_function) = (self::function(analysis, &c), graph_function(model, &c));
     Ok(code::enclose(model, &quote!(#code #function #graph_function)))
 }
@@ -34,8 +34,8 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let [nk, nv, nw, nc] = dimensions(variables);
     let numbers = [nx, nz, nu, np, nk, nv, nw, nc, residual.len(), jacobian.len(), hessian.len(), nv - 1];
     let [lx, lz, lu, lp, lk, lv, lw, lc, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
-    let (ty, structure) = (ty(model), structure::of_function(analysis));
-    let (units, unit) = (units::write(krate, &model.units), units::of_outputs(&model.units));
+    let (ty, structure) = (model_type(model), structure::function_structure(analysis));
+    let (units, unit) = (units::write(krate, &model.units), units::output_unit(&model.units));
     let is_timed = !analysis.time.is_empty() && model.duration.is_none();
     let timed = is_timed.then(|| {
         quote!(
@@ -97,7 +97,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
 
 /// Functions over any scalar, of slices.
 fn graph_function(model: &Model, c: &Option<TokenStream>) -> TokenStream {
-    let (krate, ty, [_, nv, ..]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let (krate, ty, [_, nv, ..]) = (&model.krate, model_type(model), dimensions(&model.variables));
     let last = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]

@@ -11,11 +11,11 @@ mod function;
 mod model;
 mod routine;
 mod schedule;
+mod simultaneous;
 mod structure;
 #[cfg(test)]
 mod tests;
 mod text;
-mod together;
 mod units;
 
 use crate::language::{self, Instance, Model, Place};
@@ -24,7 +24,7 @@ use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
 
 /// Models or functions that one function was read as, with the name of that.
-pub enum Part {
+pub enum ReadItem {
     /// Models.
     Models(syn::Ident, Vec<Analysis>),
     /// Functions of a model's variables.
@@ -33,25 +33,25 @@ pub enum Part {
 
 /// The item as written, the types and their implementations of `Dae` (and `GraphDae`, `Ode`) or of
 /// `Function`.
-pub fn expand(item: TokenStream, place: Place, parts: &[Part]) -> syn::Result<TokenStream> {
+pub fn expand(item: TokenStream, place: Place, parts: &[ReadItem]) -> syn::Result<TokenStream> {
     let (mut types, mut implementations) = (Vec::new(), TokenStream::new());
     let mut krate = None;
     for part in parts {
         match part {
-            Part::Models(original, models) => {
+            ReadItem::Models(original, models) => {
                 let Some(first) = models.first() else { continue };
                 krate = krate.or(Some(&first.model.krate));
                 for model in models {
                     implementations.extend(model::write(model)?);
                 }
-                types.push(Type::of(&first.model, documentation::of_type(original, models)));
+                types.push(Type::of(&first.model, documentation::type_documentation(original, models)));
                 implementations.extend(models.iter().filter_map(model::constrained));
                 for of in [model::invariants, model::projection] {
                     let functions: Vec<&FunctionAnalysis> = models.iter().filter_map(of).collect();
                     types.extend(self::functions(functions.iter().copied(), &mut implementations)?);
                 }
             }
-            Part::Functions(functions) => {
+            ReadItem::Functions(functions) => {
                 krate = krate.or(functions.first().map(|first| &first.model.krate));
                 types.extend(self::functions(functions.iter(), &mut implementations)?);
             }
@@ -70,7 +70,7 @@ fn functions<'a>(
     for function in functions.clone() {
         implementations.extend(function::write(function)?);
     }
-    let documentation = documentation::of_function(functions.clone());
+    let documentation = documentation::function_documentation(functions.clone());
     Ok(functions.clone().next().map(|first| Type::of(&first.model, documentation)))
 }
 
@@ -91,7 +91,7 @@ fn with_elementary_functions(item: TokenStream, krate: &syn::Path) -> TokenStrea
         #[allow(unused_imports)]
         use #krate::__private::Float as _;
     };
-    language::tokens::with(item, &import, &TokenStream::new())
+    language::tokens::insert_in_body(item, &import, &TokenStream::new())
 }
 
 /// The type of a model.
@@ -143,7 +143,7 @@ fn assemble(
                 #(#declarations)*
                 #implementations
             };
-            let module = language::tokens::with(item, &TokenStream::new(), &inside);
+            let module = language::tokens::insert_in_body(item, &TokenStream::new(), &inside);
             let exports = types.iter().map(|Type { name, visibility, .. }| {
                 quote! {
                     #[doc(inline)]
@@ -165,7 +165,7 @@ fn assemble(
 /// inside of itself, of which the compiler says nothing else, and the others for that type.
 pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error) -> TokenStream {
     let mut errors = error.clone().into_iter().map(|error| error.to_compile_error());
-    let Some((name, original)) = original(&item) else { return quote!(#item #(#errors)*) };
+    let Some((name, original)) = named_item(&item) else { return quote!(#item #(#errors)*) };
     let stub = |visibility: &syn::Visibility, generics: &TokenStream, name: &syn::Ident, is: TokenStream| {
         quote! {
             #[doc(hidden)]
@@ -188,7 +188,7 @@ pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error
             let item = language::tokens::without_attributes(item);
             let first = errors.next();
             let mut stubs = stub(&module.vis, &TokenStream::new(), &name, quote!([(); #first]));
-            for (function, attribute) in language::marked(&mut module) {
+            for (function, attribute) in language::attributed_functions(&mut module) {
                 let other = language::model_name(attribute, &function.ident);
                 stubs.extend(stub(&module.vis, &parameters(&function.generics), &other, quote!(#name)));
             }
@@ -199,7 +199,7 @@ pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error
 }
 
 /// The function or module of an item, and its name.
-fn original(item: &TokenStream) -> Option<(syn::Ident, syn::Item)> {
+fn named_item(item: &TokenStream) -> Option<(syn::Ident, syn::Item)> {
     let item: syn::Item = syn::parse2(item.clone()).ok()?;
     let name = match &item {
         syn::Item::Fn(function) => function.sig.ident.clone(),

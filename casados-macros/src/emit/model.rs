@@ -1,6 +1,6 @@
 //! The implementations of `Dae`, `GraphDae` and `Ode` for one model.
 
-use super::code::{self, MODEL, dimensions, ty};
+use super::code::{self, MODEL, dimensions, model_type};
 use super::routine::Routine;
 use super::{domain, structure, units};
 use crate::language::{Model, Variables};
@@ -21,7 +21,7 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
         stores: vec![(which, 0, branches.kinks), (which, 1, branches.knots)],
     });
     let code = code::module(model, derivatives, &MODEL, routine)?;
-    let c = code::given(model);
+    let c = code::outer_arguments(model);
     let (dae, graph_dae, ode) = (dae(analysis, &c), graph_dae(model, &c), ode(analysis));
     Ok(code::enclose(model, &quote!(#code #dae #graph_dae #ode)))
 }
@@ -36,7 +36,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
     let [lx, lz, lu, lp, lk, lv, lw, lc, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nc, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
-    let (ty, structure) = (ty(model), structure::write(analysis));
+    let (ty, structure) = (model_type(model), structure::write(analysis));
     let branches = analysis.branches.as_ref().map(|branches| {
         let count = Literal::usize_unsuffixed(branches.count);
         quote! {
@@ -53,7 +53,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     });
     let (linear, integrals) = (&model.extra.linear, model.extra.integrals);
     let linear = (!linear.is_empty()).then(|| {
-        let controls = structure::numbers(linear);
+        let controls = structure::index_literals(linear);
         quote!(const LINEAR: &'static [u32] = &[#(#controls),*];)
     });
     let integrals = (integrals > 0).then(|| {
@@ -117,7 +117,7 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
 
 /// Functions over any scalar, of slices.
 fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
-    let (krate, ty, [_, nv, ..]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let (krate, ty, [_, nv, ..]) = (&model.krate, model_type(model), dimensions(&model.variables));
     let time = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]
@@ -143,7 +143,7 @@ fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
 /// Of an explicit model its rows.
 fn ode(analysis: &Analysis) -> Option<TokenStream> {
     let Analysis { model, explicit, .. } = analysis;
-    let (krate, ty) = (&model.krate, ty(model));
+    let (krate, ty) = (&model.krate, model_type(model));
     let finite = |rows: &&Vec<(u32, f64)>| rows.iter().all(|row| row.1.is_finite());
     explicit.as_ref().filter(finite).map(|rows| {
         let rows = rows.iter().map(|&(row, coefficient)| {
@@ -171,10 +171,10 @@ pub fn projection(analysis: &Analysis) -> Option<&FunctionAnalysis> {
 
 /// What connects a model with the functions of its invariants.
 pub fn constrained(analysis: &Analysis) -> Option<TokenStream> {
-    let (model, invariants) = (ty(&analysis.model), ty(&invariants(analysis)?.model));
+    let (model, invariants) = (model_type(&analysis.model), model_type(&invariants(analysis)?.model));
     let krate = &analysis.model.krate;
     let projectable = projection(analysis).map(|projection| {
-        let projection = ty(&projection.model);
+        let projection = model_type(&projection.model);
         quote! {
             #[automatically_derived]
             impl #krate::__private::Projectable for #model {

@@ -2,9 +2,9 @@
 
 use super::chunk::{self, Chunk, Plan};
 use super::divisor;
-use super::schedule::{self, Step, Values};
-use super::text::{binary, number, unary};
-use super::together::{self, Function};
+use super::schedule::{self, Statement, Values};
+use super::simultaneous::{self, Function};
+use super::text::{binary_text, number_text, unary};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Table, Unary};
 use crate::language::{self, Variables};
 use std::collections::{BTreeSet, HashMap};
@@ -12,11 +12,11 @@ use std::fmt::Write;
 
 /// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
 /// takes longer over all of them in one, and spills more registers there than the calls cost.
-const LIMIT: usize = 500;
+const MAX_STATEMENTS: usize = 500;
 
 /// What a model has from outside.
 #[derive(Clone, Copy)]
-pub struct Outside<'a> {
+pub struct OuterConstants<'a> {
     /// The number of its constants.
     pub constants: usize,
     /// Its tables.
@@ -39,11 +39,11 @@ pub struct Routine<'a> {
 
 impl Routine<'_> {
     /// Writes the routine. `S: Scalar` must be in scope.
-    pub fn write(&self, graph: &Graph, variables: &Variables, outside: Outside) -> String {
+    pub fn write(&self, graph: &Graph, variables: &Variables, outside: OuterConstants) -> String {
         let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
-        let steps = together::together(graph, &schedule::schedule(graph, &outputs));
+        let steps = simultaneous::group_simultaneous_calls(graph, &schedule::schedule(graph, &outputs));
         let operations = steps.iter().copied().flat_map(chunk::computed).count();
-        let plan = chunk::plan(graph, &outputs, &steps, LIMIT);
+        let plan = chunk::plan(graph, &outputs, &steps, MAX_STATEMENTS);
         let mut names = vec![u32::MAX; graph.len()];
         for (name, node) in (0..).zip(steps.iter().copied().flat_map(chunk::computed)) {
             names[node.0 as usize] = name;
@@ -66,10 +66,10 @@ impl Routine<'_> {
         let mut text = String::new();
         let count = if operations == 1 { "operation" } else { "operations" };
         let _ = writeln!(text, "/// {} {operations} {count}.", self.documentation);
-        writer.driver(&mut text, &plan);
+        writer.write_driver(&mut text, &plan);
         for (number, piece) in plan.chunks.iter().enumerate() {
             let in_place = writer.read_in_place(&steps[piece.steps.clone()], piece);
-            Writer { in_place, ..writer.clone() }.piece(&mut text, number, &steps, piece, plan.slots);
+            Writer { in_place, ..writer.clone() }.write_piece(&mut text, number, &steps, piece, plan.slots);
         }
         text
     }
@@ -80,7 +80,7 @@ struct Writer<'a> {
     routine: &'a Routine<'a>,
     graph: &'a Graph,
     variables: &'a Variables,
-    outside: Outside<'a>,
+    outside: OuterConstants<'a>,
     outputs: &'a [Node],
     /// Number of the local variable of each node.
     names: &'a [u32],
@@ -95,7 +95,7 @@ impl Writer<'_> {
     /// are values of types without numbers.
     fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(String, String)> {
         let Routine { inputs, outputs, .. } = self.routine;
-        let Outside { constants, tables } = self.outside;
+        let OuterConstants { constants, tables } = self.outside;
         let mut arguments = Vec::new();
         arguments.extend((constants > 0).then(|| ("c".into(), format!("&{lifetime}[f64; {constants}]"))));
         arguments.extend((0..tables.len()).map(|k| (format!("table_{k}"), format!("Table{k}"))));
@@ -118,7 +118,7 @@ impl Writer<'_> {
     }
 
     /// Arguments for them.
-    fn types(&self) -> String {
+    fn generic_arguments(&self) -> String {
         let mut types = String::from("S");
         for k in 0..self.outside.tables.len() {
             let _ = write!(types, ", Table{k}");
@@ -132,7 +132,7 @@ impl Writer<'_> {
     }
 
     /// The function that runs the pieces.
-    fn driver(&self, text: &mut String, plan: &Plan) {
+    fn write_driver(&self, text: &mut String, plan: &Plan) {
         // Who calls it names the scalar alone.
         let mut parameters: Vec<String> =
             self.arguments(0, "").iter().map(|(name, ty)| format!("{name}: {ty}")).collect();
@@ -157,39 +157,46 @@ impl Writer<'_> {
         text.push_str("}\n");
     }
 
-    fn piece(&self, text: &mut String, number: usize, steps: &[Step], piece: &Chunk, slots: usize) {
+    fn write_piece(
+        &self,
+        text: &mut String,
+        number: usize,
+        steps: &[Statement],
+        piece: &Chunk,
+        slots: usize,
+    ) {
         let name = self.name(number);
         let (names, types): (Vec<String>, Vec<String>) = self.arguments(slots, "'a ").into_iter().unzip();
         let generics = self.parameters();
         let _ = writeln!(text, "struct {name}<'a, {generics}>({});", types.join(", "));
-        let _ = writeln!(text, "impl<{generics}> Piece for {name}<'_, {}> {{", self.types());
+        let _ = writeln!(text, "impl<{generics}> Piece for {name}<'_, {}> {{", self.generic_arguments());
         let _ = writeln!(text, "#[inline(always)]\nfn run(self) {{\nlet Self({}) = self;", names.join(", "));
         let steps = &steps[piece.steps.clone()];
 
-        self.loads(text, steps, piece);
+        self.write_loads(text, steps, piece);
         let mut steps = steps.iter().copied().peekable();
         while let Some(step) = steps.next() {
             // A value that is stored and nothing else needs no name.
-            if let Step::Compute(node) = step
-                && let Some(Step::Store(output)) =
+            if let Statement::Compute(node) = step
+                && let Some(Statement::Store(output)) =
                     steps.next_if(|next| self.uses[node.at()] == 1 && self.stores(*next, node))
             {
-                self.store(text, output, &self.expression(node));
+                self.write_store(text, output, &self.expression_text(node));
                 continue;
             }
-            self.step(text, step);
-            self.spills(text, step, piece);
+            self.write_step(text, step);
+            self.write_spills(text, step, piece);
         }
         text.push_str("}\n}\n");
     }
 
     /// Whether a statement stores a node.
-    fn stores(&self, step: Step, node: Node) -> bool {
-        matches!(step, Step::Store(output) if self.outputs[output] == node)
+    fn stores(&self, step: Statement, node: Node) -> bool {
+        matches!(step, Statement::Store(output) if self.outputs[output] == node)
     }
 
     /// Values of earlier pieces that are read once, in slots that the piece does not write to.
-    fn read_in_place(&self, steps: &[Step], piece: &Chunk) -> HashMap<Node, usize> {
+    fn read_in_place(&self, steps: &[Statement], piece: &Chunk) -> HashMap<Node, usize> {
         let mut uses: HashMap<Node, usize> = HashMap::new();
         for node in steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step)) {
             *uses.entry(node).or_default() += 1;
@@ -202,7 +209,7 @@ impl Writer<'_> {
     }
 
     /// What a piece reads: variables, seeds, and values of the pieces before it.
-    fn loads(&self, text: &mut String, steps: &[Step], piece: &Chunk) {
+    fn write_loads(&self, text: &mut String, steps: &[Statement], piece: &Chunk) {
         let read = steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step));
         let (mut variables, mut seeds) = (BTreeSet::new(), BTreeSet::new());
         for node in read {
@@ -229,38 +236,40 @@ impl Writer<'_> {
     }
 
     /// One statement.
-    fn step(&self, text: &mut String, step: Step) {
+    fn write_step(&self, text: &mut String, step: Statement) {
         match step {
-            Step::Compute(node) => {
-                let _ = writeln!(text, "let {} = {};", self.atom(node), self.expression(node));
+            Statement::Compute(node) => {
+                let _ = writeln!(text, "let {} = {};", self.operand_text(node), self.expression_text(node));
             }
-            Step::SinCos(sin, cos) => {
-                let argument = self.graph.op(sin).operands().map(|a| self.atom(a)).next();
+            Statement::SinCos(sin, cos) => {
+                let argument = self.graph.op(sin).operands().map(|a| self.operand_text(a)).next();
                 let _ = writeln!(
                     text,
                     "let ({}, {}) = {}.sin_cos();",
-                    self.atom(sin),
-                    self.atom(cos),
+                    self.operand_text(sin),
+                    self.operand_text(cos),
                     argument.unwrap_or_default()
                 );
             }
-            Step::Together(values) => self.together(text, values),
-            Step::Store(output) => self.store(text, output, &self.atom(self.outputs[output])),
+            Statement::Together(values) => self.write_simultaneous_call(text, values),
+            Statement::Store(output) => {
+                self.write_store(text, output, &self.operand_text(self.outputs[output]))
+            }
         }
     }
 
-    fn store(&self, text: &mut String, output: usize, value: &str) {
+    fn write_store(&self, text: &mut String, output: usize, value: &str) {
         let (array, index, _) = &self.routine.stores[output];
         let _ = writeln!(text, "S::store({value}, &mut {array}[{index}]);");
     }
 
     /// The same function of several arguments.
-    fn together(&self, text: &mut String, values: [Option<Values>; 4]) {
+    fn write_simultaneous_call(&self, text: &mut String, values: [Option<Values>; 4]) {
         let values: Vec<_> = values.into_iter().flatten().collect();
-        let function = values.first().and_then(|&values| together::function_of(self.graph, values));
+        let function = values.first().and_then(|&values| simultaneous::function_of(self.graph, values));
         let Some(function) = function else { return };
         let list = |nodes: &mut dyn Iterator<Item = Node>| {
-            let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
+            let atoms: Vec<String> = nodes.map(|node| self.operand_text(node)).collect();
             format!("[{}]", atoms.join(", "))
         };
         let results: Vec<_> =
@@ -269,7 +278,7 @@ impl Writer<'_> {
             values.iter().map(|(node, _)| list(&mut self.graph.op(*node).operands())).collect();
         let function = match function {
             Function::Unary(function) => unary(function),
-            Function::Binary(function) => binary(function),
+            Function::Binary(function) => binary_text(function),
             Function::SinCos => "sin_cos",
         };
         let _ = writeln!(
@@ -281,10 +290,10 @@ impl Writer<'_> {
     }
 
     /// Values that later pieces read.
-    fn spills(&self, text: &mut String, step: Step, piece: &Chunk) {
+    fn write_spills(&self, text: &mut String, step: Statement, piece: &Chunk) {
         for node in chunk::computed(step) {
             let Some(slot) = piece.spills.get(&node) else { continue };
-            let atom = self.atom(node);
+            let atom = self.operand_text(node);
             if self.is_condition(node) {
                 let _ = writeln!(text, "w[{slot}] = S::select({atom}, S::from_f64(1.0), S::from_f64(0.0));");
             } else {
@@ -311,12 +320,12 @@ impl Writer<'_> {
     }
 
     /// A node where it is used: a local variable or a constant.
-    fn atom(&self, node: Node) -> String {
+    fn operand_text(&self, node: Node) -> String {
         if let Some(slot) = self.in_place.get(&node) {
             return format!("w[{slot}]");
         }
         match self.graph.op(node) {
-            Op::Constant(bits) => format!("S::from_f64({})", number(f64::from_bits(bits))),
+            Op::Constant(bits) => format!("S::from_f64({})", number_text(f64::from_bits(bits))),
             Op::Opaque(index) => format!("S::from_f64(c[{index}])"),
             Op::Variable(index) => self.variable(index),
             Op::Seed(row) => format!("mu_{row}"),
@@ -325,15 +334,15 @@ impl Writer<'_> {
     }
 
     /// A constant by which a quotient is a product, and its reciprocal.
-    fn divisor(&self, node: Node) -> Option<[String; 3]> {
+    fn reciprocal_text(&self, node: Node) -> Option<[String; 3]> {
         let Op::Constant(bits) = self.graph.op(node) else { return None };
         let c = f64::from_bits(bits);
-        divisor::reciprocal(c).map(|[high, low]| [c, high, low].map(number))
+        divisor::reciprocal(c).map(|[high, low]| [c, high, low].map(number_text))
     }
 
     /// A node where it is computed.
-    fn expression(&self, node: Node) -> String {
-        let atom = |node: Node| self.atom(node);
+    fn expression_text(&self, node: Node) -> String {
+        let atom = |node: Node| self.operand_text(node);
         match self.graph.op(node) {
             Op::Unary(Unary::Neg, a) => format!("-{}", atom(a)),
             Op::Unary(Unary::Table(Table { index, orders, .. }), a) => {
@@ -345,16 +354,16 @@ impl Writer<'_> {
             Op::Unary(function, a) => format!("{}.{}()", atom(a), unary(function)),
             Op::Binary(function, a, b) => {
                 if function == Binary::Div
-                    && let Some([c, high, low]) = self.divisor(b)
+                    && let Some([c, high, low]) = self.reciprocal_text(b)
                 {
                     return format!("{}.over({c}, [{high}, {low}])", atom(a));
                 }
                 let (a, b) = (atom(a), atom(b));
                 match function {
                     Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => {
-                        format!("{a} {} {b}", binary(function))
+                        format!("{a} {} {b}", binary_text(function))
                     }
-                    _ => format!("{a}.{}({b})", binary(function)),
+                    _ => format!("{a}.{}({b})", binary_text(function)),
                 }
             }
             Op::Powi(a, n) => format!("{}.powi({n})", atom(a)),

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 /// One statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum Statement {
     /// Compute a node.
     Compute(Node),
     /// Compute the sine and the cosine of the same argument.
@@ -27,7 +27,7 @@ pub fn is_leaf(op: Op) -> bool {
 }
 
 /// The statements that compute the outputs, each operand before its uses.
-pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
+pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Statement> {
     let Some(last) = outputs.iter().map(|node| node.at()).max() else {
         return Vec::new();
     };
@@ -76,12 +76,12 @@ pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
             if let Some((Some(sin), Some(cos))) = pair {
                 done[sin.at()] = true;
                 done[cos.at()] = true;
-                steps.push(Step::SinCos(sin, cos));
+                steps.push(Statement::SinCos(sin, cos));
             } else {
-                steps.push(Step::Compute(node));
+                steps.push(Statement::Compute(node));
             }
         }
-        steps.push(Step::Store(number));
+        steps.push(Statement::Store(number));
     }
     steps
 }
@@ -92,14 +92,14 @@ pub mod tests {
     use crate::emit::chunk::read;
     use crate::graph::Binary;
 
-    fn check(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
+    fn check(graph: &Graph, outputs: &[Node]) -> Vec<Statement> {
         let steps = schedule(graph, outputs);
         assert_complete(graph, outputs, &steps);
         steps
     }
 
     /// Every operand is computed before its use, every value once, every output stored once.
-    pub fn assert_complete(graph: &Graph, outputs: &[Node], steps: &[Step]) {
+    pub fn assert_complete(graph: &Graph, outputs: &[Node], steps: &[Statement]) {
         let mut computed = std::collections::HashSet::new();
         let mut stored = vec![false; outputs.len()];
         let ready = |computed: &std::collections::HashSet<Node>, node| {
@@ -108,7 +108,7 @@ pub mod tests {
         for &step in steps {
             assert!(read(graph, outputs, step).all(|node| ready(&computed, node)));
             assert!(crate::emit::chunk::computed(step).all(|node| computed.insert(node)));
-            if let Step::Store(output) = step {
+            if let Statement::Store(output) = step {
                 assert!(!std::mem::replace(&mut stored[output], true));
             }
         }
@@ -121,9 +121,12 @@ pub mod tests {
         let x = g.variable(0);
         let (s, c) = (g.unary(Unary::Sin, x), g.unary(Unary::Cos, x));
         let product = g.binary(Binary::Mul, s, c);
-        assert_eq!(check(&g, &[product]), [Step::SinCos(s, c), Step::Compute(product), Step::Store(0)]);
+        assert_eq!(
+            check(&g, &[product]),
+            [Statement::SinCos(s, c), Statement::Compute(product), Statement::Store(0)]
+        );
         // The cosine alone is not accompanied by a sine that nobody asked for.
-        assert_eq!(check(&g, &[c]), [Step::Compute(c), Step::Store(0)]);
+        assert_eq!(check(&g, &[c]), [Statement::Compute(c), Statement::Store(0)]);
     }
 
     #[test]
@@ -132,8 +135,8 @@ pub mod tests {
         let x = g.variable(0);
         let unused = g.unary(Unary::Exp, x);
         let two = g.constant(2.0);
-        assert_eq!(check(&g, &[x, two]), [Step::Store(0), Step::Store(1)]);
-        assert!(!check(&g, &[x]).contains(&Step::Compute(unused)));
+        assert_eq!(check(&g, &[x, two]), [Statement::Store(0), Statement::Store(1)]);
+        assert!(!check(&g, &[x]).contains(&Statement::Compute(unused)));
         assert_eq!(schedule(&g, &[]), []);
     }
 

@@ -26,7 +26,8 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let operations = self::operations(krate, operations);
     let Facts { linear_in_state, constant_matrix, autonomous, constant_rows, .. } = facts;
     let [trivial, quadratures, directions, curved] =
-        [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
+        [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved]
+            .map(|list| index_literals(list));
     let [count, terms] = [curved.len(), analysis.symmetric].map(Literal::usize_unsuffixed);
     let elimination = elimination::write(krate, &analysis.elimination.tables);
     let reduction = reduction(krate, analysis.reduction.as_ref());
@@ -87,7 +88,7 @@ fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
 }
 
 /// The value of `Function::STRUCTURE`.
-pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
+pub fn function_structure(analysis: &FunctionAnalysis) -> TokenStream {
     let FunctionAnalysis { model, derivatives, used, .. } = analysis;
     let Derivatives { jacobian, blocks, constant, hessian, linear, operations, .. } = derivatives;
     let krate = &model.krate;
@@ -98,7 +99,7 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
     let entries = &blocks[4];
     let [rows, begins] = [0, 1].map(|more| Literal::usize_unsuffixed(model.residual.len() + more));
     let operations = self::operations(krate, operations);
-    let variables = numbers(used);
+    let variables = index_literals(used);
     quote! {{
         const JACOBIAN: #krate::__private::Pattern = #jacobian;
         const BY_ROW: &[u32] = &const { #krate::__private::by_row::<#rows, #entries>(&JACOBIAN) };
@@ -136,7 +137,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
 }
 
 /// Indices as literals.
-pub fn numbers(list: &[u32]) -> Vec<Literal> {
+pub fn index_literals(list: &[u32]) -> Vec<Literal> {
     list.iter().map(|&index| Literal::u32_unsuffixed(index)).collect()
 }
 

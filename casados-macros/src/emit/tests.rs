@@ -40,10 +40,10 @@ fn analysis(model: Model) -> Analysis {
     analyse(model).unwrap()
 }
 
-fn pretty(item: TokenStream, place: Place, models: Vec<Analysis>) -> String {
-    let (name, _) = super::original(&item).unwrap();
+fn expanded_text(item: TokenStream, place: Place, models: Vec<Analysis>) -> String {
+    let (name, _) = super::named_item(&item).unwrap();
     let file: syn::File =
-        syn::parse2(expand(item, place, &[super::Part::Models(name, models)]).unwrap()).unwrap();
+        syn::parse2(expand(item, place, &[super::ReadItem::Models(name, models)]).unwrap()).unwrap();
     prettyplease::unparse(&file)
 }
 
@@ -143,7 +143,7 @@ fn of_a_pendulum() {
     let item = quote!(
         fn pendulum() {}
     );
-    insta::assert_snapshot!(pretty(item, Place::Beside, vec![analysis(pendulum())]));
+    insta::assert_snapshot!(expanded_text(item, Place::Beside, vec![analysis(pendulum())]));
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn of_a_module_with_a_selection_and_an_outer_constant() {
             fn model() {}
         }
     );
-    insta::assert_snapshot!(pretty(item, Place::Inside, vec![analysis(valve())]));
+    insta::assert_snapshot!(expanded_text(item, Place::Inside, vec![analysis(valve())]));
 }
 
 #[test]
@@ -161,11 +161,11 @@ fn of_instances_of_an_explicit_model() {
     let item = quote!(
         fn decay<const N: usize>() {}
     );
-    insta::assert_snapshot!(pretty(item, Place::Beside, vec![analysis(decay(1)), analysis(decay(2))]));
+    insta::assert_snapshot!(expanded_text(item, Place::Beside, vec![analysis(decay(1)), analysis(decay(2))]));
 }
 
 #[test]
-fn beside_errors_stands_the_type() {
+fn types_are_emitted_with_errors() {
     let item = quote!(
         pub(crate) fn chain_of_masses<const N: usize>(x: [f64; N]) {}
     );

@@ -3,7 +3,7 @@
 use crate::graph::{Binary, Unary};
 
 /// A number such that reading it gives the same bits.
-pub fn number(value: f64) -> String {
+pub fn number_text(value: f64) -> String {
     if value.is_finite() {
         format!("{value:?}")
     } else if value.is_nan() {
@@ -16,7 +16,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// The operator or the method of a function of two arguments.
-pub fn binary(function: Binary) -> &'static str {
+pub fn binary_text(function: Binary) -> &'static str {
     match function {
         Binary::Add => "+",
         Binary::Sub => "-",
@@ -69,7 +69,7 @@ mod tests {
         let list =
             [0.0, -0.0, 0.1, -1.0 / 3.0, 1e300, 5e-324, f64::MIN_POSITIVE, f64::MAX, 1e22, 123456789.0];
         for value in list {
-            let text = number(value);
+            let text = number_text(value);
             let expression: syn::Expr = syn::parse_str(&text).unwrap();
             let (sign, literal) = match &expression {
                 syn::Expr::Unary(unary) => (-1.0, &*unary.expr),
@@ -81,8 +81,8 @@ mod tests {
             let read: f64 = sign * literal.base10_parse::<f64>().unwrap();
             assert_eq!(read.to_bits(), value.to_bits(), "{text}");
         }
-        assert_eq!(number(f64::INFINITY), "f64::INFINITY");
-        assert_eq!(number(f64::NEG_INFINITY), "f64::NEG_INFINITY");
-        assert_eq!(number(f64::from_bits(0x7ff8_0000_0000_0001)), "f64::from_bits(0x7ff8000000000001)");
+        assert_eq!(number_text(f64::INFINITY), "f64::INFINITY");
+        assert_eq!(number_text(f64::NEG_INFINITY), "f64::NEG_INFINITY");
+        assert_eq!(number_text(f64::from_bits(0x7ff8_0000_0000_0001)), "f64::from_bits(0x7ff8000000000001)");
     }
 }

@@ -21,7 +21,7 @@ pub fn write(krate: &syn::Path, units: &Units) -> TokenStream {
 }
 
 /// Of the outputs of a function, if there is one.
-pub fn of_outputs(units: &Units) -> Option<TokenStream> {
+pub fn output_unit(units: &Units) -> Option<TokenStream> {
     let unit = &units.outputs;
     (!unit.is_empty()).then(|| quote!(const UNIT: &'static str = #unit;))
 }

@@ -9,10 +9,10 @@ use super::{Binary, Graph, Node, Op, Unary};
 
 /// Selections nest at most this deeply, so that work stays linear in their depth: more are one by
 /// all of their conditions.
-const DEPTH: usize = 8;
+const MAX_SELECTION_DEPTH: usize = 8;
 
 /// Sums of selections nested deeper than this are multiplied from outside.
-const SUMMANDS: usize = 3;
+const MAX_SUMMAND_DEPTH: usize = 3;
 
 /// A condition, and the branch in which a value is not zero.
 type Branch = (Node, bool);
@@ -32,8 +32,8 @@ impl Graph {
     }
 
     /// Takes a value out of the branches outside of which it is zero.
-    fn peel(&self, mut a: Node, branches: &mut Vec<Branch>) -> Node {
-        for _ in 0..DEPTH {
+    fn strip_branches(&self, mut a: Node, branches: &mut Vec<Branch>) -> Node {
+        for _ in 0..MAX_SELECTION_DEPTH {
             let Some((branch, inner)) = self.branch(a) else { break };
             branches.push(branch);
             a = inner;
@@ -42,7 +42,7 @@ impl Graph {
     }
 
     /// Puts a value into branches.
-    fn wrap(&mut self, mut a: Node, mut branches: Vec<Branch>) -> Node {
+    fn apply_branches(&mut self, mut a: Node, mut branches: Vec<Branch>) -> Node {
         let zero = self.constant(0.0);
         let mut left = Vec::new();
         while let Some((condition, taken)) = branches.pop() {
@@ -54,7 +54,7 @@ impl Graph {
             }
         }
         // No selection may be deeper than `peel` reaches: many become one.
-        if left.len() > DEPTH {
+        if left.len() > MAX_SELECTION_DEPTH {
             let mut all = None;
             for (condition, taken) in left {
                 let condition = if taken { condition } else { self.not(condition) };
@@ -70,15 +70,15 @@ impl Graph {
     }
 
     /// `−a`
-    pub(super) fn negative(&mut self, a: Node) -> Node {
+    pub(super) fn simplified_neg(&mut self, a: Node) -> Node {
         let mut branches = Vec::new();
-        let a = self.peel(a, &mut branches);
+        let a = self.strip_branches(a, &mut branches);
         let a = self.unary(Unary::Neg, a);
-        self.wrap(a, branches)
+        self.apply_branches(a, branches)
     }
 
     /// `a + b`
-    pub(super) fn plus(&mut self, a: Node, b: Node) -> Node {
+    pub(super) fn simplified_add(&mut self, a: Node, b: Node) -> Node {
         if let (Some(((c, in_a), x)), Some(((d, in_b), y))) = (self.branch(a), self.branch(b))
             && c == d
         {
@@ -86,15 +86,15 @@ impl Graph {
             let (x, y) = match (in_a, in_b) {
                 (true, false) => (x, y),
                 (false, true) => (y, x),
-                (true, true) => (self.plus_inside(x, y), zero),
-                (false, false) => (zero, self.plus_inside(x, y)),
+                (true, true) => (self.add_within_branches(x, y), zero),
+                (false, false) => (zero, self.add_within_branches(x, y)),
             };
             return self.select(c, x, y);
         }
-        self.plus_inside(a, b)
+        self.add_within_branches(a, b)
     }
 
-    fn plus_inside(&mut self, a: Node, b: Node) -> Node {
+    fn add_within_branches(&mut self, a: Node, b: Node) -> Node {
         let ((x, factor_a), (y, factor_b)) = (self.multiple(a), self.multiple(b));
         if x == y && self.value(x).is_none() {
             let factor = self.constant(factor_a + factor_b);
@@ -117,42 +117,46 @@ impl Graph {
     }
 
     /// `a − b`
-    pub(super) fn minus(&mut self, a: Node, b: Node) -> Node {
-        let b = self.negative(b);
-        self.plus(a, b)
+    pub(super) fn simplified_sub(&mut self, a: Node, b: Node) -> Node {
+        let b = self.simplified_neg(b);
+        self.simplified_add(a, b)
     }
 
     /// Whether a value is a sum of selections that are zero in some branch.
-    fn is_guarded(&self, a: Node, depth: usize) -> bool {
+    fn is_sum_of_selections(&self, a: Node, depth: usize) -> bool {
         self.branch(a).is_some()
             || match self.op(a) {
                 Op::Binary(Binary::Add | Binary::Sub, x, y) if depth > 0 => {
-                    self.is_guarded(x, depth - 1) && self.is_guarded(y, depth - 1)
+                    self.is_sum_of_selections(x, depth - 1) && self.is_sum_of_selections(y, depth - 1)
                 }
                 _ => false,
             }
     }
 
     /// `a · b`
-    pub(super) fn times(&mut self, a: Node, b: Node) -> Node {
+    pub(super) fn simplified_mul(&mut self, a: Node, b: Node) -> Node {
         for (sum, factor) in [(a, b), (b, a)] {
             if let Op::Binary(function @ (Binary::Add | Binary::Sub), x, y) = self.op(sum)
-                && self.is_guarded(sum, SUMMANDS)
+                && self.is_sum_of_selections(sum, MAX_SUMMAND_DEPTH)
             {
-                let (x, y) = (self.times(x, factor), self.times(y, factor));
-                return if function == Binary::Add { self.plus(x, y) } else { self.minus(x, y) };
+                let (x, y) = (self.simplified_mul(x, factor), self.simplified_mul(y, factor));
+                return if function == Binary::Add {
+                    self.simplified_add(x, y)
+                } else {
+                    self.simplified_sub(x, y)
+                };
             }
         }
         let mut branches = Vec::new();
-        let (a, b) = (self.peel(a, &mut branches), self.peel(b, &mut branches));
-        let product = self.product(a, b);
-        self.wrap(product, branches)
+        let (a, b) = (self.strip_branches(a, &mut branches), self.strip_branches(b, &mut branches));
+        let product = self.mul_within_branches(a, b);
+        self.apply_branches(product, branches)
     }
 
-    fn product(&mut self, a: Node, b: Node) -> Node {
+    fn mul_within_branches(&mut self, a: Node, b: Node) -> Node {
         for (factor, other) in [(a, b), (b, a)] {
             if let Some(value) = self.value(factor) {
-                return self.scaled(value, other);
+                return self.scale_by_constant(value, other);
             }
         }
         // (x / y) y = x
@@ -167,7 +171,7 @@ impl Graph {
     }
 
     /// A constant times a node, with constant factors of the node taken together.
-    fn scaled(&mut self, factor: f64, a: Node) -> Node {
+    fn scale_by_constant(&mut self, factor: f64, a: Node) -> Node {
         if let Op::Binary(function @ (Binary::Mul | Binary::Div), x, y) = self.op(a) {
             if let Some(value) = self.value(x) {
                 let x = self.constant(factor * value);
@@ -184,13 +188,13 @@ impl Graph {
     }
 
     /// `a / b`
-    pub(super) fn over(&mut self, a: Node, b: Node) -> Node {
+    pub(super) fn simplified_div(&mut self, a: Node, b: Node) -> Node {
         let mut branches = Vec::new();
-        let a = self.peel(a, &mut branches);
+        let a = self.strip_branches(a, &mut branches);
         let quotient = match self.value(b) {
-            Some(value) => self.scaled(1.0 / value, a),
+            Some(value) => self.scale_by_constant(1.0 / value, a),
             None => self.binary(Binary::Div, a, b),
         };
-        self.wrap(quotient, branches)
+        self.apply_branches(quotient, branches)
     }
 }

@@ -24,7 +24,7 @@ impl Graph {
     }
 
     /// The number of operations that outputs take together; an elementary function is one.
-    pub fn operations(&self, outputs: &[Node]) -> u32 {
+    pub fn operation_count(&self, outputs: &[Node]) -> u32 {
         let leaf = |node: &&Node| {
             matches!(self.op(**node), Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_))
         };

@@ -76,14 +76,14 @@ impl Linearised {
     ) -> Option<usize> {
         let mut products = 0;
         let mut each = |this: &mut Self, v: u32| {
-            products += this.products(v);
+            products += this.product_count(v);
             (products <= budget).then(|| this.eliminate_vertex(graph, v))
         };
         match order {
             Order::Reverse => intermediates.rev().try_for_each(|v| each(self, v).map(drop))?,
             Order::Forward => intermediates.into_iter().try_for_each(|v| each(self, v).map(drop))?,
             Order::Markowitz => {
-                let key = |this: &Self, v: u32| Reverse((this.products(v), Reverse(v)));
+                let key = |this: &Self, v: u32| Reverse((this.product_count(v), Reverse(v)));
                 let mut heap: BinaryHeap<_> = intermediates.clone().map(|v| key(self, v)).collect();
                 let mut left = vec![true; self.into.len()];
                 while let Some(entry) = heap.pop() {
@@ -109,7 +109,7 @@ impl Linearised {
     }
 
     /// The products that eliminating a vertex takes.
-    fn products(&self, v: u32) -> usize {
+    fn product_count(&self, v: u32) -> usize {
         let v = v as usize;
         let (into, out, arcs) = (self.into[v].len(), self.out[v].len(), self.arcs[v].len());
         if self.arcs[v].contains_key(&(v as u32)) {
@@ -131,25 +131,25 @@ impl Linearised {
         for &s in &out {
             let Some(after) = self.into[s as usize].remove(&v) else { continue };
             for (&p, &before) in &into {
-                let product = graph.times(before, after);
+                let product = graph.simplified_mul(before, after);
                 self.add_edge(graph, p, s, product);
             }
         }
         for (&n, &weight) in &arcs {
             self.arcs[n as usize].remove(&v);
             for (&p, &before) in &into {
-                let mut product = graph.times(before, weight);
+                let mut product = graph.simplified_mul(before, weight);
                 if p == n {
-                    product = graph.plus(product, product);
+                    product = graph.simplified_add(product, product);
                 }
                 self.add_arc(graph, p, n, product);
             }
         }
         if let Some(weight) = own {
             for (&p, &before) in &into {
-                let left = graph.times(before, weight);
+                let left = graph.simplified_mul(before, weight);
                 for (&q, &other) in into.range(..=p) {
-                    let product = graph.times(left, other);
+                    let product = graph.simplified_mul(left, other);
                     self.add_arc(graph, p, q, product);
                 }
             }
@@ -161,7 +161,7 @@ impl Linearised {
 /// Adds to an entry. Says whether it is there afterwards: zeros are not kept.
 fn add(graph: &mut Graph, entries: &mut BTreeMap<u32, Node>, key: u32, value: Node) -> bool {
     let sum = match entries.get(&key) {
-        Some(&old) => graph.plus(old, value),
+        Some(&old) => graph.simplified_add(old, value),
         None => value,
     };
     if graph.is_zero(sum) {

@@ -4,7 +4,7 @@ use super::{Binary, Compare, Graph, Node, Op, Unary};
 
 /// Values of everything that a graph depends on. What is missing is NaN.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Point<'a> {
+pub struct EvaluationPoint<'a> {
     /// `(ẋ, x, z, u, p, t)`
     pub variables: &'a [f64],
     /// Constants from outside.
@@ -15,7 +15,7 @@ pub struct Point<'a> {
 
 impl Graph {
     /// Values of nodes at a point. Conditions are 1 or 0.
-    pub fn evaluate(&self, nodes: &[Node], point: Point) -> Vec<f64> {
+    pub fn evaluate(&self, nodes: &[Node], point: EvaluationPoint) -> Vec<f64> {
         let given = |values: &[f64], index: u32| values.get(index as usize).copied().unwrap_or(f64::NAN);
         let truth = |truth: bool| f64::from(u8::from(truth));
         let mut values = vec![0.0; self.len()];
@@ -67,7 +67,7 @@ pub fn unary_value(function: Unary, a: f64) -> f64 {
         Unary::Atanh => a.atanh(),
         Unary::Abs => a.abs(),
         Unary::Signum => a.signum(),
-        Unary::Table(table) => table.stand_in([a]),
+        Unary::Table(table) => table.sample_value([a]),
     }
 }
 
@@ -81,7 +81,7 @@ pub fn binary_value(function: Binary, a: f64, b: f64) -> f64 {
         Binary::Powf => a.powf(b),
         Binary::Atan2 => a.atan2(b),
         Binary::Hypot => a.hypot(b),
-        Binary::Table(table) => table.stand_in([a, b]),
+        Binary::Table(table) => table.sample_value([a, b]),
     }
 }
 

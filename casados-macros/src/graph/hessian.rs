@@ -1,7 +1,7 @@
 //! The sparse Hessian of `μᵀ f`.
 
 use super::elimination::{Linearised, Order};
-use super::jacobian::{Vertices, best};
+use super::jacobian::{VertexNumbering, cheapest_order};
 use super::reverse::adjoints;
 use super::{Entry, Graph, Node};
 
@@ -9,7 +9,7 @@ use super::{Entry, Graph, Node};
 /// respect to the variables `0..variables`, by row, then column. Of two elimination orders the one
 /// with fewer operations.
 pub fn hessian(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<Entry> {
-    best(graph, &[Order::Reverse, Order::Markowitz], &[], |graph, order, budget| {
+    cheapest_order(graph, &[Order::Reverse, Order::Markowitz], &[], |graph, order, budget| {
         hessian_in_order(graph, outputs, variables, order, budget)
     })
 }
@@ -26,13 +26,13 @@ pub fn hessian_in_order(
     order: Order,
     budget: usize,
 ) -> Option<(Vec<Entry>, usize)> {
-    let active = graph.active(outputs.iter().map(|output| output.0), variables);
+    let active = graph.active_nodes(outputs.iter().map(|output| output.0), variables);
     let adjoints = adjoints(graph, outputs, &active);
     let is_active = |node: Node| active[node.at()];
     let mut arcs = Vec::new();
     for (node, adjoint) in (0..).map(Node).zip(&adjoints) {
         if let Some(adjoint) = *adjoint {
-            arcs.extend(graph.second(node, adjoint, is_active));
+            arcs.extend(graph.second_partials(node, adjoint, is_active));
         }
     }
     // Only vertices below an arc matter.
@@ -49,7 +49,7 @@ pub fn hessian_in_order(
         }
     }
     let nodes: Vec<Node> = (0..active.len() as u32).map(Node).filter(|node| needed[node.at()]).collect();
-    let vertices = Vertices::new(graph, &nodes, variables, active.len());
+    let vertices = VertexNumbering::new(graph, &nodes, variables, active.len());
     let mut linearised = Linearised::new(vertices.count as usize);
     for &node in &nodes {
         for (operand, partial) in graph.partials(node, is_active).into_iter().flatten() {

@@ -7,13 +7,16 @@ use super::{Entry, Graph, Node, Op};
 /// the variables `0..variables`, by output, then variable. Of several elimination orders the one
 /// with the fewest operations for outputs and Jacobian together.
 pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<Entry> {
-    best(graph, &[Order::Reverse, Order::Markowitz, Order::Forward], outputs, |graph, order, budget| {
-        jacobian_in_order(graph, outputs, variables, order, budget)
-    })
+    cheapest_order(
+        graph,
+        &[Order::Reverse, Order::Markowitz, Order::Forward],
+        outputs,
+        |graph, order, budget| jacobian_in_order(graph, outputs, variables, order, budget),
+    )
 }
 
 /// Tries elimination orders on copies of the graph and keeps the one with the fewest operations.
-pub fn best(
+pub fn cheapest_order(
     graph: &mut Graph,
     orders: &[Order],
     beside: &[Node],
@@ -26,9 +29,9 @@ pub fn best(
         let Some((entries, products)) = derive(&mut copy, order, budget) else { continue };
         // No order is worth many times the work of another.
         budget = budget.min(products.saturating_mul(2).saturating_add(1000));
-        let entries = copy.with_signs_inside(entries, beside);
+        let entries = copy.with_folded_signs(entries, beside);
         let needed: Vec<Node> = beside.iter().copied().chain(entries.iter().map(|entry| entry.2)).collect();
-        let operations = copy.operations(&needed);
+        let operations = copy.operation_count(&needed);
         if best.as_ref().is_none_or(|best| operations < best.0) {
             best = Some((operations, copy, entries));
         }
@@ -47,9 +50,9 @@ pub fn jacobian_in_order(
     order: Order,
     budget: usize,
 ) -> Option<(Vec<Entry>, usize)> {
-    let active = graph.active(outputs.iter().copied(), variables);
+    let active = graph.active_nodes(outputs.iter().copied(), variables);
     let nodes: Vec<Node> = graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
-    let vertices = Vertices::new(graph, &nodes, variables, active.len());
+    let vertices = VertexNumbering::new(graph, &nodes, variables, active.len());
     let mut linearised = Linearised::new(vertices.count as usize + outputs.len());
     for &node in &nodes {
         for (operand, partial) in graph.partials(node, |operand| active[operand.at()]).into_iter().flatten() {
@@ -71,13 +74,13 @@ pub fn jacobian_in_order(
 }
 
 /// Numbers of vertices: variables keep theirs, intermediate nodes follow in topological order.
-pub struct Vertices {
+pub struct VertexNumbering {
     of: Vec<u32>,
     /// How many there are.
     pub count: u32,
 }
 
-impl Vertices {
+impl VertexNumbering {
     /// Numbers the variables and some nodes.
     pub fn new(graph: &Graph, nodes: &[Node], variables: u32, len: usize) -> Self {
         let mut of = vec![u32::MAX; len];

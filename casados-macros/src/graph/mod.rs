@@ -28,7 +28,7 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 
-pub use evaluate::Point;
+pub use evaluate::EvaluationPoint;
 pub use hessian::hessian;
 pub use jacobian::jacobian;
 pub use reverse::gradient;

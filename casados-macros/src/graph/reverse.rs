@@ -4,7 +4,7 @@ use super::{Graph, Node, Op};
 
 /// The gradient of `Σ seed · output` with respect to the variables `0..variables`.
 pub fn gradient(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<Node> {
-    let active = graph.active(outputs.iter().map(|output| output.0), variables);
+    let active = graph.active_nodes(outputs.iter().map(|output| output.0), variables);
     let adjoints = adjoints(graph, outputs, &active);
     (0..variables)
         .map(|index| {
@@ -19,7 +19,7 @@ pub fn adjoints(graph: &mut Graph, outputs: &[(Node, Node)], active: &[bool]) ->
     let mut adjoints: Vec<Option<Node>> = vec![None; active.len()];
     let add = |graph: &mut Graph, sum: &mut Option<Node>, term: Node| {
         *sum = Some(match *sum {
-            Some(sum) => graph.plus(sum, term),
+            Some(sum) => graph.simplified_add(sum, term),
             None => term,
         });
     };
@@ -30,7 +30,7 @@ pub fn adjoints(graph: &mut Graph, outputs: &[(Node, Node)], active: &[bool]) ->
     }
     for index in (0..active.len()).rev() {
         let Some(adjoint) = adjoints[index] else { continue };
-        let parts = graph.pull(Node(index as u32), adjoint, |operand| active[operand.at()]);
+        let parts = graph.pull_back(Node(index as u32), adjoint, |operand| active[operand.at()]);
         for (operand, term) in parts.into_iter().flatten() {
             add(graph, &mut adjoints[operand.at()], term);
         }
@@ -41,7 +41,7 @@ pub fn adjoints(graph: &mut Graph, outputs: &[(Node, Node)], active: &[bool]) ->
 impl Graph {
     /// For every node up to the last output whether it is differentiable and not constant with
     /// respect to the variables `0..variables`.
-    pub(super) fn active(&self, outputs: impl Iterator<Item = Node>, variables: u32) -> Vec<bool> {
+    pub(super) fn active_nodes(&self, outputs: impl Iterator<Item = Node>, variables: u32) -> Vec<bool> {
         let len = outputs.map(|output| output.at() + 1).max().unwrap_or(0);
         let mut active = vec![false; len];
         for index in 0..len {

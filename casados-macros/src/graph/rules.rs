@@ -4,7 +4,7 @@ use super::{Binary, Graph, Node, Op, Unary, tangent};
 use std::f64::consts::{LN_2, LOG2_E, LOG10_E};
 
 /// Operands and what belongs to each; an operand occurs once.
-pub type PerOperand = [Option<(Node, Node)>; 2];
+pub type OperandTerms = [Option<(Node, Node)>; 2];
 
 impl Graph {
     /// `∂c/∂a` of a function `c` of one argument `a`, in forms that neither cancel nor overflow
@@ -15,76 +15,76 @@ impl Graph {
             Unary::Neg => self.constant(-1.0),
             Unary::Sqrt => {
                 let half = self.constant(0.5);
-                self.over(half, c)
+                self.simplified_div(half, c)
             }
             Unary::Cbrt => {
-                let (third, square) = (self.constant(1.0 / 3.0), self.times(c, c));
-                self.over(third, square)
+                let (third, square) = (self.constant(1.0 / 3.0), self.simplified_mul(c, c));
+                self.simplified_div(third, square)
             }
             Unary::Exp => c,
             Unary::Exp2 => {
                 let ln2 = self.constant(LN_2);
-                self.times(ln2, c)
+                self.simplified_mul(ln2, c)
             }
             // c + 1 would lose everything where a is very negative.
             Unary::ExpM1 => self.unary(Unary::Exp, a),
-            Unary::Ln => self.over(one, a),
+            Unary::Ln => self.simplified_div(one, a),
             Unary::Ln1p => {
-                let sum = self.plus(one, a);
-                self.over(one, sum)
+                let sum = self.simplified_add(one, a);
+                self.simplified_div(one, sum)
             }
             Unary::Log2 => {
                 let factor = self.constant(LOG2_E);
-                self.over(factor, a)
+                self.simplified_div(factor, a)
             }
             Unary::Log10 => {
                 let factor = self.constant(LOG10_E);
-                self.over(factor, a)
+                self.simplified_div(factor, a)
             }
             Unary::Sin => self.unary(Unary::Cos, a),
             Unary::Cos => {
                 let sin = self.unary(Unary::Sin, a);
-                self.negative(sin)
+                self.simplified_neg(sin)
             }
             Unary::Tan => {
-                let square = self.times(c, c);
-                self.plus(one, square)
+                let square = self.simplified_mul(c, c);
+                self.simplified_add(one, square)
             }
             Unary::Asin => {
                 let (_, root) = self.one_minus_square(a);
-                self.over(one, root)
+                self.simplified_div(one, root)
             }
             Unary::Acos => {
                 let ((_, root), minus_one) = (self.one_minus_square(a), self.constant(-1.0));
-                self.over(minus_one, root)
+                self.simplified_div(minus_one, root)
             }
             Unary::Atan => {
-                let square = self.times(a, a);
-                let sum = self.plus(one, square);
-                self.over(one, sum)
+                let square = self.simplified_mul(a, a);
+                let sum = self.simplified_add(one, square);
+                self.simplified_div(one, sum)
             }
             Unary::Sinh => self.unary(Unary::Cosh, a),
             Unary::Cosh => self.unary(Unary::Sinh, a),
             Unary::Tanh => {
-                let square = self.times(c, c);
-                self.minus(one, square)
+                let square = self.simplified_mul(c, c);
+                self.simplified_sub(one, square)
             }
             // Where a² overflows this is zero, which is what it rounds to beside anything else.
             Unary::Asinh => {
-                let square = self.times(a, a);
-                let sum = self.plus(one, square);
+                let square = self.simplified_mul(a, a);
+                let sum = self.simplified_add(one, square);
                 let root = self.unary(Unary::Sqrt, sum);
-                self.over(one, root)
+                self.simplified_div(one, root)
             }
             Unary::Acosh => {
-                let (below, above) = (self.minus(a, one), self.plus(a, one));
+                let (below, above) = (self.simplified_sub(a, one), self.simplified_add(a, one));
                 let (below, above) = (self.unary(Unary::Sqrt, below), self.unary(Unary::Sqrt, above));
-                let root = self.times(below, above);
-                self.over(one, root)
+                let root = self.simplified_mul(below, above);
+                self.simplified_div(one, root)
             }
             Unary::Atanh => {
                 let (difference, _) = self.one_minus_square(a);
-                self.over(one, difference)
+                self.simplified_div(one, difference)
             }
             Unary::Abs => self.unary(Unary::Signum, a),
             Unary::Signum => self.constant(0.0),
@@ -95,8 +95,8 @@ impl Graph {
     /// `1 − a²` as `(1 − a)(1 + a)`, which does not cancel near `|a| = 1`, and its square root.
     fn one_minus_square(&mut self, a: Node) -> (Node, Node) {
         let one = self.constant(1.0);
-        let (below, above) = (self.minus(one, a), self.plus(one, a));
-        let product = self.times(below, above);
+        let (below, above) = (self.simplified_sub(one, a), self.simplified_add(one, a));
+        let product = self.simplified_mul(below, above);
         (product, self.unary(Unary::Sqrt, product))
     }
 
@@ -108,41 +108,41 @@ impl Graph {
             (Binary::Sub, false) => self.constant(-1.0),
             (Binary::Mul, true) => b,
             (Binary::Mul, false) => a,
-            (Binary::Div, true) => self.over(one, b),
+            (Binary::Div, true) => self.simplified_div(one, b),
             (Binary::Div, false) => {
-                let reciprocal = self.over(one, b);
-                let product = self.times(c, reciprocal);
-                self.negative(product)
+                let reciprocal = self.simplified_div(one, b);
+                let product = self.simplified_mul(c, reciprocal);
+                self.simplified_neg(product)
             }
             (Binary::Powf, true) => match self.value(b) {
                 Some(n) if is_small_integer(n) => {
                     let power = self.powi(a, n as i32 - 1);
-                    self.times(b, power)
+                    self.simplified_mul(b, power)
                 }
                 Some(n) => {
                     let ratio = self.power_ratio(n, a, c);
                     self.zero_at_zero(n > 1.0, a, ratio)
                 }
                 None => {
-                    let lower = self.minus(b, one);
+                    let lower = self.simplified_sub(b, one);
                     let power = self.binary(Binary::Powf, a, lower);
-                    self.times(b, power)
+                    self.simplified_mul(b, power)
                 }
             },
             // At a = 0 the function does not depend on b, but the logarithm is infinite.
             (Binary::Powf, false) => {
                 let ln = self.unary(Unary::Ln, a);
-                let product = self.times(c, ln);
+                let product = self.simplified_mul(c, ln);
                 self.zero_at_zero(true, a, product)
             }
             (Binary::Atan2, _) => {
-                let (aa, bb) = (self.times(a, a), self.times(b, b));
-                let sum = self.plus(aa, bb);
-                let above = if first { b } else { self.negative(a) };
-                self.over(above, sum)
+                let (aa, bb) = (self.simplified_mul(a, a), self.simplified_mul(b, b));
+                let sum = self.simplified_add(aa, bb);
+                let above = if first { b } else { self.simplified_neg(a) };
+                self.simplified_div(above, sum)
             }
-            (Binary::Hypot, true) => self.over(a, c),
-            (Binary::Hypot, false) => self.over(b, c),
+            (Binary::Hypot, true) => self.simplified_div(a, c),
+            (Binary::Hypot, false) => self.simplified_div(b, c),
             (Binary::Table(table), first) => self.table_partial(table, a, b, first),
         }
     }
@@ -150,8 +150,8 @@ impl Graph {
     /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division instead of another power, which costs ten
     /// times as much. Not a number at `a = 0`, where the limit is zero or infinite.
     fn power_ratio(&mut self, n: f64, a: Node, c: Node) -> Node {
-        let (n, ratio) = (self.constant(n), self.over(c, a));
-        self.times(n, ratio)
+        let (n, ratio) = (self.constant(n), self.simplified_div(c, a));
+        self.simplified_mul(n, ratio)
     }
 
     /// Zero at `a = 0`, if that is the limit.
@@ -165,14 +165,14 @@ impl Graph {
     }
 
     /// The operands of a node that satisfy a predicate, with the partial derivatives.
-    pub(super) fn partials(&mut self, node: Node, active: impl Fn(Node) -> bool) -> PerOperand {
+    pub(super) fn partials(&mut self, node: Node, active: impl Fn(Node) -> bool) -> OperandTerms {
         let zero = self.constant(0.0);
         let one = self.constant(1.0);
         let both = match self.op(node) {
             Op::Unary(function, a) if active(a) => [Some((a, self.unary_partial(function, a, node))), None],
             Op::Powi(a, n) if active(a) => {
                 let (factor, power) = (self.constant(f64::from(n)), self.powi(a, n.saturating_sub(1)));
-                [Some((a, self.times(factor, power))), None]
+                [Some((a, self.simplified_mul(factor, power))), None]
             }
             Op::Binary(function, a, b) => [
                 active(a).then(|| (a, self.binary_partial(function, a, b, node, true))),
@@ -185,31 +185,33 @@ impl Graph {
             _ => [None, None],
         };
         match both {
-            [Some((a, p)), Some((b, q))] if a == b => [Some((a, self.plus(p, q))), None],
+            [Some((a, p)), Some((b, q))] if a == b => [Some((a, self.simplified_add(p, q))), None],
             both => both.map(|part| part.filter(|&(_, partial)| partial != zero)),
         }
     }
 
     /// The operands of a node that satisfy a predicate, with `w` times the partial derivatives.
-    pub(super) fn pull(&mut self, node: Node, w: Node, active: impl Fn(Node) -> bool) -> PerOperand {
+    pub(super) fn pull_back(&mut self, node: Node, w: Node, active: impl Fn(Node) -> bool) -> OperandTerms {
         match self.op(node) {
             Op::Binary(Binary::Div, a, b) if a != b => {
-                let quotient = self.over(w, b);
+                let quotient = self.simplified_div(w, b);
                 [
                     active(a).then_some((a, quotient)),
                     active(b).then(|| {
-                        let product = self.times(node, quotient);
-                        (b, self.negative(product))
+                        let product = self.simplified_mul(node, quotient);
+                        (b, self.simplified_neg(product))
                     }),
                 ]
             }
-            _ => self.partials(node, active).map(|part| part.map(|(operand, p)| (operand, self.times(w, p)))),
+            _ => self
+                .partials(node, active)
+                .map(|part| part.map(|(operand, p)| (operand, self.simplified_mul(w, p)))),
         }
     }
 
     /// `w` times the second partial derivatives of a node with respect to the operands that satisfy
     /// a predicate: `(j, k, value)`, pairs of different operands once.
-    pub(super) fn second(
+    pub(super) fn second_partials(
         &mut self,
         node: Node,
         w: Node,
@@ -220,35 +222,35 @@ impl Graph {
             Op::Unary(Unary::Neg | Unary::Abs | Unary::Signum, _)
             | Op::Binary(Binary::Add | Binary::Sub, ..)
             | Op::Select(..) => Vec::new(),
-            Op::Binary(Binary::Mul, a, b) if a == b && active(a) => vec![(a, a, self.times(two, w))],
+            Op::Binary(Binary::Mul, a, b) if a == b && active(a) => vec![(a, a, self.simplified_mul(two, w))],
             Op::Binary(Binary::Mul, a, b) if active(a) && active(b) => vec![(a, b, w)],
             Op::Binary(Binary::Mul, ..) => Vec::new(),
             Op::Binary(Binary::Div, a, b) if a != b => {
-                let [_, Some((_, partial))] = self.pull(node, w, active) else { return Vec::new() };
+                let [_, Some((_, partial))] = self.pull_back(node, w, active) else { return Vec::new() };
                 let one = self.constant(1.0);
-                let reciprocal = self.over(one, b);
+                let reciprocal = self.simplified_div(one, b);
                 let mut arcs = Vec::new();
                 if active(a) {
-                    let quotient = self.over(w, b);
-                    let product = self.times(quotient, reciprocal);
-                    arcs.push((a, b, self.negative(product)));
+                    let quotient = self.simplified_div(w, b);
+                    let product = self.simplified_mul(quotient, reciprocal);
+                    arcs.push((a, b, self.simplified_neg(product)));
                 }
                 let minus_two = self.constant(-2.0);
-                let twice = self.times(minus_two, reciprocal);
-                arcs.push((b, b, self.times(twice, partial)));
+                let twice = self.simplified_mul(minus_two, reciprocal);
+                arcs.push((b, b, self.simplified_mul(twice, partial)));
                 arcs
             }
             Op::Unary(Unary::Sqrt, a) if active(a) => {
-                let [Some((_, first)), _] = self.pull(node, w, active) else { return Vec::new() };
+                let [Some((_, first)), _] = self.pull_back(node, w, active) else { return Vec::new() };
                 let minus_half = self.constant(-0.5);
-                let factor = self.over(minus_half, a);
-                vec![(a, a, self.times(first, factor))]
+                let factor = self.simplified_div(minus_half, a);
+                vec![(a, a, self.simplified_mul(first, factor))]
             }
             Op::Unary(Unary::Ln, a) if active(a) => {
-                let [Some((_, first)), _] = self.pull(node, w, active) else { return Vec::new() };
+                let [Some((_, first)), _] = self.pull_back(node, w, active) else { return Vec::new() };
                 let partial = self.unary_partial(Unary::Ln, a, node);
-                let product = self.times(first, partial);
-                vec![(a, a, self.negative(product))]
+                let product = self.simplified_mul(first, partial);
+                vec![(a, a, self.simplified_neg(product))]
             }
             op => match op {
                 Op::Binary(Binary::Powf, a, b) => match self.value(b) {
@@ -265,9 +267,9 @@ impl Graph {
     /// `w n (n − 1) aⁿ⁻²` of `c = aⁿ`.
     fn second_of_power(&mut self, n: f64, a: Node, c: Node, w: Node) -> Node {
         let ratio = self.power_ratio(n, a, c);
-        let (first, n_minus_one) = (self.times(w, ratio), self.constant(n - 1.0));
-        let factor = self.over(n_minus_one, a);
-        let second = self.times(first, factor);
+        let (first, n_minus_one) = (self.simplified_mul(w, ratio), self.constant(n - 1.0));
+        let factor = self.simplified_div(n_minus_one, a);
+        let second = self.simplified_mul(first, factor);
         self.zero_at_zero(n > 2.0, a, second)
     }
 
@@ -307,13 +309,13 @@ impl Graph {
                 if scratch.is_zero(second) {
                     continue;
                 }
-                let second = self.graft(&scratch, second, &operands);
-                let mut value = self.times(w, second);
+                let second = self.copy_from_graph(&scratch, second, &operands);
+                let mut value = self.simplified_mul(w, second);
                 if j != k && operands[j] == operands[k] {
-                    value = self.plus(value, value);
+                    value = self.simplified_add(value, value);
                 }
                 match arcs.iter_mut().find(|arc| arc.0 == operands[j] && arc.1 == operands[k]) {
-                    Some(arc) => arc.2 = self.plus(arc.2, value),
+                    Some(arc) => arc.2 = self.simplified_add(arc.2, value),
                     None => arcs.push((operands[j], operands[k], value)),
                 }
             }
@@ -322,7 +324,7 @@ impl Graph {
     }
 
     /// An expression of another graph, with other nodes for its variables.
-    fn graft(&mut self, from: &Graph, node: Node, variables: &[Node]) -> Node {
+    fn copy_from_graph(&mut self, from: &Graph, node: Node, variables: &[Node]) -> Node {
         let mut image = vec![node; node.at() + 1];
         for node in from.reachable(&[node]) {
             image[node.at()] = match from.op(node) {

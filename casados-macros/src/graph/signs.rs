@@ -4,17 +4,17 @@
 use super::{Binary, Entry, Graph, Node, Op, Unary};
 
 /// How deep a sign goes: work stays linear.
-const DEPTH: usize = 4;
+const MAX_SIGN_DEPTH: usize = 4;
 
 impl Graph {
     /// Entries in which negations went into constants, if that takes fewer operations for them and
     /// what is computed beside them; else as they are.
-    pub(super) fn with_signs_inside(&mut self, entries: Vec<Entry>, beside: &[Node]) -> Vec<Entry> {
+    pub(super) fn with_folded_signs(&mut self, entries: Vec<Entry>, beside: &[Node]) -> Vec<Entry> {
         let signed: Vec<Entry> = entries
             .iter()
             .map(|&(row, column, value)| match self.op(value) {
                 Op::Unary(Unary::Neg, inner) => {
-                    (row, column, self.negated_inside(inner, DEPTH).unwrap_or(value))
+                    (row, column, self.negate_without_cost(inner, MAX_SIGN_DEPTH).unwrap_or(value))
                 }
                 _ => (row, column, value),
             })
@@ -22,30 +22,30 @@ impl Graph {
         let operations = |entries: &[Entry]| {
             let nodes: Vec<Node> =
                 beside.iter().copied().chain(entries.iter().map(|entry| entry.2)).collect();
-            self.operations(&nodes)
+            self.operation_count(&nodes)
         };
         if operations(&signed) < operations(&entries) { signed } else { entries }
     }
 
     /// `−a` without an operation more than `a` takes.
-    fn negated_inside(&mut self, a: Node, depth: usize) -> Option<Node> {
+    fn negate_without_cost(&mut self, a: Node, depth: usize) -> Option<Node> {
         let depth = depth.checked_sub(1)?;
         match self.op(a) {
             Op::Constant(bits) => Some(self.constant(-f64::from_bits(bits))),
             Op::Unary(Unary::Neg, inner) => Some(inner),
             Op::Binary(Binary::Sub, x, y) => Some(self.binary(Binary::Sub, y, x)),
             Op::Binary(Binary::Add, x, y) => {
-                if let Some(x) = self.negated_inside(x, depth) {
+                if let Some(x) = self.negate_without_cost(x, depth) {
                     return Some(self.binary(Binary::Sub, x, y));
                 }
-                let y = self.negated_inside(y, depth)?;
+                let y = self.negate_without_cost(y, depth)?;
                 Some(self.binary(Binary::Sub, y, x))
             }
             Op::Binary(function @ (Binary::Mul | Binary::Div), x, y) => {
-                if let Some(x) = self.negated_inside(x, depth) {
+                if let Some(x) = self.negate_without_cost(x, depth) {
                     return Some(self.binary(function, x, y));
                 }
-                let y = self.negated_inside(y, depth)?;
+                let y = self.negate_without_cost(y, depth)?;
                 Some(self.binary(function, x, y))
             }
             _ => None,
@@ -56,7 +56,7 @@ impl Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::Point;
+    use crate::graph::EvaluationPoint;
 
     #[test]
     fn signs_go_where_they_are_free() {
@@ -71,15 +71,15 @@ mod tests {
         let values = [product, sum, quotient].map(|value| g.unary(Unary::Neg, value));
         let entries: Vec<Entry> = (0..).zip(values).map(|(row, value)| (row, 0, value)).collect();
         let before: Vec<Node> = entries.iter().map(|entry| entry.2).collect();
-        let signed = g.with_signs_inside(entries, &[]);
+        let signed = g.with_folded_signs(entries, &[]);
         let after: Vec<Node> = signed.iter().map(|entry| entry.2).collect();
-        assert_eq!((g.operations(&before), g.operations(&after)), (9, 6));
+        assert_eq!((g.operation_count(&before), g.operation_count(&after)), (9, 6));
         let at = [0.7, -1.3, 0.9];
-        let point = Point { variables: &at, ..Default::default() };
+        let point = EvaluationPoint { variables: &at, ..Default::default() };
         assert_eq!(g.evaluate(&before, point), g.evaluate(&after, point));
 
         // Nothing to hide a sign in.
         let negative = g.unary(Unary::Neg, other);
-        assert_eq!(g.with_signs_inside(vec![(0, 0, negative)], &[]), [(0, 0, negative)]);
+        assert_eq!(g.with_folded_signs(vec![(0, 0, negative)], &[]), [(0, 0, negative)]);
     }
 }

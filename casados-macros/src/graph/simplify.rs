@@ -55,7 +55,7 @@ impl Graph {
     }
 
     /// The operand of a negation.
-    fn negated(&self, a: Node) -> Option<Node> {
+    fn operand_of_negation(&self, a: Node) -> Option<Node> {
         match self.op(a) {
             Op::Unary(Unary::Neg, inner) => Some(inner),
             _ => None,
@@ -89,7 +89,7 @@ impl Graph {
         if self.value(b) == Some(0.0) {
             return a;
         }
-        match (self.negated(a), self.negated(b)) {
+        match (self.operand_of_negation(a), self.operand_of_negation(b)) {
             (_, Some(inner)) => self.sub(a, inner),
             (Some(inner), None) => self.sub(b, inner),
             (None, None) => self.node(Op::Binary(Binary::Add, a.min(b), a.max(b))),
@@ -106,7 +106,7 @@ impl Graph {
         if self.value(a) == Some(0.0) {
             return self.negate(b);
         }
-        match (self.negated(a), self.negated(b)) {
+        match (self.operand_of_negation(a), self.operand_of_negation(b)) {
             (_, Some(inner)) => self.add(a, inner),
             (Some(inner), None) => {
                 let sum = self.add(inner, b);
@@ -125,12 +125,12 @@ impl Graph {
                 return other;
             } else if value == -1.0 {
                 return self.negate(other);
-            } else if let Some(inner) = self.negated(other) {
+            } else if let Some(inner) = self.operand_of_negation(other) {
                 let factor = self.constant(-value);
                 return self.mul(factor, inner);
             }
         }
-        match (self.negated(a), self.negated(b)) {
+        match (self.operand_of_negation(a), self.operand_of_negation(b)) {
             (Some(a), Some(b)) => self.mul(a, b),
             (Some(inner), None) => {
                 let product = self.mul(inner, b);
@@ -156,15 +156,15 @@ impl Graph {
             } else if let Some(reciprocal) = exact_reciprocal(value) {
                 let reciprocal = self.constant(reciprocal);
                 return self.mul(reciprocal, a);
-            } else if let Some(inner) = self.negated(a) {
+            } else if let Some(inner) = self.operand_of_negation(a) {
                 let b = self.constant(-value);
                 return self.div(inner, b);
             }
-        } else if let (Some(value), Some(inner)) = (self.value(a), self.negated(b)) {
+        } else if let (Some(value), Some(inner)) = (self.value(a), self.operand_of_negation(b)) {
             let a = self.constant(-value);
             return self.div(a, inner);
         }
-        match (self.negated(a), self.negated(b)) {
+        match (self.operand_of_negation(a), self.operand_of_negation(b)) {
             (Some(a), Some(b)) => self.div(a, b),
             (Some(inner), None) => {
                 let quotient = self.div(inner, b);
@@ -180,7 +180,7 @@ impl Graph {
 
     /// `if condition { a } else { b }`
     pub fn select(&mut self, condition: Node, a: Node, b: Node) -> Node {
-        match self.truth(condition) {
+        match self.known_condition(condition) {
             Some(true) => a,
             Some(false) => b,
             None if a == b => a,
@@ -196,8 +196,8 @@ impl Graph {
     /// A comparison of numbers. Of two constants it is folded: see [`Graph::truth`].
     pub fn compare(&mut self, comparison: Compare, a: Node, b: Node) -> Node {
         match (self.value(a), self.value(b)) {
-            (Some(a), Some(b)) => self.always(compare_value(comparison, a, b)),
-            _ if comparison == Compare::Lt && a == b => self.always(false),
+            (Some(a), Some(b)) => self.constant_condition(compare_value(comparison, a, b)),
+            _ if comparison == Compare::Lt && a == b => self.constant_condition(false),
             _ if comparison == Compare::Eq => self.node(Op::Compare(comparison, a.min(b), a.max(b))),
             _ => self.node(Op::Compare(comparison, a, b)),
         }
@@ -205,7 +205,7 @@ impl Graph {
 
     /// Both conditions.
     pub fn and(&mut self, a: Node, b: Node) -> Node {
-        match (self.truth(a), self.truth(b)) {
+        match (self.known_condition(a), self.known_condition(b)) {
             (Some(false), _) | (_, Some(true)) => a,
             (_, Some(false)) | (Some(true), _) => b,
             _ if a == b => a,
@@ -215,7 +215,7 @@ impl Graph {
 
     /// One condition or both.
     pub fn or(&mut self, a: Node, b: Node) -> Node {
-        match (self.truth(a), self.truth(b)) {
+        match (self.known_condition(a), self.known_condition(b)) {
             (Some(true), _) | (_, Some(false)) => a,
             (_, Some(true)) | (Some(false), _) => b,
             _ if a == b => a,
@@ -225,21 +225,21 @@ impl Graph {
 
     /// Not the condition.
     pub fn not(&mut self, a: Node) -> Node {
-        match (self.truth(a), self.op(a)) {
-            (Some(truth), _) => self.always(!truth),
+        match (self.known_condition(a), self.op(a)) {
+            (Some(truth), _) => self.constant_condition(!truth),
             (None, Op::Not(inner)) => inner,
             _ => self.node(Op::Not(a)),
         }
     }
 
     /// A condition that always has the same value is `0 = 0` or `0 < 0`.
-    fn always(&mut self, truth: bool) -> Node {
+    fn constant_condition(&mut self, truth: bool) -> Node {
         let zero = self.constant(0.0);
         self.node(Op::Compare(if truth { Compare::Eq } else { Compare::Lt }, zero, zero))
     }
 
     /// The value of a condition, if it is known.
-    pub fn truth(&self, condition: Node) -> Option<bool> {
+    pub fn known_condition(&self, condition: Node) -> Option<bool> {
         match self.op(condition) {
             Op::Compare(comparison, a, b) => Some(compare_value(comparison, self.value(a)?, self.value(b)?)),
             _ => None,

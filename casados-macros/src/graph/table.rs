@@ -24,7 +24,7 @@ const KNOTS: u8 = 255;
 impl<const K: usize> Table<K> {
     /// What changes between the pieces of a table with kinks, and of one that is smoother. Which it
     /// is the compiler knows.
-    pub fn pieces(self) -> [Self; 2] {
+    pub fn piece_indicators(self) -> [Self; 2] {
         [KINKS, KNOTS].map(|order| Self { orders: [order; K], ..self })
     }
 
@@ -36,7 +36,7 @@ impl<const K: usize> Table<K> {
 
     /// Values for sample points, in the place of numbers that are not known here: of a product of
     /// sines, whose derivatives fit to each other.
-    pub fn stand_in(self, at: [f64; K]) -> f64 {
+    pub fn sample_value(self, at: [f64; K]) -> f64 {
         let mut phase = 0.4 + f64::from(self.index);
         let mut product = 1.0;
         for (a, order) in at.into_iter().zip(self.orders) {

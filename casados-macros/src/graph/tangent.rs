@@ -20,8 +20,8 @@ pub fn tangent(graph: &mut Graph, outputs: &[Node], rate: impl Fn(u32) -> Option
                 };
                 for (operand, partial) in parts.into_iter().flatten() {
                     let Some(rate) = rates[operand.at()] else { continue };
-                    let term = graph.times(partial, rate);
-                    sum = Some(sum.map_or(term, |sum| graph.plus(sum, term)));
+                    let term = graph.simplified_mul(partial, rate);
+                    sum = Some(sum.map_or(term, |sum| graph.simplified_add(sum, term)));
                 }
                 sum.filter(|&sum| !graph.is_zero(sum))
             }

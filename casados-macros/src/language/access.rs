@@ -1,8 +1,8 @@
 //! Fields, elements and slices: expressions that name a place.
 
-use super::evaluator::{At, Evaluated, Evaluator, error, opaque};
+use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, opaque_value_error};
 use super::methods::{self, Receiver};
-use super::path::Named;
+use super::path::PathMeaning;
 use super::place::{Place, Projection};
 use super::types::Type;
 use super::value::{Integer, IntegerType, Range, Value};
@@ -13,31 +13,31 @@ use syn::{Expr, Result};
 impl Evaluator {
     /// The place an expression refers to, if it is one; its value otherwise.
     pub(super) fn place(&mut self, expression: &Expr, mutable: bool) -> Evaluated<Receiver> {
-        self.place_expected(expression, mutable, &Type::Unknown)
+        self.place_of_type(expression, mutable, &Type::Unknown)
     }
 
-    pub(super) fn place_expected(
+    pub(super) fn place_of_type(
         &mut self,
         expression: &Expr,
         mutable: bool,
         expected: &Type,
     ) -> Evaluated<Receiver> {
         match expression {
-            Expr::Path(path) => Ok(match self.named(path)? {
-                Named::Variable(cell) => Receiver::Place(Place { cell, path: Vec::new() }),
-                Named::Value(value) => Receiver::Value(value),
-                Named::Builtin(builtin) => Receiver::Value(self.builtin_value(builtin, path)),
+            Expr::Path(path) => Ok(match self.path_meaning(path)? {
+                PathMeaning::Variable(cell) => Receiver::Place(Place { cell, path: Vec::new() }),
+                PathMeaning::Value(value) => Receiver::Value(value),
+                PathMeaning::Builtin(builtin) => Receiver::Value(self.builtin_value(builtin, path)),
             }),
             Expr::Paren(inner) => {
-                self.deeper(expression, |e| e.place_expected(&inner.expr, mutable, expected))
+                self.deeper(expression, |e| e.place_of_type(&inner.expr, mutable, expected))
             }
             Expr::Group(inner) => {
-                self.deeper(expression, |e| e.place_expected(&inner.expr, mutable, expected))
+                self.deeper(expression, |e| e.place_of_type(&inner.expr, mutable, expected))
             }
             Expr::Field(field) => self.deeper(expression, |e| e.field_place(field, mutable)),
             Expr::Index(index) => self.deeper(expression, |e| e.index_place(index, mutable)),
             Expr::Unary(unary) if matches!(unary.op, syn::UnOp::Deref(_)) => {
-                let inner = self.deeper(expression, |e| e.place_expected(&unary.expr, mutable, expected))?;
+                let inner = self.deeper(expression, |e| e.place_of_type(&unary.expr, mutable, expected))?;
                 Ok(match inner {
                     Receiver::Place(place) => match self.read(&place, expression)? {
                         Value::Reference(target) => Receiver::Place(target),
@@ -60,7 +60,7 @@ impl Evaluator {
                 Ok(Receiver::Place(self.project(&place, projection, field)?))
             }
             (Ok(projection), Receiver::Value(value)) => {
-                Ok(Receiver::Value(self.part(&value, projection, field)?))
+                Ok(Receiver::Value(self.value_part(&value, projection, field)?))
             }
             (Err(_), _) => match (&value, &field.member) {
                 (Value::Opaque(tokens), member) => {
@@ -75,17 +75,17 @@ impl Evaluator {
                 }
                 (value, member) => {
                     let name = member.to_token_stream();
-                    Err(error(field, format!("{} has no field `{name}`", value.kind())).into())
+                    Err(error(field, format!("{} has no field `{name}`", value.description())).into())
                 }
             },
         }
     }
 
     /// With mutable references followed.
-    pub(super) fn dereferenced(&mut self, receiver: Receiver, at: At) -> Result<Receiver> {
+    pub(super) fn dereferenced(&mut self, receiver: Receiver, at: TokenSpan) -> Result<Receiver> {
         Ok(match receiver {
-            Receiver::Place(place) => Receiver::Place(self.follow(place, at)?),
-            Receiver::Value(Value::Reference(place)) => Receiver::Place(self.follow(place, at)?),
+            Receiver::Place(place) => Receiver::Place(self.follow_place(place, at)?),
+            Receiver::Value(Value::Reference(place)) => Receiver::Place(self.follow_place(place, at)?),
             value => value,
         })
     }
@@ -103,9 +103,9 @@ impl Evaluator {
             Expr::Range(_) | Expr::Tuple(_) => self.expression(&index.index, &Type::Unknown)?,
             expression => self.expression(expression, &hint)?,
         };
-        let position = self.load(position, &index.index)?;
+        let position = self.follow_value(position, &index.index)?;
         if matches!(hint, Type::Integer(_)) {
-            self.becomes_index(&index.index);
+            self.infer_usize_index(&index.index);
         }
         let projection = match (&value, &position) {
             (Value::Struct(_), _) => {
@@ -125,7 +125,7 @@ impl Evaluator {
                 let position = proc_macro2::Literal::i128_unsuffixed(integer.value);
                 return Ok(Receiver::Value(Value::Opaque(Rc::new(quote!(#tokens[#position])))));
             }
-            (Value::Opaque(_), _) => return Err(opaque(&index.expr, "an array").into()),
+            (Value::Opaque(_), _) => return Err(opaque_value_error(&index.expr, "an array").into()),
             (_, Value::Real(_) | Value::Condition(_)) => {
                 return Err(error(
                     &index.index,
@@ -134,7 +134,7 @@ impl Evaluator {
                 .into());
             }
             (Value::Array(elements), Value::Range(range)) => {
-                let (start, end) = self.bounds(range, elements.len(), &index.index)?;
+                let (start, end) = self.range_bounds(range, elements.len(), &index.index)?;
                 Projection::Slice(start, end)
             }
             (Value::Array(_), position) => Projection::Index(self.usize(position, &index.index)?),
@@ -155,16 +155,18 @@ impl Evaluator {
                 }
                 Projection::Element(position % rows, position / rows)
             }
-            (value, _) => return Err(error(index, format!("{} cannot be indexed", value.kind())).into()),
+            (value, _) => {
+                return Err(error(index, format!("{} cannot be indexed", value.description())).into());
+            }
         };
         match base {
             Receiver::Place(place) => Ok(Receiver::Place(self.project(&place, projection, index)?)),
-            Receiver::Value(value) => Ok(Receiver::Value(self.part(&value, projection, index)?)),
+            Receiver::Value(value) => Ok(Receiver::Value(self.value_part(&value, projection, index)?)),
         }
     }
 
     /// An integer variable that is an index is a `usize`, if nothing else has told its type.
-    fn becomes_index(&mut self, index: &Expr) {
+    fn infer_usize_index(&mut self, index: &Expr) {
         let Expr::Path(path) = index else { return };
         let Some(name) = path.path.get_ident() else { return };
         let symbol = self.symbol(name);
@@ -176,7 +178,7 @@ impl Evaluator {
     }
 
     /// First and end of a range of indices.
-    pub fn bounds(&mut self, range: &Range, length: usize, at: At) -> Result<(usize, usize)> {
+    pub fn range_bounds(&mut self, range: &Range, length: usize, at: TokenSpan) -> Result<(usize, usize)> {
         let start = match &range.start {
             Some(start) => self.usize(start, at)?,
             None => 0,

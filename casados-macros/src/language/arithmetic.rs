@@ -1,6 +1,6 @@
 //! Operators.
 
-use super::evaluator::{At, Evaluator, error, opaque, unsupported};
+use super::evaluator::{Evaluator, TokenSpan, error, opaque_value_error, unsupported};
 use super::methods;
 use super::value::{Integer, IntegerType, Value};
 use crate::graph::{Binary, Compare, Node, Unary};
@@ -70,7 +70,7 @@ pub enum Comparison {
 
 impl Evaluator {
     /// `a ∘ b` of any two values that have it, elementwise and user-defined operators included.
-    pub fn binary(&mut self, operator: Operator, a: &Value, b: &Value, at: At) -> Result<Value> {
+    pub fn binary(&mut self, operator: Operator, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         match (a, b) {
             (Value::Real(_) | Value::Opaque(_), Value::Real(_) | Value::Opaque(_)) => {
                 let (a, b) = (self.real(a, at)?, self.real(b, at)?);
@@ -80,7 +80,7 @@ impl Evaluator {
                 integer_operator(operator, *a, *b).map(Value::Integer).map_err(|message| error(at, message))
             }
             (Value::Integer(_), Value::Opaque(_)) | (Value::Opaque(_), Value::Integer(_)) => {
-                Err(opaque(at, "an integer"))
+                Err(opaque_value_error(at, "an integer"))
             }
             (Value::Bool(_) | Value::Condition(_), Value::Bool(_) | Value::Condition(_)) => match operator {
                 Operator::BitAnd => self.and(a, b, at),
@@ -105,13 +105,18 @@ impl Evaluator {
                 }
                 Err(error(
                     at,
-                    format!("there is no `{}` between {} and {}", operator.symbol(), a.kind(), b.kind()),
+                    format!(
+                        "there is no `{}` between {} and {}",
+                        operator.symbol(),
+                        a.description(),
+                        b.description()
+                    ),
                 ))
             }
         }
     }
 
-    fn real_operator(&mut self, operator: Operator, a: Node, b: Node, at: At) -> Result<Node> {
+    fn real_operator(&mut self, operator: Operator, a: Node, b: Node, at: TokenSpan) -> Result<Node> {
         let function = match operator {
             Operator::Add => Binary::Add,
             Operator::Sub => Binary::Sub,
@@ -129,13 +134,13 @@ impl Evaluator {
     }
 
     /// `-a`
-    pub fn negate(&mut self, a: &Value, at: At) -> Result<Value> {
+    pub fn negate(&mut self, a: &Value, at: TokenSpan) -> Result<Value> {
         match a {
             Value::Real(_) | Value::Opaque(_) => {
                 let a = self.real(a, at)?;
                 Ok(Value::Real(self.graph.unary(Unary::Neg, a)))
             }
-            Value::Integer(a) => fit(a.value.checked_neg(), a.ty)
+            Value::Integer(a) => checked_integer(a.value.checked_neg(), a.ty)
                 .map(Value::Integer)
                 .ok_or_else(|| error(at, "attempt to negate with overflow")),
             Value::Reference(place) => {
@@ -151,13 +156,13 @@ impl Evaluator {
             }
             _ => match self.user_method("Neg", "neg", a, Vec::new(), at)? {
                 Some(value) => Ok(value),
-                None => Err(error(at, format!("there is no `-` of {}", a.kind()))),
+                None => Err(error(at, format!("there is no `-` of {}", a.description()))),
             },
         }
     }
 
     /// `!a`
-    pub fn invert(&mut self, a: &Value, at: At) -> Result<Value> {
+    pub fn invert(&mut self, a: &Value, at: TokenSpan) -> Result<Value> {
         match a {
             Value::Bool(a) => Ok(Value::Bool(!a)),
             Value::Condition(a) => Ok(Value::Condition(self.graph.not(*a))),
@@ -170,38 +175,48 @@ impl Evaluator {
                 let a = self.read(place, at)?;
                 self.invert(&a, at)
             }
-            Value::Opaque(_) => Err(opaque(at, "a `bool`")),
+            Value::Opaque(_) => Err(opaque_value_error(at, "a `bool`")),
             _ => match self.user_method("Not", "not", a, Vec::new(), at)? {
                 Some(value) => Ok(value),
-                None => Err(error(at, format!("there is no `!` of {}", a.kind()))),
+                None => Err(error(at, format!("there is no `!` of {}", a.description()))),
             },
         }
     }
 
     /// `a && b` of values.
-    pub fn and(&mut self, a: &Value, b: &Value, at: At) -> Result<Value> {
+    pub fn and(&mut self, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         Ok(match (a, b) {
             (Value::Bool(true), b) => b.clone(),
             (a, Value::Bool(true)) => a.clone(),
             (Value::Bool(false), _) | (_, Value::Bool(false)) => Value::Bool(false),
             (Value::Condition(a), Value::Condition(b)) => Value::Condition(self.graph.and(*a, *b)),
-            _ => return Err(error(at, format!("there is no `&` of {} and {}", a.kind(), b.kind()))),
+            _ => {
+                return Err(error(
+                    at,
+                    format!("there is no `&` of {} and {}", a.description(), b.description()),
+                ));
+            }
         })
     }
 
     /// `a || b` of values.
-    pub fn or(&mut self, a: &Value, b: &Value, at: At) -> Result<Value> {
+    pub fn or(&mut self, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         Ok(match (a, b) {
             (Value::Bool(false), b) => b.clone(),
             (a, Value::Bool(false)) => a.clone(),
             (Value::Bool(true), _) | (_, Value::Bool(true)) => Value::Bool(true),
             (Value::Condition(a), Value::Condition(b)) => Value::Condition(self.graph.or(*a, *b)),
-            _ => return Err(error(at, format!("there is no `|` of {} and {}", a.kind(), b.kind()))),
+            _ => {
+                return Err(error(
+                    at,
+                    format!("there is no `|` of {} and {}", a.description(), b.description()),
+                ));
+            }
         })
     }
 
     /// A comparison: a `Bool` where it is known, a `Condition` where it is not.
-    pub fn compare(&mut self, comparison: Comparison, a: &Value, b: &Value, at: At) -> Result<Value> {
+    pub fn compare(&mut self, comparison: Comparison, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         match (a, b) {
             (Value::Reference(place), _) => {
                 let a = self.read(place, at)?;
@@ -225,7 +240,7 @@ impl Evaluator {
         }
     }
 
-    fn ordered(&mut self, comparison: Comparison, a: &Value, b: &Value, at: At) -> Result<Value> {
+    fn ordered(&mut self, comparison: Comparison, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         let strict = comparison == Comparison::Lt;
         match (a, b) {
             (Value::Integer(a), Value::Integer(b)) => {
@@ -243,7 +258,7 @@ impl Evaluator {
                 })
             }
             (Value::Opaque(_), Value::Integer(_)) | (Value::Integer(_), Value::Opaque(_)) => {
-                Err(opaque(at, "an integer"))
+                Err(opaque_value_error(at, "an integer"))
             }
             (Value::Tuple(x), Value::Tuple(y)) | (Value::Array(x), Value::Array(y)) => {
                 // Lexicographic: the last elements decide if all before are equal.
@@ -257,11 +272,14 @@ impl Evaluator {
                 }
                 Ok(result)
             }
-            _ => Err(unsupported(at, format!("this comparison of {} and {}", a.kind(), b.kind()))),
+            _ => Err(unsupported(
+                at,
+                format!("this comparison of {} and {}", a.description(), b.description()),
+            )),
         }
     }
 
-    fn equal(&mut self, a: &Value, b: &Value, at: At) -> Result<Value> {
+    fn equal(&mut self, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         match (a, b) {
             (Value::Integer(a), Value::Integer(b)) => Ok(Value::Bool(a.value == b.value)),
             (Value::Bool(a), Value::Bool(b)) => Ok(Value::Bool(a == b)),
@@ -282,9 +300,9 @@ impl Evaluator {
                 })
             }
             (Value::Tuple(x), Value::Tuple(y)) | (Value::Array(x), Value::Array(y)) => {
-                self.all_equal(x, y, at)
+                self.compare_elements(x, y, at)
             }
-            (Value::Matrix(x), Value::Matrix(y)) => self.all_equal(&x.elements, &y.elements, at),
+            (Value::Matrix(x), Value::Matrix(y)) => self.compare_elements(&x.elements, &y.elements, at),
             (Value::Struct(x), Value::Struct(y)) => {
                 if let Some(value) = self.user_method("PartialEq", "eq", a, vec![b.clone()], at)? {
                     return Ok(value);
@@ -292,20 +310,22 @@ impl Evaluator {
                 if x.variant != y.variant {
                     return Ok(Value::Bool(false));
                 }
-                self.all_equal(&x.fields, &y.fields, at)
+                self.compare_elements(&x.fields, &y.fields, at)
             }
             (Value::Option(x), Value::Option(y)) => match (x, y) {
                 (Some(x), Some(y)) => self.compare(Comparison::Eq, x, y, at),
                 (x, y) => Ok(Value::Bool(x.is_none() && y.is_none())),
             },
             (Value::Opaque(_), Value::Integer(_)) | (Value::Integer(_), Value::Opaque(_)) => {
-                Err(opaque(at, "an integer"))
+                Err(opaque_value_error(at, "an integer"))
             }
-            _ => Err(unsupported(at, format!("the comparison of {} and {}", a.kind(), b.kind()))),
+            _ => {
+                Err(unsupported(at, format!("the comparison of {} and {}", a.description(), b.description())))
+            }
         }
     }
 
-    fn all_equal(&mut self, x: &[Value], y: &[Value], at: At) -> Result<Value> {
+    fn compare_elements(&mut self, x: &[Value], y: &[Value], at: TokenSpan) -> Result<Value> {
         let mut result = Value::Bool(x.len() == y.len());
         for (x, y) in x.iter().zip(y) {
             let equal = self.compare(Comparison::Eq, x, y, at)?;
@@ -316,7 +336,7 @@ impl Evaluator {
 }
 
 /// The integer, if it is within the range of the type.
-pub fn fit(value: Option<i128>, ty: Option<IntegerType>) -> Option<Integer> {
+pub fn checked_integer(value: Option<i128>, ty: Option<IntegerType>) -> Option<Integer> {
     let value = value?;
     match ty {
         Some(ty) if value < ty.min() || value > ty.max() => None,
@@ -325,7 +345,7 @@ pub fn fit(value: Option<i128>, ty: Option<IntegerType>) -> Option<Integer> {
 }
 
 /// The integer wrapped into the range of its type, as `as` does it.
-pub fn wrap(value: i128, ty: IntegerType) -> Integer {
+pub fn wrapped_integer(value: i128, ty: IntegerType) -> Integer {
     let bits = ty.bits();
     let value = if bits == 128 {
         value
@@ -361,7 +381,7 @@ pub fn integer_operator(operator: Operator, a: Integer, b: Integer) -> std::resu
                     if operator == Operator::Shr {
                         Some(x >> y)
                     } else {
-                        Some(ty.map_or(x << y, |ty| wrap(x << y, ty).value))
+                        Some(ty.map_or(x << y, |ty| wrapped_integer(x << y, ty).value))
                     }
                 }
                 _ => None,
@@ -370,7 +390,7 @@ pub fn integer_operator(operator: Operator, a: Integer, b: Integer) -> std::resu
     };
     // Without a type it is `i32`, unless the compiler finds another one.
     let value = value.filter(|&value| ty.is_some() || i32::try_from(value).is_ok());
-    fit(value, ty).ok_or_else(|| {
+    checked_integer(value, ty).ok_or_else(|| {
         let name = ty.map_or("i32", IntegerType::name);
         let text = format!("attempt to compute `{x} {} {y}`, which overflows `{name}`", operator.symbol());
         if ty.is_some() { text } else { format!("{text}: if another type is meant, write it, as in `1_i64`") }

@@ -17,12 +17,12 @@ impl Evaluator {
             }
             Expr::Tuple(_) | Expr::Array(_) | Expr::Struct(_) | Expr::Call(_) => {
                 let value = self.expression(&assign.right, &Type::Unknown)?;
-                self.assign_parts(&assign.left, value)?;
+                self.assign_pattern(&assign.left, value)?;
             }
             left => {
-                let place = self.assigned(left);
+                let place = self.assignment_target(left);
                 // The right side comes first, and may change which place this is.
-                let place = if is_plain(left) { place.ok() } else { Some(place?) };
+                let place = if is_side_effect_free(left) { place.ok() } else { Some(place?) };
                 let expected = match &place {
                     Some(place) => {
                         let old = self.read(place, left)?;
@@ -33,8 +33,8 @@ impl Evaluator {
                 let value = self.expression(&assign.right, &expected)?;
                 let value = self.coerce(value, &expected, &assign.right)?;
                 let place = match place {
-                    Some(place) if !is_plain(left) || is_plain(&assign.right) => place,
-                    _ => self.assigned(left)?,
+                    Some(place) if !is_side_effect_free(left) || is_side_effect_free(&assign.right) => place,
+                    _ => self.assignment_target(left)?,
                 };
                 self.write(&place, value, assign)?;
             }
@@ -43,7 +43,7 @@ impl Evaluator {
     }
 
     /// The place on the left of an assignment.
-    fn assigned(&mut self, left: &Expr) -> Evaluated<Place> {
+    fn assignment_target(&mut self, left: &Expr) -> Evaluated<Place> {
         match self.place(left, true)? {
             Receiver::Place(place) => Ok(place),
             Receiver::Value(_) => Err(error(left, "this cannot be assigned to").into()),
@@ -51,20 +51,22 @@ impl Evaluator {
     }
 
     /// Destructuring assignment.
-    fn assign_parts(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
-        self.deeper(left, |evaluator| evaluator.assign_parts_within(left, value))
+    fn assign_pattern(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
+        self.deeper(left, |evaluator| evaluator.assign_pattern_nested(left, value))
     }
 
-    fn assign_parts_within(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
+    fn assign_pattern_nested(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
         let parts: Vec<&Expr> = match left {
             Expr::Infer(_) => return Ok(()),
-            Expr::Paren(inner) => return self.assign_parts(&inner.expr, value),
+            Expr::Paren(inner) => return self.assign_pattern(&inner.expr, value),
             Expr::Tuple(tuple) => tuple.elems.iter().collect(),
             Expr::Array(array) => array.elems.iter().collect(),
             Expr::Call(call) => call.args.iter().collect(),
             Expr::Struct(literal) => {
                 let Value::Struct(structure) = &value else {
-                    return Err(error(left, format!("expected a struct, found {}", value.kind())).into());
+                    return Err(
+                        error(left, format!("expected a struct, found {}", value.description())).into()
+                    );
                 };
                 let names: Vec<String> = structure.definition.variants[structure.variant]
                     .fields
@@ -74,7 +76,7 @@ impl Evaluator {
                 for field in &literal.fields {
                     let member = field.member.to_token_stream().to_string();
                     match names.iter().position(|name| *name == member) {
-                        Some(index) => self.assign_parts(&field.expr, structure.fields[index].clone())?,
+                        Some(index) => self.assign_pattern(&field.expr, structure.fields[index].clone())?,
                         None => return Err(error(field, format!("there is no field `{member}`")).into()),
                     }
                 }
@@ -87,11 +89,11 @@ impl Evaluator {
                 return Ok(self.write(&place, value, left)?);
             }
         };
-        let value = self.load(value, left)?;
+        let value = self.follow_value(value, left)?;
         let values: Vec<Value> = match &value {
             Value::Tuple(values) | Value::Array(values) => values.to_vec(),
             Value::Struct(structure) => structure.fields.clone(),
-            other => return Err(error(left, format!("{} has no such parts", other.kind())).into()),
+            other => return Err(error(left, format!("{} has no such parts", other.description())).into()),
         };
         let is_rest =
             |part: &&Expr| matches!(part, Expr::Range(range) if range.start.is_none() && range.end.is_none());
@@ -109,14 +111,14 @@ impl Evaluator {
                 Some(rest) if index > rest => values.len() - (parts.len() - index),
                 _ => index,
             };
-            self.assign_parts(part, values[position].clone())?;
+            self.assign_pattern(part, values[position].clone())?;
         }
         Ok(())
     }
 
     pub(super) fn compound_assignment(&mut self, operator: Operator, binary: &syn::ExprBinary) -> Evaluated {
         let place = match self.place(&binary.left, true)? {
-            Receiver::Place(place) => self.follow(place, binary)?,
+            Receiver::Place(place) => self.follow_place(place, binary)?,
             Receiver::Value(Value::Reference(place)) => place,
             Receiver::Value(_) => {
                 return Err(error(&binary.left, "this cannot be assigned to").into());
@@ -146,9 +148,9 @@ impl Evaluator {
             before,
             Value::Real(_) | Value::Integer(_) | Value::Bool(_) | Value::Condition(_) | Value::Opaque(_)
         );
-        let place = if is_number && is_plain(&binary.left) && !is_plain(&binary.right) {
-            let place = self.assigned(&binary.left)?;
-            self.follow(place, binary)?
+        let place = if is_number && is_side_effect_free(&binary.left) && !is_side_effect_free(&binary.right) {
+            let place = self.assignment_target(&binary.left)?;
+            self.follow_place(place, binary)?
         } else {
             place
         };
@@ -160,22 +162,24 @@ impl Evaluator {
 }
 
 /// Whether an expression changes nothing.
-fn is_plain(expression: &Expr) -> bool {
+fn is_side_effect_free(expression: &Expr) -> bool {
     match expression {
         Expr::Path(_) | Expr::Lit(_) => true,
-        Expr::Field(field) => is_plain(&field.base),
-        Expr::Index(index) => is_plain(&index.expr) && is_plain(&index.index),
-        Expr::Paren(inner) => is_plain(&inner.expr),
-        Expr::Group(inner) => is_plain(&inner.expr),
-        Expr::Cast(cast) => is_plain(&cast.expr),
-        Expr::Unary(unary) => is_plain(&unary.expr),
+        Expr::Field(field) => is_side_effect_free(&field.base),
+        Expr::Index(index) => is_side_effect_free(&index.expr) && is_side_effect_free(&index.index),
+        Expr::Paren(inner) => is_side_effect_free(&inner.expr),
+        Expr::Group(inner) => is_side_effect_free(&inner.expr),
+        Expr::Cast(cast) => is_side_effect_free(&cast.expr),
+        Expr::Unary(unary) => is_side_effect_free(&unary.expr),
         Expr::Binary(binary) => {
             super::operator::operator(&binary.op).is_some()
-                && is_plain(&binary.left)
-                && is_plain(&binary.right)
+                && is_side_effect_free(&binary.left)
+                && is_side_effect_free(&binary.right)
         }
-        Expr::Tuple(tuple) => tuple.elems.iter().all(is_plain),
-        Expr::Range(range) => [&range.start, &range.end].into_iter().flatten().all(|end| is_plain(end)),
+        Expr::Tuple(tuple) => tuple.elems.iter().all(is_side_effect_free),
+        Expr::Range(range) => {
+            [&range.start, &range.end].into_iter().flatten().all(|end| is_side_effect_free(end))
+        }
         _ => false,
     }
 }

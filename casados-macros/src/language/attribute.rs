@@ -10,9 +10,9 @@
 //! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives;
 //! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: equations may be differentiated.
 
+use super::augmented_states::{self, AugmentedStates, Integral};
 use super::duration::Duration;
-use super::extension::{self, Extension, Integral};
-use super::mistakes::Mistakes;
+use super::mistakes::CollectedErrors;
 use super::reduction::Reduction;
 use super::sampling::{self, Kind, Sampling, Setting};
 use super::{Instance, Variables};
@@ -41,7 +41,7 @@ pub struct Arguments {
     /// The parameter that time is a multiple of.
     pub duration: Option<Duration>,
     /// Controls that are linear, and integrals.
-    pub extension: Extension,
+    pub extension: AugmentedStates,
     /// Groups of const parameters with the values that they take together.
     values: Vec<Values>,
     /// Nominal values and ranges.
@@ -62,12 +62,12 @@ impl Arguments {
             name: None,
             reduction: None,
             duration: None,
-            extension: Extension::default(),
+            extension: AugmentedStates::default(),
             values: Vec::new(),
             settings: Vec::new(),
         };
         let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
-        let mut mistakes = Mistakes::default();
+        let mut mistakes = CollectedErrors::default();
         for entry in entries {
             match entry {
                 Entry::Crate(span, path) => {
@@ -112,14 +112,15 @@ impl Arguments {
                 }
                 Entry::Settings(settings) => {
                     for setting in settings {
-                        let repeated = arguments.settings.iter().find_map(|other| setting.repeats(other));
+                        let repeated =
+                            arguments.settings.iter().find_map(|other| setting.duplicate_error(other));
                         repeated.into_iter().for_each(|error| mistakes.note(error));
                         arguments.settings.push(setting);
                     }
                 }
             }
         }
-        mistakes.none()?;
+        mistakes.into_result()?;
         Ok(arguments)
     }
 
@@ -129,7 +130,7 @@ impl Arguments {
     }
 
     /// Refuses what is said about the model of a module in which every one has its own attribute.
-    pub fn without_model(&self, module: &Ident) -> Result<()> {
+    pub fn reject_model_arguments(&self, module: &Ident) -> Result<()> {
         let settings = self.name.is_some()
             || self.reduction.is_some()
             || self.duration.is_some()
@@ -150,7 +151,7 @@ impl Arguments {
 
     /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges
     /// could say.
-    pub fn without_settings(&self, what: &str) -> Result<()> {
+    pub fn reject_settings(&self, what: &str) -> Result<()> {
         let message = format!("nominal values and ranges have no effect for {what}: remove them");
         self.settings.first().map_or(Ok(()), |setting| Err(Error::new(setting.span(), message)))
     }
@@ -172,7 +173,7 @@ impl Arguments {
                 }
             }
         }
-        let mut mistakes = Mistakes::default();
+        let mut mistakes = CollectedErrors::default();
         for values in &self.values {
             for name in &values.names {
                 if !parameters.iter().any(|parameter| parameter.ident == *name) {
@@ -183,8 +184,8 @@ impl Arguments {
                 }
             }
         }
-        mistakes.none()?;
-        let mut mistakes = Mistakes::default();
+        mistakes.into_result()?;
+        let mut mistakes = CollectedErrors::default();
         for missing in parameters
             .iter()
             .filter(|parameter| !self.values.iter().any(|values| values.names.contains(&parameter.ident)))
@@ -197,7 +198,7 @@ impl Arguments {
                 ),
             ));
         }
-        mistakes.none()?;
+        mistakes.into_result()?;
         let mut combinations: Vec<Vec<(&Ident, u64)>> = vec![Vec::new()];
         for values in &self.values {
             if combinations.len().saturating_mul(values.rows.len()) > MAX_INSTANCES {
@@ -299,7 +300,7 @@ impl Parse for Entry {
             return Ok(Self::Duration(Duration::read(span, &input.parse()?)));
         }
         if names.len() == 1 && names[0] == "linear" {
-            return Ok(Self::Linear(extension::names(span, &input.parse()?)));
+            return Ok(Self::Linear(augmented_states::names(span, &input.parse()?)));
         }
         let rows = rows(&input.parse()?, names.len())?;
         if rows.is_empty() {

@@ -1,6 +1,6 @@
 //! Branches: `if`, `match`, and the ways out: `return`, `break`.
 
-use super::evaluator::{At, Evaluated, Evaluator, Flow, Target, error};
+use super::evaluator::{Evaluated, Evaluator, Flow, Target, TokenSpan, error};
 use super::methods::Receiver;
 use super::pattern::{Subject, Truth};
 use super::types::Type;
@@ -43,7 +43,7 @@ impl Evaluator {
                     None => (Value::unit(), Vec::new()),
                 };
                 self.merge(node, then_changes, else_changes, &branch.cond)?;
-                let at: At = match (&branch.else_branch, branch.then_branch.stmts.last()) {
+                let at: TokenSpan = match (&branch.else_branch, branch.then_branch.stmts.last()) {
                     (Some(_), Some(last)) => last,
                     _ => &branch.cond,
                 };
@@ -146,8 +146,8 @@ impl Evaluator {
     }
 
     /// `return` must not depend on model variables.
-    pub(super) fn check_return(&mut self, at: At) -> Result<()> {
-        if self.branches() > self.function_branches {
+    pub(super) fn check_return(&mut self, at: TokenSpan) -> Result<()> {
+        if self.open_branch_count() > self.function_branches {
             return Err(error(
                 at,
                 "this early `return` depends on model variables: write the condition as `if ... { a } else { b }` with \
@@ -168,14 +168,14 @@ impl Evaluator {
     }
 
     /// `break` and `continue` must not depend on model variables.
-    pub(super) fn check_target(&mut self, label: Option<String>, at: At) -> Result<()> {
+    pub(super) fn check_target(&mut self, label: Option<String>, at: TokenSpan) -> Result<()> {
         let target = self.targets.iter().rev().find(|(name, target, _)| match &label {
             Some(_) => *name == label,
             None => *target == Target::Loop,
         });
         match target {
             None => Err(error(at, "there is no loop around this")),
-            Some((.., branches)) if self.branches() > *branches => Err(error(
+            Some((.., branches)) if self.open_branch_count() > *branches => Err(error(
                 at,
                 "how often the loop runs depends on model variables: let it run a fixed number of times and \
                  choose the results by `if ... { a } else { b }`",

@@ -1,8 +1,8 @@
 //! Calls: closures, functions that the macro sees, methods of the user's types, built-in functions.
 
-use super::evaluator::{At, Evaluated, Evaluator, error, opaque, unsupported};
+use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, opaque_value_error, unsupported};
 use super::methods::{self, Call, Receiver};
-use super::path::Named;
+use super::path::PathMeaning;
 use super::types::Type;
 use super::value::{Builtin, Function, Struct, Value};
 use std::rc::Rc;
@@ -28,7 +28,7 @@ impl Arguments<'_> {
 
 impl Evaluator {
     /// Calls a closure, a function or a constructor.
-    pub fn call(&mut self, function: &Value, arguments: Vec<Value>, at: At) -> Result<Value> {
+    pub fn call(&mut self, function: &Value, arguments: Vec<Value>, at: TokenSpan) -> Result<Value> {
         self.call_expecting(function, arguments, &Type::Unknown, at)
     }
 
@@ -38,13 +38,19 @@ impl Evaluator {
         function: &Value,
         arguments: Vec<Value>,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Value> {
         let result = self.deeper(at, |evaluator| evaluator.call_value(function, arguments, expected, at));
-        self.finished(result, at)
+        self.into_value(result, at)
     }
 
-    fn call_value(&mut self, function: &Value, arguments: Vec<Value>, expected: &Type, at: At) -> Evaluated {
+    fn call_value(
+        &mut self,
+        function: &Value,
+        arguments: Vec<Value>,
+        expected: &Type,
+        at: TokenSpan,
+    ) -> Evaluated {
         match function {
             Value::Closure(closure) => self.call_closure(closure, arguments, expected, at),
             Value::Function(function) => {
@@ -56,17 +62,17 @@ impl Evaluator {
                 let function = self.read(place, at)?;
                 self.call_value(&function, arguments, expected, at)
             }
-            Value::Opaque(_) => Err(opaque(at, "a function").into()),
-            other => Err(error(at, format!("{} cannot be called", other.kind())).into()),
+            Value::Opaque(_) => Err(opaque_value_error(at, "a function").into()),
+            other => Err(error(at, format!("{} cannot be called", other.description())).into()),
         }
     }
 
     pub(super) fn call_expression(&mut self, call: &syn::ExprCall, expected: &Type) -> Evaluated {
         let callee = match &*call.func {
-            Expr::Path(path) => match self.named(path)? {
-                Named::Variable(cell) => cell.borrow().clone(),
-                Named::Value(value) => value,
-                Named::Builtin(builtin) => {
+            Expr::Path(path) => match self.path_meaning(path)? {
+                PathMeaning::Variable(cell) => cell.borrow().clone(),
+                PathMeaning::Value(value) => value,
+                PathMeaning::Builtin(builtin) => {
                     let hint = argument_hint(&builtin, expected);
                     let mut arguments = Vec::with_capacity(call.args.len());
                     for argument in &call.args {
@@ -77,8 +83,10 @@ impl Evaluator {
             },
             other => self.expression(other, &Type::Unknown)?,
         };
-        match self.load(callee, call)? {
-            Value::Function(function) => self.call_written(&function, None, &call.args, expected, call),
+        match self.follow_value(callee, call)? {
+            Value::Function(function) => {
+                self.call_with_expressions(&function, None, &call.args, expected, call)
+            }
             Value::Constructor(ty, variant) => {
                 let ty = match (&ty, expected) {
                     (Type::Struct(a, known), Type::Struct(b, _)) if Rc::ptr_eq(a, b) && known.is_empty() => {
@@ -121,7 +129,13 @@ impl Evaluator {
     }
 
     /// A tuple struct or variant.
-    fn construct(&mut self, ty: &Type, variant: usize, arguments: Vec<Value>, at: At) -> Result<Value> {
+    fn construct(
+        &mut self,
+        ty: &Type,
+        variant: usize,
+        arguments: Vec<Value>,
+        at: TokenSpan,
+    ) -> Result<Value> {
         let Type::Struct(definition, generics) = ty else {
             return Err(error(at, "this cannot be called"));
         };
@@ -141,7 +155,7 @@ impl Evaluator {
         builtin: &Builtin,
         mut arguments: Vec<Value>,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated {
         let name = builtin.path.last().cloned().unwrap_or_default();
         if name == "Some" && arguments.len() == 1 {
@@ -161,7 +175,7 @@ impl Evaluator {
             }
         }
         let full = builtin.path.join("::");
-        if let Some(instead) = builtin.path.iter().rev().nth(1).and_then(|ty| instead_of(ty)) {
+        if let Some(instead) = builtin.path.iter().rev().nth(1).and_then(|ty| replacement_hint(ty)) {
             return Err(unsupported(at, format!("`{full}` ({instead})")).into());
         }
         Err(error(
@@ -200,7 +214,7 @@ impl Evaluator {
         builtin: &Builtin,
         arguments: Vec<Value>,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated<Option<Value>> {
         let (name, turbofish) = (builtin.path.last().map_or("", String::as_str), &builtin.turbofish);
         let function = match builtin.owner {
@@ -218,15 +232,15 @@ impl Evaluator {
 
     /// Calls a function with arguments as they are written; of several that only differ in their
     /// arguments the one that these fit.
-    fn call_written(
+    fn call_with_expressions(
         &mut self,
         function: &Function,
         receiver: Option<Value>,
         written: &Punctuated<Expr, Token![,]>,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated {
-        let several = self.overloads(function);
+        let several = self.implementations_of_trait(function);
         if several.len() < 2 {
             return self.call_function(function, Arguments::Written(receiver, written), expected, at);
         }
@@ -241,7 +255,7 @@ impl Evaluator {
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
         // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
-        let receiver = self.place_expected(&call.receiver, true, &receiver_hint(call, &name, expected))?;
+        let receiver = self.place_of_type(&call.receiver, true, &receiver_hint(call, &name, expected))?;
         let receiver = self.dereferenced(receiver, &call.receiver)?;
         let turbofish = match &call.turbofish {
             Some(arguments) => {
@@ -251,7 +265,7 @@ impl Evaluator {
             None => Vec::new(),
         };
         if let Some((function, first)) = self.user_function(&receiver, &name, &turbofish, call)? {
-            return self.call_written(&function, Some(first), &call.args, expected, call);
+            return self.call_with_expressions(&function, Some(first), &call.args, expected, call);
         }
         if name == "into"
             && let Some(value) = self.user_conversion(&receiver, expected, call)?
@@ -287,7 +301,7 @@ impl Evaluator {
             return Ok(value);
         }
         let value = receiver.value(self, call)?;
-        Err(unsupported(at, format!("the method `{name}` of {}", value.kind())).into())
+        Err(unsupported(at, format!("the method `{name}` of {}", value.description())).into())
     }
 }
 
@@ -329,7 +343,7 @@ fn receiver_hint(call: &syn::ExprMethodCall, name: &str, expected: &Type) -> Typ
 }
 
 /// What to write instead of a type of nalgebra that a graph model does not have.
-fn instead_of(ty: &str) -> Option<&'static str> {
+fn replacement_hint(ty: &str) -> Option<&'static str> {
     Some(match ty {
         "Quaternion" | "UnitQuaternion" | "UnitDualQuaternion" | "DualQuaternion" => {
             "use four numbers of the state, and a helper function for their product"

@@ -1,11 +1,11 @@
 //! Closures.
 
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator, Target, error, unsupported};
+use super::evaluator::{Evaluated, Evaluator, Target, TokenSpan, error, unsupported};
 use super::items::Symbol;
 use super::pattern::Subject;
 use super::types::Type;
-use super::value::{Calls, Closure, Value};
+use super::value::{CallStack, Closure, Value};
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
 use std::cell::RefCell;
@@ -14,7 +14,7 @@ use std::rc::Rc;
 /// What is set aside while the body of a function is executed.
 pub(super) struct Body {
     pub scope: Rc<Scope>,
-    pub calls: Option<Rc<Calls>>,
+    pub calls: Option<Rc<CallStack>>,
     pub returns: Type,
     pub targets: Vec<(Option<String>, Target, usize)>,
     pub branches: usize,
@@ -26,7 +26,7 @@ impl Evaluator {
             return Err(unsupported(closure, "asynchronous code").into());
         }
         let scope = match &closure.capture {
-            Some(_) => self.captured(closure.body.to_token_stream()),
+            Some(_) => self.captured_scope(closure.body.to_token_stream()),
             None => self.scope.clone(),
         };
         let calls = self.calls.clone();
@@ -34,9 +34,9 @@ impl Evaluator {
     }
 
     /// A scope with copies of the variables that the tokens mention.
-    fn captured(&mut self, tokens: TokenStream) -> Rc<Scope> {
+    fn captured_scope(&mut self, tokens: TokenStream) -> Rc<Scope> {
         let mut names = Vec::new();
-        self.mentioned(tokens, &mut names);
+        self.collect_mentioned(tokens, &mut names);
         let mut copies = Vec::new();
         for name in names {
             if copies.iter().all(|(known, _)| *known != name)
@@ -46,14 +46,14 @@ impl Evaluator {
                 copies.push((name, Rc::new(RefCell::new(value))));
             }
         }
-        Scope::inside(&self.scope, Names::Variables(copies))
+        Scope::child_scope(&self.scope, Names::Variables(copies))
     }
 
-    fn mentioned(&mut self, tokens: TokenStream, names: &mut Vec<Symbol>) {
+    fn collect_mentioned(&mut self, tokens: TokenStream, names: &mut Vec<Symbol>) {
         for token in tokens {
             match token {
                 TokenTree::Ident(ident) => names.push(self.symbol(&ident)),
-                TokenTree::Group(group) => self.mentioned(group.stream(), names),
+                TokenTree::Group(group) => self.collect_mentioned(group.stream(), names),
                 _ => {}
             }
         }
@@ -64,7 +64,7 @@ impl Evaluator {
         closure: &Rc<Closure>,
         arguments: Vec<Value>,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated {
         let written = &closure.closure;
         if written.inputs.len() != arguments.len() {

@@ -1,7 +1,7 @@
 //! Values become values of a type: integers get their width, constants from outside are taken
 //! apart.
 
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{Evaluator, TokenSpan, error};
 use super::types::Type;
 use super::value::{Struct, Value};
 use quote::quote;
@@ -11,12 +11,12 @@ use syn::Result;
 impl Evaluator {
     /// The value as one of the type: opaque constants are taken apart, integers get their type,
     /// `&mut` stays what it is. An error if the shapes do not fit.
-    pub fn coerce(&mut self, value: Value, ty: &Type, at: At) -> Result<Value> {
+    pub fn coerce(&mut self, value: Value, ty: &Type, at: TokenSpan) -> Result<Value> {
         Ok(match (ty, &value) {
             (Type::Unknown, _) | (_, Value::Reference(_)) => value,
             (Type::Real, Value::Opaque(_)) => Value::Real(self.real(&value, at)?),
             (Type::Integer(ty), Value::Integer(integer)) if integer.ty.is_none() => {
-                match super::arithmetic::fit(Some(integer.value), Some(*ty)) {
+                match super::arithmetic::checked_integer(Some(integer.value), Some(*ty)) {
                     Some(integer) => Value::Integer(integer),
                     None => {
                         let message = format!("{} is out of the range of `{}`", integer.value, ty.name());
@@ -24,8 +24,12 @@ impl Evaluator {
                     }
                 }
             }
-            (Type::Integer(_), Value::Opaque(_)) => return Err(super::evaluator::opaque(at, "an integer")),
-            (Type::Bool, Value::Opaque(_)) => return Err(super::evaluator::opaque(at, "a `bool`")),
+            (Type::Integer(_), Value::Opaque(_)) => {
+                return Err(super::evaluator::opaque_value_error(at, "an integer"));
+            }
+            (Type::Bool, Value::Opaque(_)) => {
+                return Err(super::evaluator::opaque_value_error(at, "a `bool`"));
+            }
             (Type::Array(_, Some(length)), Value::Array(elements)) if *length != elements.len() => {
                 let found = elements.len();
                 return Err(error(
@@ -69,23 +73,23 @@ impl Evaluator {
             (
                 Type::Array(_, Some(_)) | Type::Tuple(_) | Type::Matrix(Some(_), Some(_)) | Type::Struct(..),
                 Value::Opaque(tokens),
-            ) => self.take_apart(tokens, ty, at)?,
+            ) => self.split_opaque(tokens, ty, at)?,
             _ => value,
         })
     }
 
     /// An opaque constant of a known shape, as a value of opaque parts.
-    fn take_apart(&mut self, tokens: &proc_macro2::TokenStream, ty: &Type, at: At) -> Result<Value> {
+    fn split_opaque(&mut self, tokens: &proc_macro2::TokenStream, ty: &Type, at: TokenSpan) -> Result<Value> {
         match ty {
             Type::Real => self.real(&Value::Opaque(Rc::new(tokens.clone())), at).map(Value::Real),
             Type::Array(element, Some(length)) => {
-                self.tick(*length, at)?;
+                self.count_steps(*length, at)?;
                 let part = |index: usize| {
                     let index = proc_macro2::Literal::usize_unsuffixed(index);
                     quote!(#tokens[#index])
                 };
                 (0..*length)
-                    .map(|index| self.take_apart(&part(index), element, at))
+                    .map(|index| self.split_opaque(&part(index), element, at))
                     .collect::<Result<_>>()
                     .map(Value::array)
             }
@@ -96,18 +100,19 @@ impl Evaluator {
                 };
                 let parts = parts.iter().enumerate();
                 parts
-                    .map(|(index, ty)| self.take_apart(&part(index), ty, at))
+                    .map(|(index, ty)| self.split_opaque(&part(index), ty, at))
                     .collect::<Result<_>>()
                     .map(Value::tuple)
             }
             Type::Matrix(Some(rows), Some(columns)) => {
-                self.tick(rows.saturating_mul(*columns), at)?;
+                self.count_steps(rows.saturating_mul(*columns), at)?;
                 let part = |index: usize| {
                     let index = proc_macro2::Literal::usize_unsuffixed(index);
                     quote!(#tokens[#index])
                 };
-                let elements: Result<_> =
-                    (0..rows * columns).map(|index| self.take_apart(&part(index), &Type::Real, at)).collect();
+                let elements: Result<_> = (0..rows * columns)
+                    .map(|index| self.split_opaque(&part(index), &Type::Real, at))
+                    .collect();
                 Ok(Value::matrix(*rows, *columns, elements?))
             }
             Type::Struct(definition, arguments) if !definition.is_enum => {
@@ -124,11 +129,11 @@ impl Evaluator {
                             quote!(#tokens.#name)
                         }
                     };
-                    fields.push(self.take_apart(&part, ty, at)?);
+                    fields.push(self.split_opaque(&part, ty, at)?);
                 }
                 Ok(Value::Struct(Rc::new(Struct { definition: definition.clone(), variant: 0, fields })))
             }
-            _ => Err(super::evaluator::opaque(at, "a value of this type")),
+            _ => Err(super::evaluator::opaque_value_error(at, "a value of this type")),
         }
     }
 }

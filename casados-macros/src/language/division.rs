@@ -38,7 +38,7 @@ impl<'ast> Visit<'ast> for Divisions {
     fn visit_expr_cast(&mut self, cast: &'ast syn::ExprCast) {
         if let syn::Type::Path(ty) = &*cast.ty
             && ty.path.is_ident("f64")
-            && let Expr::Binary(binary) = within(&cast.expr)
+            && let Expr::Binary(binary) = without_parentheses(&cast.expr)
             && let syn::BinOp::Div(operator) = &binary.op
             && let (Some(a), Some(b)) = (integer(&binary.left), integer(&binary.right))
             && a.checked_rem(b).is_some_and(|rest| rest != 0)
@@ -50,17 +50,17 @@ impl<'ast> Visit<'ast> for Divisions {
 }
 
 /// An expression without the brackets around it.
-fn within(expression: &Expr) -> &Expr {
+fn without_parentheses(expression: &Expr) -> &Expr {
     match expression {
-        Expr::Paren(inner) => within(&inner.expr),
-        Expr::Group(inner) => within(&inner.expr),
+        Expr::Paren(inner) => without_parentheses(&inner.expr),
+        Expr::Group(inner) => without_parentheses(&inner.expr),
         other => other,
     }
 }
 
 /// The value of an integer literal.
 fn integer(expression: &Expr) -> Option<i128> {
-    match within(expression) {
+    match without_parentheses(expression) {
         Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(literal), .. }) if !literal.suffix().starts_with('f') => {
             literal.base10_parse().ok()
         }

@@ -72,7 +72,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
             (item, Place::Beside, function, Vec::new(), name, visibility, attributes)
         }
         Item::Mod(mut module) => {
-            let marked = module::marked(&mut module);
+            let marked = module::take_attributed_functions(&mut module);
             let Ok(Some(index)) = module::model_function(form, &mut module, &marked) else { return Ok(None) };
             let items = module.content.as_ref().map(|(_, items)| items.clone()).unwrap_or_default();
             let Some(Item::Fn(function)) = items.get(index).cloned() else { return Ok(None) };
@@ -232,7 +232,7 @@ impl Signature {
                 format!(
                     "the model returns {}, but has {expected} unknowns: return one for each differential and \
                      algebraic state",
-                    super::model::numbers(equations)
+                    super::model::count_in_words(equations)
                 ),
             ));
         }

@@ -53,7 +53,7 @@ impl Duration {
         let seconds = graph.binary(Binary::Mul, duration, tau);
         model.residual = graph.substitute(&model.residual, &BTreeMap::from([(time, seconds)]));
         if !is_function {
-            model.residual = scaled(graph, &model.residual, nx as u32, duration);
+            model.residual = scaled_residual(graph, &model.residual, nx as u32, duration);
         }
         model.duration = Some(index as u32);
         Ok(())
@@ -61,7 +61,7 @@ impl Duration {
 }
 
 /// Equations of `x′` in the place of `ẋ`.
-fn scaled(graph: &mut Graph, residual: &[Node], nx: u32, duration: Node) -> Vec<Node> {
+fn scaled_residual(graph: &mut Graph, residual: &[Node], nx: u32, duration: Node) -> Vec<Node> {
     let zero = graph.constant(0.0);
     let at_rest: BTreeMap<u32, Node> = (0..nx).map(|state| (state, zero)).collect();
     let degrees = graph.degrees(residual, |variable| variable < nx);

@@ -36,18 +36,18 @@ pub enum Names {
 
 impl Scope {
     /// A scope inside of another.
-    pub fn inside(parent: &Rc<Scope>, names: Names) -> Rc<Scope> {
+    pub fn child_scope(parent: &Rc<Scope>, names: Names) -> Rc<Scope> {
         Rc::new(Scope { parent: Some(parent.clone()), names })
     }
 
     /// This scope and those around it, from the inside out.
-    pub fn chain(self: &Rc<Scope>) -> impl Iterator<Item = &Rc<Scope>> {
+    pub fn enclosing_scopes(self: &Rc<Scope>) -> impl Iterator<Item = &Rc<Scope>> {
         std::iter::successors(Some(self), |scope| scope.parent.as_ref())
     }
 
     /// The variable of a name, unless an item of that name is nearer.
     pub fn variable(self: &Rc<Scope>, name: Symbol) -> Option<Cell> {
-        for scope in self.chain() {
+        for scope in self.enclosing_scopes() {
             match &scope.names {
                 Names::Variables(variables) => {
                     if let Some((_, cell)) = variables.iter().rev().find(|(symbol, _)| *symbol == name) {

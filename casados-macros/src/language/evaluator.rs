@@ -6,7 +6,7 @@ use super::implementation::Implementation;
 use super::items::Symbol;
 use super::place::Cell;
 use super::types::Type;
-use super::value::{Calls, Integer, Value};
+use super::value::{CallStack, Integer, Value};
 use crate::graph::{Graph, Node};
 use proc_macro2::TokenStream;
 use quote::ToTokens;
@@ -15,15 +15,15 @@ use std::rc::Rc;
 use syn::Result;
 
 /// The tokens an error points at.
-pub type At<'a> = &'a dyn ToTokens;
+pub type TokenSpan<'a> = &'a dyn ToTokens;
 
 /// An error at the user's tokens: one lower-case sentence that says what, and the way out.
-pub fn error(at: At, message: impl std::fmt::Display) -> syn::Error {
+pub fn error(at: TokenSpan, message: impl std::fmt::Display) -> syn::Error {
     syn::Error::new_spanned(at, message)
 }
 
 /// An error about what a graph model cannot express: `what` is the subject of the sentence.
-pub fn unsupported(at: At, what: impl std::fmt::Display) -> syn::Error {
+pub fn unsupported(at: TokenSpan, what: impl std::fmt::Display) -> syn::Error {
     error(
         at,
         format!(
@@ -34,14 +34,14 @@ pub fn unsupported(at: At, what: impl std::fmt::Display) -> syn::Error {
 }
 
 /// Evaluation steps before a model is taken for one that does not end.
-pub const STEPS: usize = 10_000_000;
+pub const MAX_STEPS: usize = 10_000_000;
 /// Graph nodes before a model is taken for one that does not end.
-pub const NODES: usize = 4_000_000;
+pub const MAX_NODES: usize = 4_000_000;
 /// Nested expressions and calls.
-pub const DEPTH: usize = 200;
+pub const MAX_DEPTH: usize = 200;
 /// Bytes of the stack that the evaluation may use. An unoptimised macro needs 4 to 20 kB for a
 /// level, and the smallest threads that macros run in have 2 MiB.
-const STACK: usize = 5 << 18;
+const MAX_STACK_BYTES: usize = 5 << 18;
 
 /// Why the evaluation of an expression did not end with its value.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ pub struct Evaluator {
     /// Scopes of items, kept alive for the definitions in them.
     pub(super) scopes: Vec<Rc<Scope>>,
     /// The functions that are being executed.
-    pub(super) calls: Option<Rc<Calls>>,
+    pub(super) calls: Option<Rc<CallStack>>,
     /// Loops and labelled blocks around the code that is being executed, with the number of
     /// branches on conditions at run time that are around them.
     pub(super) targets: Vec<(Option<String>, Target, usize)>,
@@ -125,16 +125,16 @@ pub type Changes = Vec<(Cell, Value)>;
 
 impl Evaluator {
     /// Counts steps: loops in built-in functions call this once per element.
-    pub fn tick(&mut self, steps: usize, at: At) -> Result<()> {
+    pub fn count_steps(&mut self, steps: usize, at: TokenSpan) -> Result<()> {
         self.steps = self.steps.saturating_add(steps);
-        if self.steps > STEPS {
+        if self.steps > MAX_STEPS {
             return Err(error(
                 at,
-                format!("the model takes more than {STEPS} evaluation steps: does this loop end?"),
+                format!("the model takes more than {MAX_STEPS} evaluation steps: does this loop end?"),
             ));
         }
-        if self.graph.len() > NODES {
-            return Err(error(at, format!("the model has more than {NODES} operations")));
+        if self.graph.len() > MAX_NODES {
+            return Err(error(at, format!("the model has more than {MAX_NODES} operations")));
         }
         Ok(())
     }
@@ -142,14 +142,14 @@ impl Evaluator {
     /// Executes something one level deeper.
     pub(super) fn deeper<T>(
         &mut self,
-        at: At,
+        at: TokenSpan,
         execute: impl FnOnce(&mut Self) -> Evaluated<T>,
     ) -> Evaluated<T> {
-        self.tick(1, at)?;
+        self.count_steps(1, at)?;
         let marker = 0_u8;
         let here = std::ptr::from_ref(&marker).addr();
         let used = self.bottom.get_or_insert(here).abs_diff(here);
-        if self.depth >= DEPTH || used > STACK {
+        if self.depth >= MAX_DEPTH || used > MAX_STACK_BYTES {
             return Err(error(
                 at,
                 "expressions and calls are nested too deeply here: split them into statements",
@@ -163,7 +163,7 @@ impl Evaluator {
     }
 
     /// The result of something that cannot be left by `break`, `continue` or `return`.
-    pub(super) fn finished(&mut self, result: Evaluated, at: At) -> Result<Value> {
+    pub(super) fn into_value(&mut self, result: Evaluated, at: TokenSpan) -> Result<Value> {
         match result {
             Ok(value) => Ok(value),
             Err(Flow::Error(error)) => Err(error),
@@ -172,7 +172,7 @@ impl Evaluator {
     }
 
     /// Notes the value of a variable before it is written to.
-    pub(super) fn remember(&mut self, cell: &Cell) {
+    pub(super) fn save_old_value(&mut self, cell: &Cell) {
         if let Some(journal) = self.journals.last_mut()
             && journal.seen.insert(Rc::as_ptr(cell))
         {
@@ -182,7 +182,7 @@ impl Evaluator {
     }
 
     /// The number of conditions at run time around what is being executed.
-    pub(super) fn branches(&self) -> usize {
+    pub(super) fn open_branch_count(&self) -> usize {
         self.journals.len()
     }
 
@@ -207,11 +207,11 @@ impl Evaluator {
     }
 
     /// Executes something that happens only if a condition holds at run time.
-    pub(super) fn only_if<T>(
+    pub(super) fn run_conditionally<T>(
         &mut self,
         condition: Node,
         execute: impl FnOnce(&mut Self) -> Result<T>,
-        at: At,
+        at: TokenSpan,
     ) -> Result<T> {
         match self.branch(|evaluator| Ok(execute(evaluator)?)) {
             Ok((value, changes)) => {
@@ -224,7 +224,7 @@ impl Evaluator {
     }
 
     /// Makes the changes of two branches, of which the first is taken if the condition holds.
-    pub(super) fn merge(&mut self, condition: Node, a: Changes, b: Changes, at: At) -> Result<()> {
+    pub(super) fn merge(&mut self, condition: Node, a: Changes, b: Changes, at: TokenSpan) -> Result<()> {
         let position: HashMap<_, _> =
             b.iter().enumerate().map(|(index, (cell, _))| (Rc::as_ptr(cell), index)).collect();
         let mut merged = HashSet::new();
@@ -235,14 +235,14 @@ impl Evaluator {
                 None => cell.borrow().clone(),
             };
             let value = self.select(condition, &then, &otherwise, at)?;
-            self.remember(&cell);
+            self.save_old_value(&cell);
             cell.replace(value);
         }
         for (cell, otherwise) in b {
             if !merged.contains(&Rc::as_ptr(&cell)) {
                 let then = cell.borrow().clone();
                 let value = self.select(condition, &then, &otherwise, at)?;
-                self.remember(&cell);
+                self.save_old_value(&cell);
                 cell.replace(value);
             }
         }
@@ -250,7 +250,7 @@ impl Evaluator {
     }
 
     /// The value as a number. Opaque constants become one here.
-    pub fn real(&mut self, value: &Value, at: At) -> Result<Node> {
+    pub fn real(&mut self, value: &Value, at: TokenSpan) -> Result<Node> {
         match value {
             Value::Real(node) => Ok(*node),
             Value::Opaque(tokens) => {
@@ -266,25 +266,25 @@ impl Evaluator {
                 let value = self.read(place, at)?;
                 self.real(&value, at)
             }
-            other => Err(error(at, format!("expected an `f64`, found {}", other.kind()))),
+            other => Err(error(at, format!("expected an `f64`, found {}", other.description()))),
         }
     }
 
     /// The value as a known integer.
-    pub fn integer(&mut self, value: &Value, at: At) -> Result<Integer> {
+    pub fn integer(&mut self, value: &Value, at: TokenSpan) -> Result<Integer> {
         match value {
             Value::Integer(integer) => Ok(*integer),
             Value::Reference(place) => {
                 let value = self.read(place, at)?;
                 self.integer(&value, at)
             }
-            Value::Opaque(_) => Err(opaque(at, "an integer")),
-            other => Err(error(at, format!("expected an integer, found {}", other.kind()))),
+            Value::Opaque(_) => Err(opaque_value_error(at, "an integer")),
+            other => Err(error(at, format!("expected an integer, found {}", other.description()))),
         }
     }
 
     /// The value as a known index or length.
-    pub fn usize(&mut self, value: &Value, at: At) -> Result<usize> {
+    pub fn usize(&mut self, value: &Value, at: TokenSpan) -> Result<usize> {
         let integer = self.integer(value, at)?;
         usize::try_from(integer.value)
             .map_err(|_| error(at, format!("this is {}, which is no `usize`", integer.value)))
@@ -292,7 +292,7 @@ impl Evaluator {
 }
 
 /// An error about a constant of which the value is needed.
-pub fn opaque(at: At, what: &str) -> syn::Error {
+pub fn opaque_value_error(at: TokenSpan, what: &str) -> syn::Error {
     error(
         at,
         format!(

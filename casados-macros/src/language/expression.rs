@@ -1,9 +1,9 @@
 //! Expressions.
 
-use super::arithmetic::wrap;
-use super::evaluator::{Evaluated, Evaluator, Flow, error, opaque, unsupported};
+use super::arithmetic::wrapped_integer;
+use super::evaluator::{Evaluated, Evaluator, Flow, error, opaque_value_error, unsupported};
 use super::methods::Receiver;
-use super::path::Named;
+use super::path::PathMeaning;
 use super::pattern::Truth;
 use super::place::Place;
 use super::types::Type;
@@ -37,7 +37,7 @@ impl Evaluator {
             Expr::Tuple(tuple) => {
                 let mut parts = Vec::with_capacity(tuple.elems.len());
                 for (index, part) in tuple.elems.iter().enumerate() {
-                    parts.push(self.expression(part, &expected.part(index))?);
+                    parts.push(self.expression(part, &expected.tuple_element(index))?);
                 }
                 Ok(Value::tuple(parts))
             }
@@ -68,13 +68,15 @@ impl Evaluator {
             },
             Expr::Try(inner) => {
                 let value = self.expression(&inner.expr, &Type::Option(Rc::new(expected.clone())))?;
-                match self.load(value, expression)? {
+                match self.follow_value(value, expression)? {
                     Value::Option(Some(value)) => Ok(*value),
                     Value::Option(None) => {
                         self.check_return(expression)?;
                         Err(Flow::Return(Value::Option(None)))
                     }
-                    other => Err(error(expression, format!("there is no `?` of {}", other.kind())).into()),
+                    other => {
+                        Err(error(expression, format!("there is no `?` of {}", other.description())).into())
+                    }
                 }
             }
             Expr::Infer(_) => Err(error(expression, "`_` is no value").into()),
@@ -85,20 +87,20 @@ impl Evaluator {
 
     /// The value of a path.
     pub(super) fn path_value(&mut self, path: &syn::ExprPath) -> Evaluated {
-        match self.named(path)? {
-            Named::Variable(cell) => Ok(cell.borrow().clone()),
-            Named::Value(value) => Ok(value),
-            Named::Builtin(builtin) => Ok(self.builtin_value(builtin, path)),
+        match self.path_meaning(path)? {
+            PathMeaning::Variable(cell) => Ok(cell.borrow().clone()),
+            PathMeaning::Value(value) => Ok(value),
+            PathMeaning::Builtin(builtin) => Ok(self.builtin_value(builtin, path)),
         }
     }
 
     fn reference_expression(&mut self, reference: &syn::ExprReference, expected: &Type) -> Evaluated {
         if reference.mutability.is_none() {
             let value = self.expression(&reference.expr, expected)?;
-            return Ok(self.load(value, reference)?);
+            return Ok(self.follow_value(value, reference)?);
         }
-        match self.place_expected(&reference.expr, true, expected)? {
-            Receiver::Place(place) => Ok(Value::Reference(self.follow(place, reference)?)),
+        match self.place_of_type(&reference.expr, true, expected)? {
+            Receiver::Place(place) => Ok(Value::Reference(self.follow_place(place, reference)?)),
             Receiver::Value(value @ Value::Reference(_)) => Ok(value),
             Receiver::Value(value) => Ok(Value::Reference(Place::new(value))),
         }
@@ -110,12 +112,14 @@ impl Evaluator {
         let hint = if matches!(ty, Type::Real) { Type::Unknown } else { ty.scalar() };
         let hint = if matches!(&*cast.expr, Expr::Lit(_)) { hint } else { Type::Unknown };
         let value = self.expression(&cast.expr, &hint)?;
-        let value = self.load(value, cast)?;
+        let value = self.follow_value(value, cast)?;
         Ok(match (ty, value) {
             (Type::Real, Value::Integer(integer)) => Value::Real(self.graph.constant(integer.value as f64)),
             (Type::Real, value @ Value::Real(_)) => value,
             (Type::Real, Value::Opaque(tokens)) => Value::Opaque(Rc::new(quote!((#tokens as f64)))),
-            (Type::Integer(ty), Value::Integer(integer)) => Value::Integer(wrap(integer.value, ty)),
+            (Type::Integer(ty), Value::Integer(integer)) => {
+                Value::Integer(wrapped_integer(integer.value, ty))
+            }
             (Type::Integer(ty), Value::Bool(value)) => {
                 Value::Integer(Integer { value: i128::from(value), ty: Some(ty) })
             }
@@ -149,13 +153,15 @@ impl Evaluator {
                     }
                     value += 1;
                 }
-                Value::Integer(wrap(value, ty))
+                Value::Integer(wrapped_integer(value, ty))
             }
-            (Type::Integer(_), Value::Opaque(_)) => return Err(opaque(cast, "an integer").into()),
+            (Type::Integer(_), Value::Opaque(_)) => return Err(opaque_value_error(cast, "an integer").into()),
             (Type::Bool, value @ (Value::Bool(_) | Value::Condition(_))) => value,
             (Type::Unknown, value) => value,
             (_, value) => {
-                return Err(error(cast, format!("{} cannot be cast to this type", value.kind())).into());
+                return Err(
+                    error(cast, format!("{} cannot be cast to this type", value.description())).into()
+                );
             }
         })
     }
@@ -164,14 +170,14 @@ impl Evaluator {
         let mut start = match &range.start {
             Some(start) => {
                 let value = self.expression(start, &Type::Unknown)?;
-                Some(self.load(value, start)?)
+                Some(self.follow_value(value, start)?)
             }
             None => None,
         };
         let mut end = match &range.end {
             Some(end) => {
                 let value = self.expression(end, &Type::Unknown)?;
-                Some(self.load(value, end)?)
+                Some(self.follow_value(value, end)?)
             }
             None => None,
         };

@@ -1,7 +1,7 @@
 //! Values as flat lists of numbers, in the order of declaration: elements of arrays by index,
 //! fields of structs as they are declared, matrices column after column.
 
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::Value;
 use crate::graph::Node;
 use proc_macro2::Span;
@@ -10,26 +10,26 @@ use syn::{Block, Expr, Result, Stmt};
 
 impl Evaluator {
     /// The numbers of a value, in order.
-    pub fn flatten(&mut self, value: &Value, at: At) -> Result<Vec<Node>> {
+    pub fn flatten(&mut self, value: &Value, at: TokenSpan) -> Result<Vec<Node>> {
         let mut numbers = Vec::new();
-        self.flatten_to(value, &mut numbers, at)?;
+        self.flatten_into(value, &mut numbers, at)?;
         Ok(numbers)
     }
 
-    fn flatten_to(&mut self, value: &Value, numbers: &mut Vec<Node>, at: At) -> Result<()> {
+    fn flatten_into(&mut self, value: &Value, numbers: &mut Vec<Node>, at: TokenSpan) -> Result<()> {
         match value {
             Value::Array(elements) | Value::Tuple(elements) => {
-                elements.iter().try_for_each(|element| self.flatten_to(element, numbers, at))
+                elements.iter().try_for_each(|element| self.flatten_into(element, numbers, at))
             }
             Value::Struct(structure) => {
-                structure.fields.iter().try_for_each(|field| self.flatten_to(field, numbers, at))
+                structure.fields.iter().try_for_each(|field| self.flatten_into(field, numbers, at))
             }
             Value::Matrix(matrix) => {
-                matrix.elements.iter().try_for_each(|element| self.flatten_to(element, numbers, at))
+                matrix.elements.iter().try_for_each(|element| self.flatten_into(element, numbers, at))
             }
             Value::Reference(place) => {
                 let value = self.read(place, at)?;
-                self.flatten_to(&value, numbers, at)
+                self.flatten_into(&value, numbers, at)
             }
             Value::Real(_) | Value::Opaque(_) => {
                 numbers.push(self.real(value, at)?);
@@ -39,7 +39,7 @@ impl Evaluator {
                 at,
                 format!(
                     "a model returns numbers (`f64`, arrays, tuples, structs and nalgebra vectors of them), not {}",
-                    other.kind()
+                    other.description()
                 ),
             )),
         }
@@ -51,19 +51,19 @@ impl Evaluator {
 pub fn spans(block: &Block, value: &Value) -> Vec<Span> {
     let mut spans = Vec::new();
     match block.stmts.last() {
-        Some(Stmt::Expr(expression, _)) => push_spans(expression, value, &mut spans),
+        Some(Stmt::Expr(expression, _)) => collect_spans(expression, value, &mut spans),
         other => spans.resize(count(value), other.map_or_else(|| block.span(), Spanned::span)),
     }
     spans
 }
 
-fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
+fn collect_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
     match (expression, value) {
-        (Expr::Paren(inner), _) => push_spans(&inner.expr, value, spans),
-        (Expr::Group(inner), _) => push_spans(&inner.expr, value, spans),
+        (Expr::Paren(inner), _) => collect_spans(&inner.expr, value, spans),
+        (Expr::Group(inner), _) => collect_spans(&inner.expr, value, spans),
         (Expr::Return(inner), _) if inner.expr.is_some() => {
             if let Some(inner) = &inner.expr {
-                push_spans(inner, value, spans);
+                collect_spans(inner, value, spans);
             }
         }
         (Expr::Array(array), Value::Array(values)) if array.elems.len() == values.len() => {
@@ -71,14 +71,14 @@ fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
                 .elems
                 .iter()
                 .zip(values.iter())
-                .for_each(|(element, value)| push_spans(element, value, spans));
+                .for_each(|(element, value)| collect_spans(element, value, spans));
         }
         (Expr::Tuple(tuple), Value::Tuple(values)) if tuple.elems.len() == values.len() => {
             tuple
                 .elems
                 .iter()
                 .zip(values.iter())
-                .for_each(|(element, value)| push_spans(element, value, spans));
+                .for_each(|(element, value)| collect_spans(element, value, spans));
         }
         (Expr::Struct(literal), Value::Struct(structure)) => {
             let declared = structure.definition.variants.get(structure.variant);
@@ -90,8 +90,8 @@ fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
                     })
                 });
                 match field {
-                    Some(field) => push_spans(&field.expr, value, spans),
-                    None => push_all(literal.path.span(), value, spans),
+                    Some(field) => collect_spans(&field.expr, value, spans),
+                    None => repeat_span(literal.path.span(), value, spans),
                 }
             }
         }
@@ -100,11 +100,11 @@ fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
         {
             spans.extend(call.args.iter().map(Spanned::span));
         }
-        _ => push_all(expression.span(), value, spans),
+        _ => repeat_span(expression.span(), value, spans),
     }
 }
 
-fn push_all(span: Span, value: &Value, spans: &mut Vec<Span>) {
+fn repeat_span(span: Span, value: &Value, spans: &mut Vec<Span>) {
     spans.resize(spans.len() + count(value), span);
 }
 

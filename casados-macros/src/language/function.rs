@@ -3,11 +3,11 @@
 use super::call::Arguments;
 use super::closure::Body;
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator, Flow, error};
+use super::evaluator::{Evaluated, Evaluator, Flow, TokenSpan, error};
 use super::pattern::Subject;
 use super::place::Place;
 use super::types::Type;
-use super::value::{Calls, Function, Value};
+use super::value::{CallStack, Function, Value};
 use std::rc::Rc;
 
 impl Evaluator {
@@ -17,11 +17,11 @@ impl Evaluator {
         function: &Function,
         arguments: Arguments,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated {
         let item = &function.item;
         let name = &item.sig.ident;
-        self.refuse_recursion(item, name, at)?;
+        self.check_recursion(item, name, at)?;
         if item.sig.inputs.len() != arguments.len() {
             let (expected, found) = (item.sig.inputs.len(), arguments.len());
             return Err(
@@ -36,8 +36,10 @@ impl Evaluator {
             if let Some(pattern) = &implementation.self_type {
                 self.unify(pattern, owner, &generics);
             }
-            around =
-                Scope::inside(&generics, Names::SelfType(owner.clone(), implementation.self_type.clone()));
+            around = Scope::child_scope(
+                &generics,
+                Names::SelfType(owner.clone(), implementation.self_type.clone()),
+            );
             block_scope = Some(generics);
         }
         let generics = &item.sig.generics;
@@ -60,13 +62,13 @@ impl Evaluator {
                 Some(pattern) => self.resolve(pattern, generics)?,
                 None => owner.clone(),
             };
-            inside = Scope::inside(&inside, Names::SelfType(own, implementation.self_type.clone()));
+            inside = Scope::child_scope(&inside, Names::SelfType(own, implementation.self_type.clone()));
         }
         let returns = match &item.sig.output {
             syn::ReturnType::Type(_, ty) => self.resolve(ty, &inside)?,
             syn::ReturnType::Default => Type::Tuple(Rc::new(Vec::new())),
         };
-        let calls = Some(Rc::new(Calls { function: item.clone(), parent: self.calls.clone() }));
+        let calls = Some(Rc::new(CallStack { function: item.clone(), parent: self.calls.clone() }));
         let inputs = item.sig.inputs.iter().zip(values);
         let result = self.execute(inside, calls, returns.clone(), |evaluator| {
             for (input, value) in inputs {
@@ -84,7 +86,7 @@ impl Evaluator {
                 value
             }
             _ if matches!(returns, Type::Unknown) => value,
-            _ => self.load(value, at)?,
+            _ => self.follow_value(value, at)?,
         };
         Ok(self.coerce(value, &returns, at)?)
     }
@@ -96,7 +98,7 @@ impl Evaluator {
         arguments: Arguments,
         scope: &Rc<Scope>,
         generic: bool,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated<Vec<Value>> {
         let name = &item.sig.ident;
         let mut values = Vec::with_capacity(arguments.len());
@@ -126,7 +128,7 @@ impl Evaluator {
     }
 
     /// A graph of a function that calls itself would have no end.
-    fn refuse_recursion(&self, item: &Rc<syn::ItemFn>, name: &syn::Ident, at: At) -> Evaluated<()> {
+    fn check_recursion(&self, item: &Rc<syn::ItemFn>, name: &syn::Ident, at: TokenSpan) -> Evaluated<()> {
         let mut frame = self.calls.clone();
         while let Some(calls) = frame {
             if Rc::ptr_eq(&calls.function, item) {
@@ -150,7 +152,7 @@ impl Evaluator {
         hint: &Type,
         (name, index): (&syn::Ident, usize),
         scope: Option<&Rc<Scope>>,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated {
         Ok(match input {
             syn::FnArg::Typed(input) => {
@@ -161,7 +163,7 @@ impl Evaluator {
                     {
                         value
                     }
-                    (_, value) => self.load(value, at)?,
+                    (_, value) => self.follow_value(value, at)?,
                 };
                 let value = self.coerce(value, hint, at)?;
                 if let Some(scope) = scope {
@@ -172,7 +174,7 @@ impl Evaluator {
                             format!(
                                 "argument {} of `{name}` is {}, which does not fit its type",
                                 index + 1,
-                                value.kind()
+                                value.description()
                             ),
                         )
                         .into());
@@ -185,7 +187,7 @@ impl Evaluator {
                     value @ Value::Reference(_) => value,
                     value => Value::Reference(Place::new(value)),
                 },
-                _ => self.load(value, at)?,
+                _ => self.follow_value(value, at)?,
             },
         })
     }
@@ -194,11 +196,11 @@ impl Evaluator {
     pub(super) fn execute(
         &mut self,
         scope: Rc<Scope>,
-        calls: Option<Rc<Calls>>,
+        calls: Option<Rc<CallStack>>,
         returns: Type,
         body: impl FnOnce(&mut Self) -> Evaluated,
     ) -> Evaluated {
-        let branches = self.branches();
+        let branches = self.open_branch_count();
         let saved = Body {
             scope: std::mem::replace(&mut self.scope, scope),
             calls: std::mem::replace(&mut self.calls, calls),

@@ -2,7 +2,7 @@
 //! values.
 
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluator, Flow, error};
+use super::evaluator::{Evaluator, Flow, TokenSpan, error};
 use super::items::Symbol;
 use super::label::Label;
 use super::types::Type;
@@ -33,8 +33,8 @@ impl Evaluator {
                 _ => {}
             }
         }
-        let scope = Scope::inside(parent, Names::Variables(constants));
-        if types.is_empty() { scope } else { Scope::inside(&scope, Names::Types(types)) }
+        let scope = Scope::child_scope(parent, Names::Variables(constants));
+        if types.is_empty() { scope } else { Scope::child_scope(&scope, Names::Types(types)) }
     }
 
     /// Gives generic parameters their explicit arguments.
@@ -56,7 +56,7 @@ impl Evaluator {
         generics: &syn::Generics,
         scope: &Rc<Scope>,
         name: &syn::Ident,
-        at: At,
+        at: TokenSpan,
     ) -> Result<()> {
         for parameter in generics.const_params() {
             let symbol = self.symbol(&parameter.ident);
@@ -76,7 +76,7 @@ impl Evaluator {
     }
 
     /// What generic parameters are bound to.
-    pub(super) fn bound(&mut self, generics: &syn::Generics, scope: &Rc<Scope>) -> Vec<Generic> {
+    pub(super) fn bound_arguments(&mut self, generics: &syn::Generics, scope: &Rc<Scope>) -> Vec<Generic> {
         let mut arguments = Vec::new();
         for parameter in &generics.params {
             match parameter {
@@ -133,13 +133,13 @@ impl Evaluator {
     fn unify_path(&mut self, pattern: &syn::Type, path: &syn::Path, ty: &Type, scope: &Rc<Scope>) -> bool {
         if let Some(name) = path.get_ident() {
             if name == "Self" {
-                let written = scope.chain().find_map(|around| match &around.names {
+                let written = scope.enclosing_scopes().find_map(|around| match &around.names {
                     Names::SelfType(known, written) => Some((known.clone(), written.clone())),
                     _ => None,
                 });
                 return match written {
                     Some((_, Some(written))) => self.unify(&written, ty, scope),
-                    Some((known, None)) => fits(&known, ty),
+                    Some((known, None)) => may_be_equal(&known, ty),
                     None => true,
                 };
             }
@@ -149,7 +149,7 @@ impl Evaluator {
                     bind(scope, name, &Generic::Type(ty.clone()));
                     return true;
                 }
-                return fits(&known, ty);
+                return may_be_equal(&known, ty);
             }
         }
         let Ok(known) = self.resolve(pattern, scope) else { return false };
@@ -187,7 +187,7 @@ impl Evaluator {
         {
             return self.unify_arguments(written, &[Generic::Type((**inner).clone())], 0, scope);
         }
-        fits(&known, ty)
+        may_be_equal(&known, ty)
     }
 
     fn unify_arguments(
@@ -262,21 +262,21 @@ impl Evaluator {
         ty: &Type,
         label: Label,
         leaf: &mut dyn FnMut(&mut Evaluator, Label) -> Result<Node>,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Value> {
-        self.deeper(at, |evaluator| evaluator.instantiate_within(ty, label, leaf, at).map_err(Flow::from))
+        self.deeper(at, |evaluator| evaluator.instantiate_nested(ty, label, leaf, at).map_err(Flow::from))
             .map_err(|flow| match flow {
                 Flow::Error(error) => error,
                 _ => error(at, "this type has no end"),
             })
     }
 
-    fn instantiate_within(
+    fn instantiate_nested(
         &mut self,
         ty: &Type,
         label: Label,
         leaf: &mut dyn FnMut(&mut Evaluator, Label) -> Result<Node>,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Value> {
         match ty {
             Type::Real => Ok(Value::Real(leaf(self, label)?)),
@@ -293,7 +293,7 @@ impl Evaluator {
                     for row in 0..*rows {
                         let part =
                             if *columns == 1 { format!("[{row}]") } else { format!("[({row}, {column})]") };
-                        self.tick(1, at)?;
+                        self.count_steps(1, at)?;
                         elements.push(Value::Real(leaf(self, label.part(&part))?));
                     }
                 }
@@ -335,7 +335,7 @@ fn usize_integer(value: usize) -> Integer {
 
 /// What a type parameter is bound to, if there is one of that name.
 fn parameter_type(scope: &Rc<Scope>, name: Symbol) -> Option<Type> {
-    scope.chain().find_map(|scope| match &scope.names {
+    scope.enclosing_scopes().find_map(|scope| match &scope.names {
         Names::Types(types) => {
             types.iter().find(|(parameter, _)| *parameter == name).map(|(_, ty)| ty.borrow().clone())
         }
@@ -352,7 +352,7 @@ fn bind(scope: &Rc<Scope>, name: Symbol, argument: &Generic) {
             }
         }
         Generic::Type(ty) => {
-            for scope in scope.chain() {
+            for scope in scope.enclosing_scopes() {
                 if let Names::Types(types) = &scope.names
                     && let Some((_, slot)) = types.iter().find(|(parameter, _)| *parameter == name)
                 {
@@ -365,19 +365,21 @@ fn bind(scope: &Rc<Scope>, name: Symbol, argument: &Generic) {
 }
 
 /// Whether two types may be the same, as far as they are known.
-fn fits(a: &Type, b: &Type) -> bool {
+fn may_be_equal(a: &Type, b: &Type) -> bool {
     match (a, b) {
         (Type::Unknown, _) | (_, Type::Unknown) => true,
         (Type::Real, Type::Real) | (Type::Bool, Type::Bool) => true,
         (Type::Integer(a), Type::Integer(b)) => a == b,
         (Type::Tuple(a), Type::Tuple(b)) => {
-            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| fits(a, b))
+            a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| may_be_equal(a, b))
         }
-        (Type::Array(a, n), Type::Array(b, m)) => fits(a, b) && (n.is_none() || m.is_none() || n == m),
+        (Type::Array(a, n), Type::Array(b, m)) => {
+            may_be_equal(a, b) && (n.is_none() || m.is_none() || n == m)
+        }
         (Type::Struct(a, x), Type::Struct(b, y)) => {
             Rc::ptr_eq(a, b)
                 && x.iter().zip(y.iter()).all(|(x, y)| match (x, y) {
-                    (Generic::Type(x), Generic::Type(y)) => fits(x, y),
+                    (Generic::Type(x), Generic::Type(y)) => may_be_equal(x, y),
                     (Generic::Const(x), Generic::Const(y)) => x.value == y.value,
                     _ => true,
                 })
@@ -385,7 +387,7 @@ fn fits(a: &Type, b: &Type) -> bool {
         (Type::Matrix(r, c), Type::Matrix(s, d)) => {
             (r.is_none() || s.is_none() || r == s) && (c.is_none() || d.is_none() || c == d)
         }
-        (Type::Option(a), Type::Option(b)) => fits(a, b),
+        (Type::Option(a), Type::Option(b)) => may_be_equal(a, b),
         _ => false,
     }
 }

@@ -21,18 +21,18 @@ fn context(ident: &Ident) -> String {
 }
 
 /// Gives variables of the same name and different contexts different names.
-pub fn separate(item: &mut syn::Item) {
-    let mut names = Names::default();
+pub fn separate_contexts(item: &mut syn::Item) {
+    let mut names = ContextCollector::default();
     names.visit_item(item);
     names.bound.retain(|name, _| names.used.get(name).is_some_and(|contexts| contexts.len() > 1));
     if names.bound.is_empty() {
         return;
     }
-    Rename { bound: names.bound }.visit_item_mut(item);
+    ContextRenamer { bound: names.bound }.visit_item_mut(item);
 }
 
 #[derive(Default)]
-struct Names {
+struct ContextCollector {
     /// Contexts in which a name is a variable; the arguments' names keep their text.
     bound: HashMap<String, HashSet<String>>,
     /// Contexts in which it occurs.
@@ -41,13 +41,13 @@ struct Names {
     arguments: bool,
 }
 
-impl Names {
+impl ContextCollector {
     fn uses(&mut self, ident: &Ident) {
         self.used.entry(ident.to_string()).or_default().insert(context(ident));
     }
 }
 
-impl<'ast> Visit<'ast> for Names {
+impl<'ast> Visit<'ast> for ContextCollector {
     fn visit_ident(&mut self, ident: &'ast Ident) {
         self.uses(ident);
     }
@@ -82,11 +82,11 @@ impl<'ast> Visit<'ast> for Names {
     }
 }
 
-struct Rename {
+struct ContextRenamer {
     bound: HashMap<String, HashSet<String>>,
 }
 
-impl Rename {
+impl ContextRenamer {
     /// The name of a variable of this context.
     fn rename(&self, ident: &mut Ident) {
         let Some(contexts) = self.bound.get(&ident.to_string()) else { return };
@@ -123,7 +123,7 @@ impl Rename {
     }
 }
 
-impl VisitMut for Rename {
+impl VisitMut for ContextRenamer {
     fn visit_pat_ident_mut(&mut self, pattern: &mut syn::PatIdent) {
         self.rename(&mut pattern.ident);
         visit_mut::visit_pat_ident_mut(self, pattern);

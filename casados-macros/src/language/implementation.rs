@@ -33,7 +33,7 @@ enum Member {
 
 impl Evaluator {
     /// An `impl` block.
-    pub(super) fn implementation(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
+    pub(super) fn register_impl(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
         let members = item.items.iter().filter_map(|entry| match entry {
             syn::ImplItem::Fn(function) => Some(Member::Function(
                 function.modifiers.clone(),

@@ -2,7 +2,7 @@
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
-use super::modules::{Module, module_of, names_of};
+use super::modules::{Module, module_of, module_path};
 use super::units;
 use super::value::{Definition, Style, Value, Variant};
 use std::cell::{OnceCell, RefCell};
@@ -95,7 +95,7 @@ impl Evaluator {
         module: Module,
     ) -> Result<Rc<Scope>> {
         // What is around a module is not seen in it.
-        self.items_of(items, &Rc::default(), Some(module))
+        self.declare_items(items, &Rc::default(), Some(module))
     }
 
     /// The scope of the items of a block inside of another; `impl` blocks are known from now on.
@@ -104,10 +104,10 @@ impl Evaluator {
         items: impl Iterator<Item = &'a syn::Item> + Clone,
         parent: &Rc<Scope>,
     ) -> Result<Rc<Scope>> {
-        self.items_of(items, parent, None)
+        self.declare_items(items, parent, None)
     }
 
-    fn items_of<'a>(
+    fn declare_items<'a>(
         &mut self,
         items: impl Iterator<Item = &'a syn::Item> + Clone,
         parent: &Rc<Scope>,
@@ -118,7 +118,7 @@ impl Evaluator {
         for item in items.clone() {
             self.item(item, parent, &mut names, &mut definitions)?;
         }
-        let scope = Scope::inside(parent, Names::Items(Box::new(names)));
+        let scope = Scope::child_scope(parent, Names::Items(Box::new(names)));
         if let Names::Items(names) = &scope.names
             && let Some(around) = module_of(&scope)
         {
@@ -145,7 +145,7 @@ impl Evaluator {
         self.scopes.push(scope.clone());
         for item in items {
             match item {
-                syn::Item::Impl(item) => self.implementation(item, &scope),
+                syn::Item::Impl(item) => self.register_impl(item, &scope),
                 syn::Item::Trait(item) => self.defaults(item, &scope),
                 _ => {}
             }
@@ -215,7 +215,8 @@ impl Evaluator {
                 let Some((_, content)) = &item.content else {
                     return Err(unsupported(item, "a module in another file"));
                 };
-                let around = names.module.as_ref().map_or_else(|| names_of(parent), |module| &module.names);
+                let around =
+                    names.module.as_ref().map_or_else(|| module_path(parent), |module| &module.names);
                 let path = around.iter().cloned().chain([item.ident.to_string()]).collect();
                 let scope = self.module(content.iter(), Module { names: path, ..Module::default() })?;
                 let name = self.symbol(&item.ident);
@@ -269,7 +270,7 @@ impl Evaluator {
     fn is_local(&mut self, tree: &syn::UseTree, scope: &Rc<Scope>) -> bool {
         let syn::UseTree::Path(tree) = tree else { return false };
         let first = self.symbol(&tree.ident);
-        scope.chain().any(|scope| match &scope.names {
+        scope.enclosing_scopes().any(|scope| match &scope.names {
             Names::Items(items) => items.types.contains_key(&first) || items.modules.contains_key(&first),
             _ => false,
         })
@@ -305,7 +306,7 @@ impl Evaluator {
         let saved = std::mem::replace(&mut self.scope, scope.clone());
         let value = self.expression(expression, &ty);
         self.scope = saved;
-        let value = self.finished(value, expression)?;
+        let value = self.into_value(value, expression)?;
         self.coerce(value, &ty, expression)
     }
 }

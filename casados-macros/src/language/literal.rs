@@ -1,7 +1,7 @@
 //! Literals: numbers, arrays, structs.
 
-use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
-use super::path::Named;
+use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, unsupported};
+use super::path::PathMeaning;
 use super::types::Type;
 use super::value::{Integer, IntegerType, Struct, Value};
 use quote::ToTokens;
@@ -28,7 +28,7 @@ impl Evaluator {
                 let ty = match (int.suffix(), expected) {
                     ("", Type::Integer(ty)) => Some(*ty),
                     ("", _) => None,
-                    (suffix, _) => IntegerType::named(suffix),
+                    (suffix, _) => IntegerType::by_name(suffix),
                 };
                 Ok(Value::Integer(Integer { value, ty }))
             }
@@ -41,7 +41,7 @@ impl Evaluator {
         }
     }
 
-    fn float_literal(&mut self, digits: &str, suffix: &str, at: At) -> Evaluated {
+    fn float_literal(&mut self, digits: &str, suffix: &str, at: TokenSpan) -> Evaluated {
         if !suffix.is_empty() && suffix != "f64" {
             return Err(error(at, format!("models are computed in `f64`, not in `{suffix}`")).into());
         }
@@ -72,7 +72,7 @@ impl Evaluator {
                 self.usize(&value, length)?
             }
         };
-        self.tick(length, repeat)?;
+        self.count_steps(length, repeat)?;
         Ok(Value::array(vec![value; length]))
     }
 
@@ -86,7 +86,7 @@ impl Evaluator {
             let last = prefix.segments.pop();
             ty = self.resolve_path(&prefix, &scope, 0)?;
             if let (Type::Struct(definition, _), Some(last)) = (&ty, last) {
-                match super::path::position(definition, &last.ident.to_string()) {
+                match super::path::variant_index(definition, &last.ident.to_string()) {
                     Some(index) => variant = index,
                     None => return Err(error(&literal.path, format!("`{name}` is no variant")).into()),
                 }
@@ -95,7 +95,7 @@ impl Evaluator {
         if !matches!(ty, Type::Struct(..)) {
             // A variant that a `use` has brought here.
             let path = syn::ExprPath { attrs: Vec::new(), qself: None, path: literal.path.clone() };
-            if let Named::Value(Value::Constructor(owner, index)) = self.named(&path)? {
+            if let PathMeaning::Value(Value::Constructor(owner, index)) = self.path_meaning(&path)? {
                 (ty, variant) = (owner, index);
             }
         }
@@ -130,7 +130,7 @@ impl Evaluator {
         if let Some(rest) = &literal.rest {
             let own = Type::Struct(definition.clone(), arguments.clone());
             let value = self.expression(rest, &own)?;
-            match self.load(value, rest)? {
+            match self.follow_value(value, rest)? {
                 Value::Struct(structure) if Rc::ptr_eq(&structure.definition, &definition) => {
                     for (field, value) in fields.iter_mut().zip(&structure.fields) {
                         if matches!(field, Value::Uninitialised) {
@@ -139,7 +139,7 @@ impl Evaluator {
                     }
                 }
                 other => {
-                    let message = format!("expected a `{}`, found {}", definition.name, other.kind());
+                    let message = format!("expected a `{}`, found {}", definition.name, other.description());
                     return Err(error(rest, message).into());
                 }
             }

@@ -4,9 +4,9 @@ use syn::{Error, Result};
 
 /// The mistakes found so far.
 #[derive(Default)]
-pub struct Mistakes(Option<Error>);
+pub struct CollectedErrors(Option<Error>);
 
-impl Mistakes {
+impl CollectedErrors {
     /// One more.
     pub fn note(&mut self, error: Error) {
         match &mut self.0 {
@@ -16,7 +16,7 @@ impl Mistakes {
     }
 
     /// An error if there is any.
-    pub fn none(self) -> Result<()> {
+    pub fn into_result(self) -> Result<()> {
         self.0.map_or(Ok(()), Err)
     }
 }

@@ -5,6 +5,7 @@ mod access;
 mod arithmetic;
 mod assignment;
 mod attribute;
+mod augmented_states;
 mod branch;
 mod call;
 mod closure;
@@ -15,7 +16,6 @@ mod duration;
 mod environment;
 mod evaluator;
 mod expression;
-mod extension;
 mod flatten;
 mod function;
 mod generics;
@@ -48,7 +48,7 @@ mod value;
 
 use crate::graph::{Graph, Node};
 use attribute::Arguments;
-pub use extension::Extra;
+pub use augmented_states::Extra;
 use model::Template;
 use proc_macro2::{Span, TokenStream};
 pub use reduction::{Rates, Reduction};
@@ -68,7 +68,7 @@ pub enum Form {
 
 impl Form {
     /// The attribute of a name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn by_name(name: &str) -> Option<Self> {
         Some(match name {
             "dae" => Self::Dae,
             "ode" => Self::Ode,
@@ -78,7 +78,7 @@ impl Form {
     }
 
     /// What the function is, with its article.
-    pub fn what(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Dae | Self::Ode => "a model",
             Self::Function => "a function of a model's variables",
@@ -102,13 +102,13 @@ pub struct Source {
     /// Where the generated items go.
     pub place: Place,
     /// The function; of a module those with attributes of their own too.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ModelOrFunctions>,
     /// Items at which the compiler warns of what is right, but hardly meant.
     pub warnings: TokenStream,
 }
 
 /// What a function is read as.
-pub struct Part {
+pub struct ModelOrFunctions {
     /// Which attribute.
     pub form: Form,
     /// Name of the function, or of the module that it stands for.
@@ -198,7 +198,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
     let arguments = Arguments::read(attribute)?;
     let written = item.clone();
     let mut parsed = syn::parse2(tokens::without_tests(item))?;
-    hygiene::separate(&mut parsed);
+    hygiene::separate_contexts(&mut parsed);
     let warnings = division::warnings(&parsed);
     match parsed {
         syn::Item::Fn(function) => {
@@ -212,24 +212,28 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 krate: arguments.path(),
             };
             let models = models(&arguments, &template)?;
-            let part = Part { form, original: function.sig.ident.clone(), models };
+            let part = ModelOrFunctions { form, original: function.sig.ident.clone(), models };
             Ok(Source { item: written, place: Place::Beside, parts: vec![part], warnings })
         }
         syn::Item::Mod(module) => {
-            let parts = parts(form, &arguments, module)?;
+            let parts = model_and_functions(form, &arguments, module)?;
             let item = tokens::without_attributes(written);
             Ok(Source { item, place: Place::Inside, parts, warnings })
         }
         other => Err(syn::Error::new_spanned(
             other,
-            format!("{} is a function, or a module with a function in it", form.what()),
+            format!("{} is a function, or a module with a function in it", form.description()),
         )),
     }
 }
 
 /// The model of a module, and its functions with attributes of their own.
-fn parts(form: Form, arguments: &Arguments, mut module: syn::ItemMod) -> syn::Result<Vec<Part>> {
-    let marked = module::marked(&mut module);
+fn model_and_functions(
+    form: Form,
+    arguments: &Arguments,
+    mut module: syn::ItemMod,
+) -> syn::Result<Vec<ModelOrFunctions>> {
+    let marked = module::take_attributed_functions(&mut module);
     let index = module::model_function(form, &mut module, &marked)?;
     let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
     let template = |form, index: usize, named: Option<&syn::ItemMod>, own: &Arguments| match items.get(index)
@@ -251,12 +255,12 @@ fn parts(form: Form, arguments: &Arguments, mut module: syn::ItemMod) -> syn::Re
     match index {
         Some(index) => {
             let models = models(arguments, &template(form, index, Some(&module), arguments)?)?;
-            parts.push(Part { form, original: module.ident.clone(), models });
+            parts.push(ModelOrFunctions { form, original: module.ident.clone(), models });
         }
-        None => arguments.without_model(&module.ident)?,
+        None => arguments.reject_model_arguments(&module.ident)?,
     }
-    let mut mistakes = mistakes::Mistakes::default();
-    for module::Marked { index, form, attribute } in marked {
+    let mut mistakes = mistakes::CollectedErrors::default();
+    for module::AttributedFunction { index, form, attribute } in marked {
         let part = Arguments::read(attribute).and_then(|own| {
             let Some(syn::Item::Fn(function)) = items.get(index) else { return Ok(None) };
             let mut own = own;
@@ -264,20 +268,20 @@ fn parts(form: Form, arguments: &Arguments, mut module: syn::ItemMod) -> syn::Re
                 own.extension = own.extension.or(&arguments.extension);
             }
             let models = models(&own, &template(form, index, None, &own)?)?;
-            Ok(Some(Part { form, original: function.sig.ident.clone(), models }))
+            Ok(Some(ModelOrFunctions { form, original: function.sig.ident.clone(), models }))
         });
         match part {
             Ok(part) => parts.extend(part),
             Err(error) => mistakes.note(error),
         }
     }
-    mistakes.none()?;
+    mistakes.into_result()?;
     Ok(parts)
 }
 
 fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
     if template.form == Form::Function {
-        arguments.without_settings("a function")?;
+        arguments.reject_settings("a function")?;
     }
     if template.form != Form::Dae
         && let Some(reduction) = &arguments.reduction
@@ -289,7 +293,7 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
     }
     let instances = arguments.instances(&template.function.sig.generics)?;
     let model = |instance| {
-        let mut model = template.model(instance, &arguments.extension)?;
+        let mut model = template.instantiate(instance, &arguments.extension)?;
         model.samplings = arguments.samplings(&model.variables)?;
         model.reduction.clone_from(&arguments.reduction);
         if let Some(duration) = &arguments.duration {
@@ -301,10 +305,10 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
 }
 
 /// The functions of a module with attributes of their own, and what stands in these.
-pub fn marked(module: &mut syn::ItemMod) -> Vec<(syn::Signature, TokenStream)> {
-    let marked = module::marked(module);
+pub fn attributed_functions(module: &mut syn::ItemMod) -> Vec<(syn::Signature, TokenStream)> {
+    let marked = module::take_attributed_functions(module);
     let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
-    let signature = |marked: module::Marked| match items.get(marked.index) {
+    let signature = |marked: module::AttributedFunction| match items.get(marked.index) {
         Some(syn::Item::Fn(function)) => Some((function.sig.clone(), marked.attribute)),
         _ => None,
     };

@@ -1,12 +1,12 @@
 //! From a model function, and the items around it, to a graph: the variables are made, the function
 //! is called with them, and the numbers that it returns are the residual.
 
+use super::augmented_states::{AugmentedStates, Extra};
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
-use super::extension::{Extension, Extra};
 use super::flatten;
 use super::label::Label;
-use super::mistakes::Mistakes;
+use super::mistakes::CollectedErrors;
 use super::modules::Module;
 use super::place::Place;
 use super::signature::{self, Argument, Role};
@@ -38,7 +38,7 @@ pub struct Template<'a> {
 
 impl Template<'_> {
     /// The model with these values of the const parameters.
-    pub fn model(&self, instance: Vec<Instance>, extension: &Extension) -> Result<Model> {
+    pub fn instantiate(&self, instance: Vec<Instance>, extension: &AugmentedStates) -> Result<Model> {
         let arguments = signature::arguments(self.form, self.function)?;
         let mut evaluator = Evaluator::default();
         let items = evaluator.module(self.items.iter(), Module::default())?;
@@ -50,7 +50,7 @@ impl Template<'_> {
                 (evaluator.symbol(&parameter.name), Place::new(Value::Integer(*value)).cell)
             })
             .collect();
-        let scope = Scope::inside(&items, Names::Variables(parameters));
+        let scope = Scope::child_scope(&items, Names::Variables(parameters));
         let (variables, units, values) = self.variables(&arguments, &mut evaluator, &scope)?;
         let generics: Vec<Generic> = turbofish.into_iter().map(Generic::Const).collect();
         let callable = |item: &ItemFn| {
@@ -68,7 +68,7 @@ impl Template<'_> {
             let value = evaluator.call(&callable(&integrand), values.clone(), &integrand.sig.ident)?;
             rates.extend(evaluator.flatten(&value, &integrand.sig.output)?);
         }
-        let more = self.more(&arguments, &mut evaluator, &scope)?;
+        let more = self.extra_argument_lengths(&arguments, &mut evaluator, &scope)?;
         extension.check(self.function, variables.u.len(), more)?;
         let value = evaluator.call(&function, values, &self.function.sig.ident)?;
         let numbers = evaluator.flatten(&value, &self.function.sig.output)?;
@@ -104,12 +104,12 @@ impl Template<'_> {
             uses: evaluator.uses,
             krate: self.krate.clone(),
         };
-        extension.apply(&mut model, &rates, more)?;
+        extension.add_states(&mut model, &rates, more)?;
         Ok(model)
     }
 
     /// How long the arguments `du` and `q` are.
-    fn more(
+    fn extra_argument_lengths(
         &self,
         arguments: &[Argument],
         evaluator: &mut Evaluator,
@@ -130,8 +130,9 @@ impl Template<'_> {
         scope: &Rc<Scope>,
     ) -> Result<(Variables, Units, Vec<Value>)> {
         let (types, labels) = types_and_labels(arguments, evaluator, scope)?;
-        let names: Vec<Vec<String>> = labels.iter().map(|list| each(list, |label| &label.name)).collect();
-        let variables = self.named(arguments, &names)?;
+        let names: Vec<Vec<String>> =
+            labels.iter().map(|list| label_texts(list, |label| &label.name)).collect();
+        let variables = self.variable_names(arguments, &names)?;
         let units = units(arguments, &labels).with_documentation(&self.documentation, &variables);
         let mut values = Vec::new();
         let of_du = arguments.iter().position(|argument| argument.role == Role::Du);
@@ -154,7 +155,7 @@ impl Template<'_> {
     }
 
     /// The variables by their names in each argument.
-    fn named(&self, arguments: &[Argument], names: &[Vec<String>]) -> Result<Variables> {
+    fn variable_names(&self, arguments: &[Argument], names: &[Vec<String>]) -> Result<Variables> {
         let names_of = |role: Role| {
             let position = arguments.iter().position(|argument| argument.role == role);
             position.map_or_else(Vec::new, |position| names[position].clone())
@@ -181,8 +182,8 @@ impl Template<'_> {
                         &argument.ty,
                         format!(
                             "`xdot` has {} and `x` has {}: they must have the same type",
-                            numbers(list.len()),
-                            numbers(variables.x.len())
+                            count_in_words(list.len()),
+                            count_in_words(variables.x.len())
                         ),
                     ));
                 }
@@ -211,14 +212,14 @@ impl Template<'_> {
         let message = match self.form {
             Form::Dae | Form::Function if nz == 0 => format!(
                 "the residual has {}, but `x` has {nx}: return one equation for each state",
-                numbers(residual.len())
+                count_in_words(residual.len())
             ),
             Form::Dae | Form::Function => format!(
                 "the residual has {}, but `x` and `z` have {nx} + {nz}: return one equation for each state",
-                numbers(residual.len())
+                count_in_words(residual.len())
             ),
             Form::Ode => {
-                format!("`x` has {}, but {} of `xdot` are returned", numbers(nx), residual.len())
+                format!("`x` has {}, but {} of `xdot` are returned", count_in_words(nx), residual.len())
             }
         };
         match &self.function.sig.output {
@@ -228,7 +229,7 @@ impl Template<'_> {
     }
 }
 
-fn each(labels: &[Label], text: impl Fn(&Label) -> &String) -> Vec<String> {
+fn label_texts(labels: &[Label], text: impl Fn(&Label) -> &String) -> Vec<String> {
     labels.iter().map(text).cloned().collect()
 }
 
@@ -236,7 +237,7 @@ fn each(labels: &[Label], text: impl Fn(&Label) -> &String) -> Vec<String> {
 fn units(arguments: &[Argument], labels: &[Vec<Label>]) -> Units {
     let of = |role: Role| {
         let position = arguments.iter().position(|argument| argument.role == role)?;
-        Some(each(labels.get(position)?, |label| &label.unit))
+        Some(label_texts(labels.get(position)?, |label| &label.unit))
     };
     let all = |role: Role| of(role).unwrap_or_default();
     let x = of(Role::X).unwrap_or_else(|| all(Role::Xdot));
@@ -252,7 +253,7 @@ fn types_and_labels(
 ) -> Result<(Vec<Type>, Vec<Vec<Label>>)> {
     let mut types = Vec::new();
     let mut labels = Vec::new();
-    let mut mistakes = Mistakes::default();
+    let mut mistakes = CollectedErrors::default();
     for argument in arguments {
         let ty = match evaluator.resolve(&argument.ty, scope) {
             Ok(ty) => ty,
@@ -277,12 +278,12 @@ fn types_and_labels(
         types.push(ty);
         labels.push(list);
     }
-    mistakes.none()?;
+    mistakes.into_result()?;
     Ok((types, labels))
 }
 
 /// So many numbers, in words.
-pub(super) fn numbers(n: usize) -> String {
+pub(super) fn count_in_words(n: usize) -> String {
     if n == 1 { "1 number".to_owned() } else { format!("{n} numbers") }
 }
 
@@ -303,7 +304,9 @@ fn offset(Variables { x, z, u, p }: &Variables, role: Role) -> u32 {
 /// The value of a const parameter, as an integer of its type.
 fn integer(parameter: &Instance) -> Result<Integer> {
     let ty = match &parameter.ty {
-        syn::Type::Path(path) => path.path.get_ident().and_then(|name| IntegerType::named(&name.to_string())),
+        syn::Type::Path(path) => {
+            path.path.get_ident().and_then(|name| IntegerType::by_name(&name.to_string()))
+        }
         _ => None,
     };
     let Some(ty) = ty else {

@@ -7,7 +7,7 @@ use proc_macro2::TokenStream;
 use syn::{Error, FnArg, Item, ItemFn, ItemMod, Meta, Pat, Result};
 
 /// A function of a module with an attribute of its own.
-pub struct Marked {
+pub struct AttributedFunction {
     /// Its index among the items.
     pub index: usize,
     /// Which attribute.
@@ -17,7 +17,7 @@ pub struct Marked {
 }
 
 /// Takes `#[dae]`, `#[ode]` and `#[function]` off the functions of a module that bear them.
-pub fn marked(module: &mut ItemMod) -> Vec<Marked> {
+pub fn take_attributed_functions(module: &mut ItemMod) -> Vec<AttributedFunction> {
     let items = module.content.iter_mut().flat_map(|(_, items)| items);
     let functions = items.enumerate().filter_map(|(index, item)| match item {
         Item::Fn(function) => Some((index, function)),
@@ -27,12 +27,12 @@ pub fn marked(module: &mut ItemMod) -> Vec<Marked> {
     for (index, function) in functions {
         function.attrs.retain(|attribute| {
             let last = attribute.path().segments.last().map(|segment| segment.ident.to_string());
-            let Some(form) = last.as_deref().and_then(Form::named) else { return true };
+            let Some(form) = last.as_deref().and_then(Form::by_name) else { return true };
             let attribute = match &attribute.meta {
                 Meta::List(list) => list.tokens.clone(),
                 _ => TokenStream::new(),
             };
-            list.push(Marked { index, form, attribute });
+            list.push(AttributedFunction { index, form, attribute });
             false
         });
     }
@@ -43,7 +43,11 @@ pub fn marked(module: &mut ItemMod) -> Vec<Marked> {
 /// function among the items: the marked one; or the only one whose arguments are those of a model;
 /// or, of several, the one that is named like the module. Functions with an attribute of their own
 /// are not meant; where they are models and no other is, there is none.
-pub fn model_function(form: Form, module: &mut ItemMod, others: &[Marked]) -> Result<Option<usize>> {
+pub fn model_function(
+    form: Form,
+    module: &mut ItemMod,
+    others: &[AttributedFunction],
+) -> Result<Option<usize>> {
     let name = module.ident.clone();
     let Some((_, items)) = &mut module.content else {
         return Err(Error::new_spanned(

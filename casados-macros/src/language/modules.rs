@@ -16,7 +16,7 @@ pub struct Module {
 }
 
 /// Where a path to a module leads.
-pub(super) enum Lead {
+pub(super) enum PathTarget {
     /// To a module that the macro sees.
     Module(Rc<Scope>),
     /// Out of them, or to something else: a crate, a type.
@@ -24,10 +24,10 @@ pub(super) enum Lead {
 }
 
 /// The modules that a search has been in, so that it ends where each of two uses the other.
-pub(super) type Trail = Vec<*const Scope>;
+pub(super) type VisitedModules = Vec<*const Scope>;
 
 /// `use` items that lead to each other are followed so far.
-pub(super) const LINKS: usize = 64;
+pub(super) const MAX_USE_LINKS: usize = 64;
 
 /// The items of a scope, if it has any.
 fn items(scope: &Scope) -> Option<&Items> {
@@ -39,11 +39,11 @@ fn items(scope: &Scope) -> Option<&Items> {
 
 /// The innermost module around a scope.
 pub(super) fn module_of(scope: &Rc<Scope>) -> Option<&Rc<Scope>> {
-    scope.chain().find(|scope| items(scope).is_some_and(|items| items.module.is_some()))
+    scope.enclosing_scopes().find(|scope| items(scope).is_some_and(|items| items.module.is_some()))
 }
 
 /// The names from the outermost module that the macro sees to the one around a scope.
-pub(super) fn names_of(scope: &Rc<Scope>) -> &[String] {
+pub(super) fn module_path(scope: &Rc<Scope>) -> &[String] {
     let module = module_of(scope).and_then(|module| items(module)).and_then(|items| items.module.as_ref());
     module.map_or(&[], |module| &module.names)
 }
@@ -55,14 +55,14 @@ fn around(scope: &Rc<Scope>) -> Option<Rc<Scope>> {
 }
 
 /// The full path of a name that a `use` has brought here, and where that stands.
-pub(super) fn used(scope: &Rc<Scope>, name: Symbol) -> Option<(Vec<String>, Rc<Scope>)> {
-    scope.chain().find_map(|scope| Some((items(scope)?.uses.get(&name)?.clone(), scope.clone())))
+pub(super) fn used_path(scope: &Rc<Scope>, name: Symbol) -> Option<(Vec<String>, Rc<Scope>)> {
+    scope.enclosing_scopes().find_map(|scope| Some((items(scope)?.uses.get(&name)?.clone(), scope.clone())))
 }
 
 /// The path from the outermost module that the macro sees, of one that begins with `self` or
 /// `super` in an inner one.
 pub(super) fn from_outermost(path: Vec<String>, scope: &Rc<Scope>) -> Vec<String> {
-    let names = names_of(scope);
+    let names = module_path(scope);
     let steps = path.iter().take_while(|name| matches!(name.as_str(), "self" | "super")).count();
     if names.is_empty() || steps == 0 {
         return path;
@@ -78,7 +78,12 @@ pub(super) fn from_outermost(path: Vec<String>, scope: &Rc<Scope>) -> Vec<String
 
 impl Evaluator {
     /// Where the names of a path lead that is written in a scope.
-    pub(super) fn lead(&mut self, names: &[String], scope: &Rc<Scope>, trail: &mut Trail) -> Lead {
+    pub(super) fn resolve_module_path(
+        &mut self,
+        names: &[String],
+        scope: &Rc<Scope>,
+        trail: &mut VisitedModules,
+    ) -> PathTarget {
         let mut current: Option<Rc<Scope>> = None;
         let mut names = names;
         while let Some((first, rest)) = names.split_first() {
@@ -88,44 +93,45 @@ impl Evaluator {
                 "crate" => None,
                 _ => break,
             };
-            let Some(next) = next else { return Lead::Elsewhere };
+            let Some(next) = next else { return PathTarget::Elsewhere };
             (current, names) = (Some(next), rest);
         }
         for name in names {
             let symbol = self.symbol_of(name);
             let place = current.as_ref().unwrap_or(scope);
-            let module = place.chain().find_map(|scope| items(scope)?.modules.get(&symbol).cloned());
-            let next = match (module, used(place, symbol)) {
+            let module =
+                place.enclosing_scopes().find_map(|scope| items(scope)?.modules.get(&symbol).cloned());
+            let next = match (module, used_path(place, symbol)) {
                 (Some(module), _) => module,
-                (None, Some((full, place))) if trail.len() < LINKS => {
+                (None, Some((full, place))) if trail.len() < MAX_USE_LINKS => {
                     trail.push(Rc::as_ptr(&place));
-                    match self.lead(&full, &place, trail) {
-                        Lead::Module(module) => module,
-                        Lead::Elsewhere => return Lead::Elsewhere,
+                    match self.resolve_module_path(&full, &place, trail) {
+                        PathTarget::Module(module) => module,
+                        PathTarget::Elsewhere => return PathTarget::Elsewhere,
                     }
                 }
-                _ => return Lead::Elsewhere,
+                _ => return PathTarget::Elsewhere,
             };
             current = Some(next);
         }
-        current.map_or(Lead::Elsewhere, Lead::Module)
+        current.map_or(PathTarget::Elsewhere, PathTarget::Module)
     }
 
     /// The type that a path leads to, and where it stands.
-    pub(super) fn seen_type(
+    pub(super) fn resolve_type(
         &mut self,
         path: &[String],
         scope: &Rc<Scope>,
-        trail: &mut Trail,
+        trail: &mut VisitedModules,
     ) -> Option<(TypeItem, Rc<Scope>)> {
         let (last, modules) = path.split_last()?;
         let symbol = self.symbol_of(last);
-        let place = match self.lead(modules, scope, trail) {
-            Lead::Module(module) => module,
-            Lead::Elsewhere if modules.is_empty() => scope.clone(),
-            Lead::Elsewhere => return None,
+        let place = match self.resolve_module_path(modules, scope, trail) {
+            PathTarget::Module(module) => module,
+            PathTarget::Elsewhere if modules.is_empty() => scope.clone(),
+            PathTarget::Elsewhere => return None,
         };
-        let places: Vec<_> = place.chain().cloned().collect();
+        let places: Vec<_> = place.enclosing_scopes().cloned().collect();
         places.iter().find_map(|place| self.type_in(symbol, place, trail))
     }
 
@@ -134,21 +140,21 @@ impl Evaluator {
         &mut self,
         symbol: Symbol,
         scope: &Rc<Scope>,
-        trail: &mut Trail,
+        trail: &mut VisitedModules,
     ) -> Option<(TypeItem, Rc<Scope>)> {
         let items = items(scope)?;
         if let Some(item) = items.types.get(&symbol) {
             return Some((item.clone(), scope.clone()));
         }
-        if trail.len() >= LINKS {
+        if trail.len() >= MAX_USE_LINKS {
             return None;
         }
         if let Some(full) = items.uses.get(&symbol) {
             trail.push(Rc::as_ptr(scope));
-            return self.seen_type(full, scope, trail);
+            return self.resolve_type(full, scope, trail);
         }
         for glob in &items.globs {
-            let Lead::Module(module) = self.lead(glob, scope, trail) else { continue };
+            let PathTarget::Module(module) = self.resolve_module_path(glob, scope, trail) else { continue };
             if trail.contains(&Rc::as_ptr(&module)) {
                 continue;
             }
@@ -163,7 +169,7 @@ impl Evaluator {
     /// A `use` as generated code needs it, which stands in the outermost module: of one in an inner
     /// module nothing but globs, as other names have full paths.
     pub(super) fn emitted_use(&mut self, item: &syn::ItemUse, scope: &Rc<Scope>) -> Option<syn::ItemUse> {
-        let names = names_of(scope);
+        let names = module_path(scope);
         if names.is_empty() {
             return Some(item.clone());
         }

@@ -19,12 +19,12 @@ impl Evaluator {
         }
         let innermost = spine[spine.len() - 1];
         if operator(&innermost.op).is_none() {
-            return self.other_binary(innermost);
+            return self.comparison_or_assignment(innermost);
         }
         let expected = expected.scalar();
         let mut value = self.expression(&innermost.left, &expected)?;
         for binary in spine.into_iter().rev() {
-            self.tick(1, binary)?;
+            self.count_steps(1, binary)?;
             let operator = operator(&binary.op).unwrap_or(Operator::Add);
             let shift = matches!(operator, Operator::Shl | Operator::Shr);
             let hint = match (&value, &expected) {
@@ -39,7 +39,7 @@ impl Evaluator {
     }
 
     /// Comparisons, `&&`, `||`, compound assignments.
-    fn other_binary(&mut self, binary: &syn::ExprBinary) -> Evaluated {
+    fn comparison_or_assignment(&mut self, binary: &syn::ExprBinary) -> Evaluated {
         if let Some(operator) = assignment_operator(&binary.op) {
             return self.compound_assignment(operator, binary);
         }
@@ -66,7 +66,7 @@ impl Evaluator {
             Truth::Known(known) if known != and => Ok(Value::Bool(known)),
             Truth::Known(_) => {
                 let right = self.expression(&binary.right, &Type::Bool)?;
-                Ok(self.load(right, &binary.right)?)
+                Ok(self.follow_value(right, &binary.right)?)
             }
             Truth::When(node) => {
                 // The right side is executed only if the left one says so; what it changes depends
@@ -75,7 +75,7 @@ impl Evaluator {
                 let result = self.branch(|evaluator| evaluator.expression(&binary.right, &Type::Bool));
                 self.scope = saved;
                 let (right, changes) = result?;
-                let right = self.load(right, &binary.right)?;
+                let right = self.follow_value(right, &binary.right)?;
                 let taken = if and { node } else { self.graph.not(node) };
                 self.merge(taken, changes, Vec::new(), binary)?;
                 let left = Value::Condition(node);

@@ -1,11 +1,11 @@
 //! What paths stand for: variables, items, associated functions and constants, built-in functions.
 
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator};
+use super::evaluator::{Evaluated, Evaluator, TokenSpan};
 use super::implementation::Implementation;
 use super::items::{Symbol, TypeItem, ValueItem};
 use super::methods;
-use super::modules::{LINKS, Lead, Trail, from_outermost, names_of, used};
+use super::modules::{MAX_USE_LINKS, PathTarget, VisitedModules, from_outermost, module_path, used_path};
 use super::place::Cell;
 use super::types::Type;
 use super::value::{Builtin, Definition, Function, Generic, Struct, Style, Value};
@@ -17,7 +17,7 @@ use syn::ext::IdentExt;
 use syn::parse::Parser;
 
 /// What a path stands for.
-pub enum Named {
+pub enum PathMeaning {
     /// A variable.
     Variable(Cell),
     /// A value: a constant or a function that the macro sees.
@@ -28,10 +28,14 @@ pub enum Named {
 
 impl Evaluator {
     /// What a path in an expression stands for.
-    pub(super) fn named(&mut self, path: &syn::ExprPath) -> Evaluated<Named> {
+    pub(super) fn path_meaning(&mut self, path: &syn::ExprPath) -> Evaluated<PathMeaning> {
         let scope = self.scope.clone();
         let Some(last) = path.path.segments.last() else {
-            return Ok(Named::Builtin(Builtin { owner: None, path: Vec::new(), turbofish: Vec::new() }));
+            return Ok(PathMeaning::Builtin(Builtin {
+                owner: None,
+                path: Vec::new(),
+                turbofish: Vec::new(),
+            }));
         };
         let name = self.symbol(&last.ident);
         if let Some(qself) = &path.qself {
@@ -44,19 +48,19 @@ impl Evaluator {
             if last.arguments.is_none()
                 && let Some(cell) = scope.variable(name)
             {
-                return Ok(Named::Variable(cell));
+                return Ok(PathMeaning::Variable(cell));
             }
             let turbofish = self.generic_arguments(&last.arguments, &scope)?;
-            return Ok(self.item_named(name, &last.ident, turbofish, &scope, &mut Vec::new())?);
+            return Ok(self.item_meaning(name, &last.ident, turbofish, &scope, &mut Vec::new())?);
         }
         let turbofish = self.generic_arguments(&last.arguments, &scope)?;
         let count = path.path.segments.len();
         let modules: Vec<_> =
             path.path.segments.iter().take(count - 1).map(|module| module.ident.to_string()).collect();
-        if let Lead::Module(module) = self.lead(&modules, &scope, &mut Vec::new()) {
-            return Ok(match self.item_named(name, &last.ident, turbofish, &module, &mut Vec::new())? {
-                Named::Builtin(builtin) if builtin.path.len() == 1 => {
-                    Named::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
+        if let PathTarget::Module(module) = self.resolve_module_path(&modules, &scope, &mut Vec::new()) {
+            return Ok(match self.item_meaning(name, &last.ident, turbofish, &module, &mut Vec::new())? {
+                PathMeaning::Builtin(builtin) if builtin.path.len() == 1 => {
+                    PathMeaning::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
                 }
                 named => named,
             });
@@ -67,14 +71,14 @@ impl Evaluator {
         let ty = self.resolve_path(&prefix, &scope, 0)?;
         if !matches!(ty, Type::Unknown) {
             return Ok(match self.member(&ty, false, &last.ident, turbofish, path)? {
-                Named::Builtin(builtin) => {
-                    Named::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
+                PathMeaning::Builtin(builtin) => {
+                    PathMeaning::Builtin(Builtin { path: self.full_path(&path.path, &scope), ..builtin })
                 }
                 named => named,
             });
         }
         let full = self.full_path(&path.path, &scope);
-        Ok(Named::Builtin(Builtin { owner: None, path: full, turbofish }))
+        Ok(PathMeaning::Builtin(Builtin { owner: None, path: full, turbofish }))
     }
 
     /// The segments of a path, with a local `use` of the first one resolved, from the outermost
@@ -83,49 +87,49 @@ impl Evaluator {
         let mut segments = path.segments.iter().map(|segment| segment.ident.to_string());
         let first = segments.next().unwrap_or_default();
         let symbol = self.symbol_of(&first);
-        let (mut full, place) = used(scope, symbol).unwrap_or_else(|| (vec![first], scope.clone()));
+        let (mut full, place) = used_path(scope, symbol).unwrap_or_else(|| (vec![first], scope.clone()));
         full.extend(segments);
         from_outermost(full, &place)
     }
 
     /// An item of a scope.
-    fn item_named(
+    fn item_meaning(
         &mut self,
         name: Symbol,
         ident: &syn::Ident,
         turbofish: Vec<Generic>,
         scope: &Rc<Scope>,
-        trail: &mut Trail,
-    ) -> Result<Named> {
+        trail: &mut VisitedModules,
+    ) -> Result<PathMeaning> {
         if ident == "Self" {
             // `Self` of a unit or tuple struct.
             let path: syn::Path = ident.clone().into();
             if let Type::Struct(definition, arguments) = self.resolve_path(&path, scope, 0)? {
-                return Ok(Named::Value(constructor(definition, arguments, 0)));
+                return Ok(PathMeaning::Value(constructor(definition, arguments, 0)));
             }
         }
-        for around in scope.chain() {
+        for around in scope.enclosing_scopes() {
             let Names::Items(items) = &around.names else { continue };
             match items.values.get(&name) {
                 Some(ValueItem::Function(item)) => {
                     let function =
                         Function { item: item.clone(), scope: around.clone(), turbofish, owner: None };
-                    return Ok(Named::Value(Value::Function(Rc::new(function))));
+                    return Ok(PathMeaning::Value(Value::Function(Rc::new(function))));
                 }
                 Some(ValueItem::Constant(constant)) => {
                     let constant = constant.clone();
-                    return self.constant_value(&constant, around).map(Named::Value);
+                    return self.constant_value(&constant, around).map(PathMeaning::Value);
                 }
                 None => {}
             }
             match items.types.get(&name) {
                 Some(TypeItem::Definition(definition)) if !definition.is_enum => {
-                    return Ok(Named::Value(constructor(definition.clone(), Rc::new(turbofish), 0)));
+                    return Ok(PathMeaning::Value(constructor(definition.clone(), Rc::new(turbofish), 0)));
                 }
                 Some(TypeItem::Alias(_)) => {
                     let path: syn::Path = ident.clone().into();
                     if let Type::Struct(definition, arguments) = self.resolve_path(&path, scope, 0)? {
-                        return Ok(Named::Value(constructor(definition, arguments, 0)));
+                        return Ok(PathMeaning::Value(constructor(definition, arguments, 0)));
                     }
                 }
                 _ => {}
@@ -139,7 +143,7 @@ impl Evaluator {
                 }
             }
         }
-        Ok(Named::Builtin(Builtin { owner: None, path: vec![ident.to_string()], turbofish }))
+        Ok(PathMeaning::Builtin(Builtin { owner: None, path: vec![ident.to_string()], turbofish }))
     }
 
     /// What `use path::*;` brings under a name.
@@ -149,27 +153,31 @@ impl Evaluator {
         ident: &syn::Ident,
         turbofish: &[Generic],
         scope: &Rc<Scope>,
-        trail: &mut Trail,
-    ) -> Result<Option<Named>> {
-        if let Lead::Module(module) = self.lead(path, scope, trail) {
+        trail: &mut VisitedModules,
+    ) -> Result<Option<PathMeaning>> {
+        if let PathTarget::Module(module) = self.resolve_module_path(path, scope, trail) {
             if trail.contains(&Rc::as_ptr(&module)) {
                 return Ok(None);
             }
             trail.push(Rc::as_ptr(&module));
             let symbol = self.symbol(ident);
-            let named = self.item_named(symbol, ident, turbofish.to_vec(), &module, trail)?;
-            return Ok(Some(named).filter(|named| !matches!(named, Named::Builtin(_))));
+            let named = self.item_meaning(symbol, ident, turbofish.to_vec(), &module, trail)?;
+            return Ok(Some(named).filter(|named| !matches!(named, PathMeaning::Builtin(_))));
         }
         // `use Mode::*;`
-        if let Some((TypeItem::Definition(definition), _)) = self.seen_type(path, scope, &mut Vec::new())
+        if let Some((TypeItem::Definition(definition), _)) = self.resolve_type(path, scope, &mut Vec::new())
             && definition.is_enum
-            && let Some(variant) = position(&definition, &ident.to_string())
+            && let Some(variant) = variant_index(&definition, &ident.to_string())
         {
-            return Ok(Some(Named::Value(constructor(definition, Rc::new(turbofish.to_vec()), variant))));
+            return Ok(Some(PathMeaning::Value(constructor(
+                definition,
+                Rc::new(turbofish.to_vec()),
+                variant,
+            ))));
         }
         let path = path.iter().cloned().chain([ident.to_string()]).collect();
         let builtin = Builtin { owner: None, path, turbofish: Vec::new() };
-        Ok(methods::constant(self, &builtin).map(Named::Value))
+        Ok(methods::constant(self, &builtin).map(PathMeaning::Value))
     }
 
     /// What a path that was written in a `use` stands for.
@@ -178,28 +186,29 @@ impl Evaluator {
         full: Vec<String>,
         turbofish: Vec<Generic>,
         scope: &Rc<Scope>,
-        trail: &mut Trail,
-    ) -> Result<Named> {
+        trail: &mut VisitedModules,
+    ) -> Result<PathMeaning> {
         if let Some((name, owner)) = full.split_last()
-            && trail.len() < LINKS
+            && trail.len() < MAX_USE_LINKS
         {
-            if let Some((TypeItem::Definition(definition), _)) = self.seen_type(owner, scope, &mut Vec::new())
+            if let Some((TypeItem::Definition(definition), _)) =
+                self.resolve_type(owner, scope, &mut Vec::new())
                 && definition.is_enum
-                && let Some(variant) = position(&definition, name)
+                && let Some(variant) = variant_index(&definition, name)
             {
-                return Ok(Named::Value(constructor(definition, Rc::new(turbofish), variant)));
+                return Ok(PathMeaning::Value(constructor(definition, Rc::new(turbofish), variant)));
             }
-            if let Lead::Module(module) = self.lead(owner, scope, &mut Vec::new()) {
+            if let PathTarget::Module(module) = self.resolve_module_path(owner, scope, &mut Vec::new()) {
                 trail.push(Rc::as_ptr(scope));
                 let symbol = self.symbol_of(name);
                 let ident = quote::format_ident!("{name}");
-                match self.item_named(symbol, &ident, turbofish.clone(), &module, trail)? {
-                    Named::Builtin(builtin) if builtin.path.len() == 1 => {}
+                match self.item_meaning(symbol, &ident, turbofish.clone(), &module, trail)? {
+                    PathMeaning::Builtin(builtin) if builtin.path.len() == 1 => {}
                     named => return Ok(named),
                 }
             }
         }
-        Ok(Named::Builtin(Builtin { owner: None, path: from_outermost(full, scope), turbofish }))
+        Ok(PathMeaning::Builtin(Builtin { owner: None, path: from_outermost(full, scope), turbofish }))
     }
 
     /// An associated function or constant, or a variant.
@@ -209,40 +218,54 @@ impl Evaluator {
         of_trait: bool,
         ident: &syn::Ident,
         turbofish: Vec<Generic>,
-        at: At,
-    ) -> Result<Named> {
+        at: TokenSpan,
+    ) -> Result<PathMeaning> {
         let name = self.symbol(ident);
         let hidden = !of_trait && self.is_hidden(ty, &ident.to_string());
         if let Type::Struct(definition, arguments) = ty
             && definition.is_enum
-            && let Some(variant) = position(definition, &ident.to_string())
+            && let Some(variant) = variant_index(definition, &ident.to_string())
         {
-            return Ok(Named::Value(constructor(definition.clone(), arguments.clone(), variant)));
+            return Ok(PathMeaning::Value(constructor(definition.clone(), arguments.clone(), variant)));
         }
         if !hidden && let Some((implementation, item)) = self.find_function(name, ty) {
             let scope = implementation.scope.clone();
             let owner = Some((implementation, ty.clone()));
-            return Ok(Named::Value(Value::Function(Rc::new(Function { item, scope, turbofish, owner }))));
+            return Ok(PathMeaning::Value(Value::Function(Rc::new(Function {
+                item,
+                scope,
+                turbofish,
+                owner,
+            }))));
         }
         for implementation in self.implementations.clone().iter().rev() {
             let Some(constant) = implementation.constants.get(&name) else { continue };
-            let Some(scope) = self.fitting(implementation, ty) else { continue };
-            let scope = Scope::inside(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
+            let Some(scope) = self.matching_impl_scope(implementation, ty) else { continue };
+            let scope =
+                Scope::child_scope(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
             let value = if implementation.generics.params.is_empty() && implementation.self_type.is_some() {
                 self.constant_value(constant, &scope)
             } else {
                 self.deeper(at, |evaluator| {
                     Ok(evaluator.constant_expression(&constant.expression, &constant.ty, &scope)?)
                 })
-                .or_else(|flow| self.finished(Err(flow), at))
+                .or_else(|flow| self.into_value(Err(flow), at))
             };
-            return value.map(Named::Value);
+            return value.map(PathMeaning::Value);
         }
-        Ok(Named::Builtin(Builtin { owner: Some(ty.clone()), path: vec![ident.to_string()], turbofish }))
+        Ok(PathMeaning::Builtin(Builtin {
+            owner: Some(ty.clone()),
+            path: vec![ident.to_string()],
+            turbofish,
+        }))
     }
 
     /// The scope of an implementation for a type, or nothing if it is for others.
-    pub(super) fn fitting(&mut self, implementation: &Rc<Implementation>, ty: &Type) -> Option<Rc<Scope>> {
+    pub(super) fn matching_impl_scope(
+        &mut self,
+        implementation: &Rc<Implementation>,
+        ty: &Type,
+    ) -> Option<Rc<Scope>> {
         let scope = self.generic_scope(&implementation.generics, &implementation.scope);
         match &implementation.self_type {
             Some(pattern) => self.unify(pattern, ty, &scope).then_some(scope),
@@ -288,7 +311,7 @@ impl Evaluator {
         };
         for wanted in 0..3 {
             for implementation in with_name.iter().filter(|implementation| rank(implementation) == wanted) {
-                if self.fitting(implementation, ty).is_some() {
+                if self.matching_impl_scope(implementation, ty).is_some() {
                     return Some((implementation.clone(), implementation.functions[&name].clone()));
                 }
             }
@@ -302,7 +325,7 @@ impl Evaluator {
         if let Some(cell) = scope.variable(name) {
             return Ok(Some(cell.borrow().clone()));
         }
-        for around in scope.chain() {
+        for around in scope.enclosing_scopes() {
             if let Names::Items(items) = &around.names
                 && let Some(ValueItem::Constant(constant)) = items.values.get(&name)
             {
@@ -340,7 +363,7 @@ impl Evaluator {
 
     /// How generated code, which stands in the outermost module, names what the macro does not see.
     pub(super) fn emitted_path(&self, builtin: &Builtin, path: &syn::ExprPath) -> TokenStream {
-        if names_of(&self.scope).is_empty() || builtin.owner.is_some() || builtin.path.len() < 2 {
+        if module_path(&self.scope).is_empty() || builtin.owner.is_some() || builtin.path.len() < 2 {
             return path.to_token_stream();
         }
         let span = path.path.segments.last().map_or_else(Span::call_site, |last| last.ident.span());
@@ -358,7 +381,7 @@ impl Evaluator {
 }
 
 /// Index of the variant of a name.
-pub fn position(definition: &Definition, name: &str) -> Option<usize> {
+pub fn variant_index(definition: &Definition, name: &str) -> Option<usize> {
     definition.variants.iter().position(|variant| variant.name == name)
 }
 

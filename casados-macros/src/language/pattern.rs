@@ -1,13 +1,13 @@
 //! Patterns: what they match, and which variables they declare.
 
-mod parts;
+mod compound_patterns;
 
 use super::arithmetic::Comparison;
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
+use super::evaluator::{Evaluated, Evaluator, TokenSpan, error, unsupported};
 use super::items::Symbol;
 use super::methods;
-use super::path::Named;
+use super::path::PathMeaning;
 use super::place::{Place, Projection};
 use super::types::Type;
 use super::value::Value;
@@ -45,7 +45,7 @@ impl Evaluator {
         }
         let variables =
             bindings.into_iter().map(|(name, value)| (name, Rc::new(RefCell::new(value)))).collect();
-        self.scope = Scope::inside(&self.scope, Names::Variables(variables));
+        self.scope = Scope::child_scope(&self.scope, Names::Variables(variables));
     }
 
     /// Matches a pattern that cannot fail.
@@ -64,7 +64,7 @@ impl Evaluator {
     }
 
     /// The value of a subject.
-    pub(super) fn subject_value(&mut self, subject: &Subject, at: At) -> Evaluated {
+    pub(super) fn subject_value(&mut self, subject: &Subject, at: TokenSpan) -> Evaluated {
         match subject {
             Subject::Value(value) => Ok(value.clone()),
             Subject::Place(place, _) => Ok(self.read(place, at)?),
@@ -78,10 +78,10 @@ impl Evaluator {
         subject: Subject,
         bindings: &mut Bindings,
     ) -> Evaluated<Truth> {
-        self.deeper(pattern, |evaluator| evaluator.matches_within(pattern, subject, bindings))
+        self.deeper(pattern, |evaluator| evaluator.match_nested(pattern, subject, bindings))
     }
 
-    fn matches_within(
+    fn match_nested(
         &mut self,
         pattern: &syn::Pat,
         subject: Subject,
@@ -94,11 +94,11 @@ impl Evaluator {
                 subject,
             ) => subject,
             (_, Subject::Value(Value::Reference(place))) => {
-                Subject::Place(self.follow(place, pattern)?, true)
+                Subject::Place(self.follow_place(place, pattern)?, true)
             }
             (_, Subject::Place(place, by_reference)) => {
-                let target = self.follow(place.clone(), pattern)?;
-                let by_reference = by_reference || !target.same(&place);
+                let target = self.follow_place(place.clone(), pattern)?;
+                let by_reference = by_reference || !target.is_same_memory(&place);
                 Subject::Place(target, by_reference)
             }
             (_, subject) => subject,
@@ -121,7 +121,7 @@ impl Evaluator {
                     Subject::Value(Value::Reference(place)) => Subject::Value(self.read(&place, pattern)?),
                     Subject::Place(place, _) => {
                         let value = self.read(&place, pattern)?;
-                        Subject::Value(self.load(value, pattern)?)
+                        Subject::Value(self.follow_value(value, pattern)?)
                     }
                     subject => subject,
                 };
@@ -157,7 +157,7 @@ impl Evaluator {
                 self.declare(bindings.clone());
                 let value = self.expression(&guard.guard, &Type::Bool);
                 self.scope = saved;
-                let value = self.load(value?, pattern)?;
+                let value = self.follow_value(value?, pattern)?;
                 self.both(truth, &value, pattern)
             }
             _ => Err(unsupported(pattern, "this pattern").into()),
@@ -192,17 +192,17 @@ impl Evaluator {
                     )
                     .into()),
                 },
-                _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
+                _ => Err(unsupported(pattern, format!("this pattern on {}", value.description())).into()),
             };
         }
-        match (self.named(&path)?, &value) {
-            (Named::Value(Value::Constructor(_, variant)), Value::Struct(structure)) => {
+        match (self.path_meaning(&path)?, &value) {
+            (PathMeaning::Value(Value::Constructor(_, variant)), Value::Struct(structure)) => {
                 if structure.variant != variant {
                     return Ok(Truth::Known(false));
                 }
                 self.match_parts(&pattern.elems, pattern, subject, bindings)
             }
-            _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
+            _ => Err(unsupported(pattern, format!("this pattern on {}", value.description())).into()),
         }
     }
 
@@ -256,22 +256,22 @@ impl Evaluator {
         Ok(some.map_or(Truth::Known(false), Truth::When))
     }
 
-    fn match_constant(&mut self, value: &Value, constant: &Value, at: At) -> Evaluated<Truth> {
+    fn match_constant(&mut self, value: &Value, constant: &Value, at: TokenSpan) -> Evaluated<Truth> {
         let equal = self.compare(Comparison::Eq, value, constant, at)?;
         self.truth(&equal, at)
     }
 
     /// Whether a `bool` holds.
-    pub(super) fn truth(&mut self, value: &Value, at: At) -> Evaluated<Truth> {
-        match self.load(value.clone(), at)? {
+    pub(super) fn truth(&mut self, value: &Value, at: TokenSpan) -> Evaluated<Truth> {
+        match self.follow_value(value.clone(), at)? {
             Value::Bool(value) => Ok(Truth::Known(value)),
             Value::Condition(node) => Ok(Truth::When(node)),
-            Value::Opaque(_) => Err(super::evaluator::opaque(at, "a `bool`").into()),
-            other => Err(error(at, format!("expected a `bool`, found {}", other.kind())).into()),
+            Value::Opaque(_) => Err(super::evaluator::opaque_value_error(at, "a `bool`").into()),
+            other => Err(error(at, format!("expected a `bool`, found {}", other.description())).into()),
         }
     }
 
-    fn both(&mut self, truth: Truth, value: &Value, at: At) -> Evaluated<Truth> {
+    fn both(&mut self, truth: Truth, value: &Value, at: TokenSpan) -> Evaluated<Truth> {
         Ok(match (truth, self.truth(value, at)?) {
             (Truth::Known(false), _) | (_, Truth::Known(false)) => Truth::Known(false),
             (Truth::Known(true), other) | (other, Truth::Known(true)) => other,
@@ -279,7 +279,7 @@ impl Evaluator {
         })
     }
 
-    pub(super) fn all(&mut self, truths: Vec<Truth>) -> Truth {
+    pub(super) fn all_truths(&mut self, truths: Vec<Truth>) -> Truth {
         let mut result = Truth::Known(true);
         for truth in truths {
             result = match (result, truth) {
@@ -336,12 +336,12 @@ impl Evaluator {
             return Ok(None);
         }
         let path = syn::ExprPath { attrs: Vec::new(), qself: None, path: ident.clone().into() };
-        Ok(match self.named(&path)? {
-            Named::Value(Value::Function(_) | Value::Constructor(..)) => None,
-            Named::Value(value) => Some(value),
+        Ok(match self.path_meaning(&path)? {
+            PathMeaning::Value(Value::Function(_) | Value::Constructor(..)) => None,
+            PathMeaning::Value(value) => Some(value),
             // By convention constants and variants begin with a capital, variables do not. Where a
             // pattern cannot fail, the compiler would refuse them.
-            Named::Builtin(builtin)
+            PathMeaning::Builtin(builtin)
                 if !self.irrefutable && ident.unraw().to_string().starts_with(char::is_uppercase) =>
             {
                 let known = methods::constant(self, &builtin);

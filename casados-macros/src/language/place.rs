@@ -1,6 +1,6 @@
 //! Places: variables and parts of them, which assignments and `&mut` refer to.
 
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::{Matrix, Value};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -51,7 +51,7 @@ impl Place {
     }
 
     /// Whether both are the same memory.
-    pub fn same(&self, other: &Place) -> bool {
+    pub fn is_same_memory(&self, other: &Place) -> bool {
         Rc::ptr_eq(&self.cell, &other.cell) && self.path == other.path
     }
 
@@ -135,21 +135,21 @@ impl Place {
 
 impl Evaluator {
     /// The value in a place.
-    pub fn read(&mut self, place: &Place, at: At) -> Result<Value> {
+    pub fn read(&mut self, place: &Place, at: TokenSpan) -> Result<Value> {
         place.get().ok_or_else(|| error(at, "this is no part of the value"))
     }
 
     /// Writes to a place.
-    pub fn write(&mut self, place: &Place, value: Value, at: At) -> Result<()> {
-        if refers(&value, &place.cell) {
+    pub fn write(&mut self, place: &Place, value: Value, at: TokenSpan) -> Result<()> {
+        if refers_to_cell(&value, &place.cell) {
             return Err(error(at, "a reference to a variable cannot be stored in that variable itself"));
         }
-        self.remember(&place.cell);
+        self.save_old_value(&place.cell);
         place.set(value).ok_or_else(|| error(at, "the value does not fit where it is assigned to"))
     }
 
     /// Follows mutable references: the place that a method called on `place` gets.
-    pub fn follow(&mut self, mut place: Place, at: At) -> Result<Place> {
+    pub fn follow_place(&mut self, mut place: Place, at: TokenSpan) -> Result<Place> {
         loop {
             match self.read(&place, at)? {
                 Value::Reference(target) => place = target,
@@ -159,7 +159,7 @@ impl Evaluator {
     }
 
     /// The value, with mutable references followed.
-    pub fn load(&mut self, mut value: Value, at: At) -> Result<Value> {
+    pub fn follow_value(&mut self, mut value: Value, at: TokenSpan) -> Result<Value> {
         while let Value::Reference(place) = &value {
             value = self.read(place, at)?;
         }
@@ -168,15 +168,15 @@ impl Evaluator {
 
     /// A part of a place; its bounds are checked. Slices of slices, and elements of slices and
     /// blocks, are resolved.
-    pub fn project(&mut self, place: &Place, projection: Projection, at: At) -> Result<Place> {
-        let mut place = self.follow(place.clone(), at)?;
+    pub fn project(&mut self, place: &Place, projection: Projection, at: TokenSpan) -> Result<Place> {
+        let mut place = self.follow_place(place.clone(), at)?;
         let value = match place.path.last() {
             Some(Projection::Slice(..) | Projection::Block { .. }) => None,
             _ => Some(self.read(&place, at)?),
         };
         let projection = match (projection, place.path.last().copied()) {
             (Projection::Index(index), Some(Projection::Slice(start, end))) => {
-                bound(index, end - start, at)?;
+                check_index(index, end - start, at)?;
                 place.path.pop();
                 Projection::Index(start + index)
             }
@@ -186,8 +186,8 @@ impl Evaluator {
                 Projection::Slice(start + first, start + last)
             }
             (Projection::Element(r, c), Some(Projection::Block { row, column, rows, columns })) => {
-                bound(r, rows, at)?;
-                bound(c, columns, at)?;
+                check_index(r, rows, at)?;
+                check_index(c, columns, at)?;
                 place.path.pop();
                 Projection::Element(row + r, column + c)
             }
@@ -203,14 +203,14 @@ impl Evaluator {
             (projection, _) => {
                 match (projection, &value) {
                     (Projection::Index(index), Some(Value::Array(elements))) => {
-                        bound(index, elements.len(), at)?
+                        check_index(index, elements.len(), at)?
                     }
                     (Projection::Slice(first, last), Some(Value::Array(elements))) => {
                         slice(first, last, elements.len(), at)?;
                     }
                     (Projection::Element(r, c), Some(Value::Matrix(matrix))) => {
-                        bound(r, matrix.rows, at)?;
-                        bound(c, matrix.columns, at)?;
+                        check_index(r, matrix.rows, at)?;
+                        check_index(c, matrix.columns, at)?;
                     }
                     (Projection::Block { row, column, rows, columns }, Some(Value::Matrix(matrix))) => {
                         slice(row, row.saturating_add(rows), matrix.rows, at)?;
@@ -229,15 +229,15 @@ impl Evaluator {
     }
 
     /// A part of a value, as [`Evaluator::project`] of a place.
-    pub fn part(&mut self, value: &Value, projection: Projection, at: At) -> Result<Value> {
+    pub fn value_part(&mut self, value: &Value, projection: Projection, at: TokenSpan) -> Result<Value> {
         match (projection, value) {
             (Projection::Index(index), Value::Array(elements)) => {
-                bound(index, elements.len(), at)?;
+                check_index(index, elements.len(), at)?;
                 Ok(elements[index].clone())
             }
             (Projection::Element(r, c), Value::Matrix(matrix)) => {
-                bound(r, matrix.rows, at)?;
-                bound(c, matrix.columns, at)?;
+                check_index(r, matrix.rows, at)?;
+                check_index(c, matrix.columns, at)?;
                 Ok(element(matrix, r, c))
             }
             _ => {
@@ -249,14 +249,16 @@ impl Evaluator {
 }
 
 /// Whether references in a value lead to a variable, directly or through other variables.
-fn refers(value: &Value, cell: &Cell) -> bool {
-    let any = |values: &[Value]| values.iter().any(|value| refers(value, cell));
+fn refers_to_cell(value: &Value, cell: &Cell) -> bool {
+    let any = |values: &[Value]| values.iter().any(|value| refers_to_cell(value, cell));
     match value {
-        Value::Reference(place) => Rc::ptr_eq(&place.cell, cell) || refers(&place.cell.borrow(), cell),
+        Value::Reference(place) => {
+            Rc::ptr_eq(&place.cell, cell) || refers_to_cell(&place.cell.borrow(), cell)
+        }
         Value::Array(values) | Value::Tuple(values) => any(values),
         Value::Struct(structure) => any(&structure.fields),
         Value::Matrix(matrix) => any(&matrix.elements),
-        Value::Option(Some(value)) => refers(value, cell),
+        Value::Option(Some(value)) => refers_to_cell(value, cell),
         _ => false,
     }
 }
@@ -265,14 +267,14 @@ fn element(matrix: &Matrix, row: usize, column: usize) -> Value {
     matrix.elements[row + column * matrix.rows].clone()
 }
 
-fn bound(index: usize, length: usize, at: At) -> Result<()> {
+fn check_index(index: usize, length: usize, at: TokenSpan) -> Result<()> {
     if index < length {
         return Ok(());
     }
     Err(error(at, format!("index out of range: the length is {length} but the index is {index}")))
 }
 
-fn slice(start: usize, end: usize, length: usize, at: At) -> Result<()> {
+fn slice(start: usize, end: usize, length: usize, at: TokenSpan) -> Result<()> {
     if start <= end && end <= length {
         return Ok(());
     }

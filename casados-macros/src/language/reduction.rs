@@ -6,7 +6,7 @@
 //! - `index_reduction(baumgarte = 2.0)`, `index_reduction(baumgarte = [2.0, 1.0])`: what the
 //!   constraints are off by decays with these rates.
 
-use super::sampling::number;
+use super::sampling::parse_number;
 use proc_macro2::{Ident, Span};
 use syn::parse::ParseStream;
 use syn::spanned::Spanned;
@@ -73,7 +73,7 @@ impl Reduction {
 
 /// A rate of decay.
 fn rate(value: &Expr) -> Result<f64> {
-    let rate = number(value)?;
+    let rate = parse_number(value)?;
     if rate > 0.0 {
         return Ok(rate);
     }

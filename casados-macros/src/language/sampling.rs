@@ -4,8 +4,8 @@
 //! - `range(x = [-1.0..=1.0, 0.0..=6.3], p = 0.5..=2.0)`: likewise an interval.
 
 use super::Variables;
-use super::mistakes::Mistakes;
-use super::model::numbers;
+use super::mistakes::CollectedErrors;
+use super::model::count_in_words;
 use super::signature::Role;
 use proc_macro2::{Ident, Span};
 use syn::parse::{Parse, ParseStream};
@@ -72,7 +72,7 @@ impl Setting {
             input.parse::<Token![=]>()?;
             Ok((name, input.parse()?))
         };
-        let mut mistakes = Mistakes::default();
+        let mut mistakes = CollectedErrors::default();
         let mut settings = Vec::new();
         for (name, value) in Punctuated::<_, Token![,]>::parse_terminated_with(input, pair)? {
             match Self::new(kind, name, &value) {
@@ -80,7 +80,7 @@ impl Setting {
                 Err(error) => mistakes.note(error),
             }
         }
-        mistakes.none()?;
+        mistakes.into_result()?;
         Ok(settings)
     }
 
@@ -100,7 +100,7 @@ impl Setting {
     }
 
     /// Whether both say the same thing of the same argument.
-    pub fn repeats(&self, other: &Self) -> Option<Error> {
+    pub fn duplicate_error(&self, other: &Self) -> Option<Error> {
         (self.kind == other.kind && self.role == other.role).then(|| {
             let message = format!("`{}` of `{}` is given twice", self.kind.name(), self.role.name());
             Error::new(self.name.span(), message)
@@ -126,7 +126,7 @@ pub(super) fn resolve(settings: &[Setting], variables: &Variables) -> Result<Vec
         (Role::T, &time),
     ];
     let mut samplings = Vec::new();
-    let mut mistakes = Mistakes::default();
+    let mut mistakes = CollectedErrors::default();
     for (role, names) in blocks {
         let begin = samplings.len();
         samplings.resize(begin + names.len(), Sampling::default());
@@ -150,7 +150,7 @@ pub(super) fn resolve(settings: &[Setting], variables: &Variables) -> Result<Vec
             }
         }
     }
-    mistakes.none()?;
+    mistakes.into_result()?;
     Ok(samplings)
 }
 
@@ -166,7 +166,8 @@ impl Setting {
             Values::Each(values) => values.clone(),
         };
         if values.len() != names.len() {
-            let message = format!("`{name}` has {}, but {} are given", numbers(names.len()), values.len());
+            let message =
+                format!("`{name}` has {}, but {} are given", count_in_words(names.len()), values.len());
             return Err(Error::new(self.span, message));
         }
         for (sampling, (low, high)) in samplings.iter_mut().zip(values) {
@@ -183,13 +184,13 @@ impl Setting {
 fn interval(kind: Kind, value: &Expr) -> Result<(f64, f64)> {
     match (kind, value) {
         (_, Expr::Paren(inner)) => interval(kind, &inner.expr),
-        (Kind::Nominal, value) => number(value).map(|value| (value, value)),
+        (Kind::Nominal, value) => parse_number(value).map(|value| (value, value)),
         (Kind::Range, Expr::Range(range)) => {
             let (Some(low), Some(high), RangeLimits::Closed(_)) = (&range.start, &range.end, &range.limits)
             else {
                 return Err(Error::new_spanned(range, "a range is written `low..=high`"));
             };
-            let (low, high) = (number(low)?, number(high)?);
+            let (low, high) = (parse_number(low)?, parse_number(high)?);
             if low > high {
                 return Err(Error::new_spanned(
                     range,
@@ -203,15 +204,15 @@ fn interval(kind: Kind, value: &Expr) -> Result<(f64, f64)> {
 }
 
 /// A literal, with a sign or without.
-pub(super) fn number(value: &Expr) -> Result<f64> {
+pub(super) fn parse_number(value: &Expr) -> Result<f64> {
     let literal = match value {
         Expr::Lit(literal) => match &literal.lit {
             Lit::Float(number) => Some(number.base10_parse::<f64>()?),
             Lit::Int(number) => Some(number.base10_parse::<f64>()?),
             _ => None,
         },
-        Expr::Paren(inner) => return number(&inner.expr),
-        Expr::Unary(unary) if matches!(unary.op, UnOp::Neg(_)) => Some(-number(&unary.expr)?),
+        Expr::Paren(inner) => return parse_number(&inner.expr),
+        Expr::Unary(unary) if matches!(unary.op, UnOp::Neg(_)) => Some(-parse_number(&unary.expr)?),
         _ => None,
     };
     match literal {

@@ -1,6 +1,6 @@
 //! `if condition { a } else { b }` on values, where the condition is known at run time only.
 
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{Evaluator, TokenSpan, error};
 use super::value::{Struct, Value};
 use crate::graph::Node;
 use std::rc::Rc;
@@ -8,10 +8,10 @@ use syn::Result;
 
 impl Evaluator {
     /// `if condition { a } else { b }`, elementwise.
-    pub fn select(&mut self, condition: Node, a: &Value, b: &Value, at: At) -> Result<Value> {
+    pub fn select(&mut self, condition: Node, a: &Value, b: &Value, at: TokenSpan) -> Result<Value> {
         Ok(match (a, b) {
             (Value::Uninitialised, _) | (_, Value::Uninitialised) => Value::Uninitialised,
-            (Value::Reference(x), Value::Reference(y)) if x.same(y) => a.clone(),
+            (Value::Reference(x), Value::Reference(y)) if x.is_same_memory(y) => a.clone(),
             (Value::Reference(_), _) | (_, Value::Reference(_)) => {
                 return Err(error(
                     at,
@@ -47,19 +47,23 @@ impl Evaluator {
             }
             (Value::Tuple(x), Value::Tuple(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Tuple(x), Value::Tuple(y)) if x.len() == y.len() => {
-                Value::tuple(self.select_all(condition, x, y, at)?)
+                Value::tuple(self.select_elements(condition, x, y, at)?)
             }
             (Value::Array(x), Value::Array(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
-                Value::array(self.select_all(condition, x, y, at)?)
+                Value::array(self.select_elements(condition, x, y, at)?)
             }
             (Value::Matrix(x), Value::Matrix(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Matrix(x), Value::Matrix(y)) if (x.rows, x.columns) == (y.rows, y.columns) => {
-                Value::matrix(x.rows, x.columns, self.select_all(condition, &x.elements, &y.elements, at)?)
+                Value::matrix(
+                    x.rows,
+                    x.columns,
+                    self.select_elements(condition, &x.elements, &y.elements, at)?,
+                )
             }
             (Value::Struct(x), Value::Struct(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Struct(x), Value::Struct(y)) if x.variant == y.variant => {
-                let fields = self.select_all(condition, &x.fields, &y.fields, at)?;
+                let fields = self.select_elements(condition, &x.fields, &y.fields, at)?;
                 Value::Struct(Rc::new(Struct {
                     definition: x.definition.clone(),
                     variant: x.variant,
@@ -80,15 +84,21 @@ impl Evaluator {
                     format!(
                         "the branches of a condition on model variables have the types {} and {}: both must be \
                          numbers or arrays of equal length",
-                        a.kind(),
-                        b.kind()
+                        a.description(),
+                        b.description()
                     ),
                 ));
             }
         })
     }
 
-    fn select_all(&mut self, condition: Node, a: &[Value], b: &[Value], at: At) -> Result<Vec<Value>> {
+    fn select_elements(
+        &mut self,
+        condition: Node,
+        a: &[Value],
+        b: &[Value],
+        at: TokenSpan,
+    ) -> Result<Vec<Value>> {
         a.iter().zip(b).map(|(a, b)| self.select(condition, a, b, at)).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! The signature of a model: its arguments, recognised by name.
 
 use super::Form;
-use super::mistakes::Mistakes;
+use super::mistakes::CollectedErrors;
 use proc_macro2::Ident;
 use syn::spanned::Spanned;
 use syn::{Error, FnArg, ItemFn, Pat, Result};
@@ -69,14 +69,14 @@ pub struct Argument {
 pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
     check_qualifiers(form, function)?;
     let mut arguments = Vec::<Argument>::new();
-    let mut mistakes = Mistakes::default();
+    let mut mistakes = CollectedErrors::default();
     for input in &function.sig.inputs {
         match argument(form, input, &arguments) {
             Ok(argument) => arguments.push(argument),
             Err(error) => mistakes.note(error),
         }
     }
-    mistakes.none()?;
+    mistakes.into_result()?;
     let has = |role: Role| arguments.iter().any(|argument| argument.role == role);
     if form == Form::Dae && !has(Role::Xdot) {
         return Err(Error::new(
@@ -143,7 +143,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             pattern.span(),
             format!(
                 "arguments of {} are recognised by their names, {arguments}; take this one apart in the body",
-                form.what()
+                form.description()
             ),
         ));
     };
@@ -177,7 +177,7 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             format!(
                 "unknown argument `{}`: the arguments of {} are {arguments}",
                 identifier.ident,
-                form.what()
+                form.description()
             ),
         )),
     }

@@ -1,6 +1,6 @@
 //! Blocks, `let`, loops, and the macros that are understood.
 
-use super::evaluator::{At, Evaluated, Evaluator, Flow, Target, error, unsupported};
+use super::evaluator::{Evaluated, Evaluator, Flow, Target, TokenSpan, error, unsupported};
 use super::methods::{Receiver, iterator};
 use super::pattern::{Subject, Truth};
 use super::types::Type;
@@ -36,7 +36,7 @@ impl Evaluator {
                     if let Some(cfg) = local.attrs.iter().find(|attribute| attribute.path().is_ident("cfg")) {
                         return Err(unsupported(cfg, "a statement under a condition of the compiler").into());
                     }
-                    self.local(local, &hint(block, local, expected))?;
+                    self.let_statement(local, &hint(block, local, expected))?;
                     Value::unit()
                 }
                 Stmt::Expr(expression, None) => self.expression(expression, expected)?,
@@ -54,7 +54,7 @@ impl Evaluator {
     }
 
     /// `let`
-    fn local(&mut self, local: &syn::Local, hint: &Type) -> Evaluated<()> {
+    fn let_statement(&mut self, local: &syn::Local, hint: &Type) -> Evaluated<()> {
         let (pattern, ty) = match &local.pat {
             syn::Pat::Type(pattern) => {
                 let scope = self.scope.clone();
@@ -101,7 +101,7 @@ impl Evaluator {
     pub(super) fn labelled_block(&mut self, block: &syn::ExprBlock, expected: &Type) -> Evaluated {
         let Some(label) = &block.label else { return self.block(&block.block, expected) };
         let label = label.name.ident.to_string();
-        let branches = self.branches();
+        let branches = self.open_branch_count();
         self.targets.push((Some(label.clone()), Target::Block, branches));
         let result = self.block(&block.block, expected);
         self.targets.pop();
@@ -117,7 +117,7 @@ impl Evaluator {
             None => true,
             Some(target) => label.is_some_and(|label| target.ident == label),
         };
-        let branches = self.branches();
+        let branches = self.open_branch_count();
         self.targets.push((label.cloned(), Target::Loop, branches));
         let result = self.block(body, &Type::Unknown);
         self.targets.pop();
@@ -135,7 +135,7 @@ impl Evaluator {
         // `for x in &mut iterator` leaves the rest of the iterator to those who come later.
         let shared = match &source {
             Value::Reference(place) => {
-                let place = self.follow(place.clone(), &inner.expr)?;
+                let place = self.follow_place(place.clone(), &inner.expr)?;
                 matches!(self.read(&place, &inner.expr)?, Value::Iterator(_)).then_some(place)
             }
             _ => None,
@@ -148,7 +148,7 @@ impl Evaluator {
             None => iterator::into_iter(self, source, &inner.expr)?,
         };
         loop {
-            self.tick(1, inner)?;
+            self.count_steps(1, inner)?;
             let next = iterator.next(self, &inner.expr)?;
             if let Some(place) = &shared {
                 self.write(place, Value::iterator(iterator.clone()), &inner.expr)?;
@@ -170,7 +170,7 @@ impl Evaluator {
     pub(super) fn while_loop(&mut self, inner: &syn::ExprWhile) -> Evaluated {
         let label = inner.label.as_ref().map(|label| label.name.ident.to_string());
         loop {
-            self.tick(1, inner)?;
+            self.count_steps(1, inner)?;
             let saved = self.scope.clone();
             let result = match self.condition(&inner.cond) {
                 Ok(Truth::Known(true)) => self.turn(label.as_ref(), &inner.body),
@@ -193,7 +193,7 @@ impl Evaluator {
     pub(super) fn endless_loop(&mut self, inner: &syn::ExprLoop, _expected: &Type) -> Evaluated {
         let label = inner.label.as_ref().map(|label| label.name.ident.to_string());
         loop {
-            self.tick(1, inner)?;
+            self.count_steps(1, inner)?;
             if let Some(value) = self.turn(label.as_ref(), &inner.body)? {
                 return Ok(value);
             }
@@ -212,7 +212,7 @@ impl Evaluator {
                     return Err(error(call, "there is nothing to assert").into());
                 };
                 let value = self.expression(condition, &Type::Bool)?;
-                self.asserted(call, &value, condition, || failed(&arguments, 1))
+                self.check_assertion(call, &value, condition, || assertion_message(&arguments, 1))
             }
             "assert_eq" | "debug_assert_eq" | "assert_ne" | "debug_assert_ne" => {
                 let arguments = list.parse2(tokens)?;
@@ -227,7 +227,7 @@ impl Evaluator {
                     super::arithmetic::Comparison::Ne
                 };
                 let value = self.compare(comparison, &x, &y, call)?;
-                self.asserted(call, &value, call, || failed(&arguments, 2))
+                self.check_assertion(call, &value, call, || assertion_message(&arguments, 2))
             }
             "matches" => {
                 let parts = |input: ParseStream| {
@@ -241,7 +241,7 @@ impl Evaluator {
             }
             "panic" | "unreachable" | "todo" | "unimplemented" => {
                 let message = match list.parse2(tokens) {
-                    Ok(arguments) => failed(&arguments, 0),
+                    Ok(arguments) => assertion_message(&arguments, 0),
                     Err(_) => REACHED.to_owned(),
                 };
                 Err(error(call, message).into())
@@ -259,11 +259,11 @@ impl Evaluator {
     }
 
     /// An assertion of what has to be known; `at` is where it is false.
-    fn asserted(
+    fn check_assertion(
         &mut self,
         call: &syn::Macro,
         value: &Value,
-        at: At,
+        at: TokenSpan,
         message: impl FnOnce() -> String,
     ) -> Evaluated {
         match self.truth(value, at)? {
@@ -330,7 +330,7 @@ fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
 const REACHED: &str = "this is reached when the macro evaluates the model";
 
 /// The user's message of an assertion that fails, or one of ours.
-fn failed(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
+fn assertion_message(arguments: &Punctuated<Expr, Token![,]>, position: usize) -> String {
     match arguments.get(position) {
         Some(Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. })) => text.value(),
         _ if position == 0 => REACHED.to_owned(),

@@ -7,14 +7,14 @@
 use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Deeper than any model.
-const DEPTH: usize = 256;
+const MAX_NESTING: usize = 256;
 
 /// Tokens of one statement or element side by side; each may be a level of the syntax tree (prefix
 /// signs, `else if`, calls of methods).
 const LENGTH: usize = 20_000;
 
 /// Terms of one sum without brackets. The compiler bears twice as many.
-const TERMS: usize = 4096;
+const MAX_SUM_TERMS: usize = 4096;
 
 /// Refuses what must not be parsed: tokens that are nested too deeply or too many side by side, and
 /// conditions of the compiler. Does not recurse itself.
@@ -32,16 +32,16 @@ pub fn check(tokens: &TokenStream) -> syn::Result<()> {
         let is_attribute = group.delimiter() == Delimiter::Bracket && innermost.follows_hash();
         let tests = is_attribute && is_test(group) && innermost.is_before_module();
         if is_attribute && !tests {
-            no_condition(group)?;
+            reject_cfg(group)?;
         }
-        if depth == DEPTH {
+        if depth == MAX_NESTING {
             let message = format!(
-                "this is nested too deeply: more than {DEPTH} brackets around it; use functions or loops"
+                "this is nested too deeply: more than {MAX_NESTING} brackets around it; use functions or loops"
             );
             return Err(syn::Error::new(group.span_open(), message));
         }
         let level = Level::new(&group.stream());
-        level.is_short()?;
+        level.check_length()?;
         open.push(level);
     }
 }
@@ -58,7 +58,7 @@ impl Level {
     }
 
     /// Refuses statements and elements that are too long.
-    fn is_short(&self) -> syn::Result<()> {
+    fn check_length(&self) -> syn::Result<()> {
         let (mut length, mut terms) = (0, 0);
         for token in &self.tokens {
             length += 1;
@@ -67,9 +67,9 @@ impl Level {
                 TokenTree::Punct(punct) if matches!(punct.as_char(), '+' | '-') => terms += 1,
                 _ => {}
             }
-            if length > LENGTH || terms > TERMS {
+            if length > LENGTH || terms > MAX_SUM_TERMS {
                 let message = format!(
-                    "this expression has more than {TERMS} terms or {LENGTH} tokens without brackets as far as here: \
+                    "this expression has more than {MAX_SUM_TERMS} terms or {LENGTH} tokens without brackets as far as here: \
                      split it into statements, functions or loops"
                 );
                 return Err(syn::Error::new(token.span(), message));
@@ -109,7 +109,7 @@ fn is_test(attribute: &Group) -> bool {
     is_ident(Some(first), "cfg") && condition.stream().to_string() == "test"
 }
 
-fn no_condition(attribute: &Group) -> syn::Result<()> {
+fn reject_cfg(attribute: &Group) -> syn::Result<()> {
     match attribute.stream().into_iter().next() {
         Some(TokenTree::Ident(ident)) if ident == "cfg" || ident == "cfg_attr" => Err(syn::Error::new(
             ident.span(),
@@ -147,29 +147,32 @@ fn module_end(tokens: &[TokenTree]) -> Option<usize> {
 
 /// The item without the modules of its tests, which a model cannot use.
 pub fn without_tests(item: TokenStream) -> TokenStream {
-    without(item, |attribute, rest| if is_test(attribute) { module_end(rest) } else { None })
+    remove_attributes(item, |attribute, rest| if is_test(attribute) { module_end(rest) } else { None })
 }
 
 /// A module without the marks `#[model]` on its functions.
 pub fn without_marks(item: TokenStream) -> TokenStream {
-    without(item, |attribute, _| (attribute.stream().to_string() == "model").then_some(0))
+    remove_attributes(item, |attribute, _| (attribute.stream().to_string() == "model").then_some(0))
 }
 
 /// A module without the marks `#[model]` and the attributes of models and functions on its
 /// functions.
 pub fn without_attributes(item: TokenStream) -> TokenStream {
-    without(item, |attribute, rest| {
+    remove_attributes(item, |attribute, rest| {
         let path = attribute.stream().into_iter().take_while(|token| !matches!(token, TokenTree::Group(_)));
         let last = path.last().map(|token| token.to_string())?;
-        let ours = last == "model" || super::Form::named(&last).is_some();
+        let ours = last == "model" || super::Form::by_name(&last).is_some();
         (ours && module_end(rest).is_none()).then_some(0)
     })
 }
 
 /// The item without attributes in its body, and as many tokens behind each as `removed` says; it is
 /// given an attribute and what follows.
-fn without(item: TokenStream, removed: impl Fn(&Group, &[TokenTree]) -> Option<usize>) -> TokenStream {
-    in_body(item, |tokens| {
+fn remove_attributes(
+    item: TokenStream,
+    removed: impl Fn(&Group, &[TokenTree]) -> Option<usize>,
+) -> TokenStream {
+    change_body(item, |tokens| {
         let (mut kept, mut rest) = (TokenStream::new(), tokens);
         while let [token, behind @ ..] = rest {
             if is_punct(Some(token), '#')
@@ -187,8 +190,8 @@ fn without(item: TokenStream, removed: impl Fn(&Group, &[TokenTree]) -> Option<u
 }
 
 /// The item with something at the beginning of its body, behind inner attributes, and at its end.
-pub fn with(item: TokenStream, first: &TokenStream, last: &TokenStream) -> TokenStream {
-    in_body(item, |tokens| {
+pub fn insert_in_body(item: TokenStream, first: &TokenStream, last: &TokenStream) -> TokenStream {
+    change_body(item, |tokens| {
         let mut inner = 0;
         while is_punct(tokens.get(inner), '#') && is_punct(tokens.get(inner + 1), '!') {
             inner += 3;
@@ -203,12 +206,12 @@ pub fn with(item: TokenStream, first: &TokenStream, last: &TokenStream) -> Token
 }
 
 /// Changes what is between the braces at the end of a function or module.
-fn in_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStream) -> TokenStream {
+fn change_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStream) -> TokenStream {
     let mut tokens: Vec<TokenTree> = item.into_iter().collect();
     if let Some(TokenTree::Group(body)) = tokens.last_mut()
         && body.delimiter() == Delimiter::Brace
     {
-        let inside: Vec<TokenTree> = parenthesised(body.stream()).into_iter().collect();
+        let inside: Vec<TokenTree> = parenthesise_groups(body.stream()).into_iter().collect();
         let mut changed = Group::new(Delimiter::Brace, change(&inside));
         changed.set_span(body.span());
         *body = changed;
@@ -217,10 +220,10 @@ fn in_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStream) 
 }
 
 /// Operations in groups without delimiters get parentheses, at every level.
-fn parenthesised(tokens: TokenStream) -> TokenStream {
+fn parenthesise_groups(tokens: TokenStream) -> TokenStream {
     let changed = tokens.into_iter().map(|token| {
         let TokenTree::Group(group) = token else { return token };
-        let stream = parenthesised(group.stream());
+        let stream = parenthesise_groups(group.stream());
         let delimiter = match group.delimiter() {
             Delimiter::None if is_operation(stream.clone()) => Delimiter::Parenthesis,
             delimiter => delimiter,
@@ -261,8 +264,8 @@ mod tests {
 
     #[test]
     fn nesting_is_bounded() {
-        assert!(check(&nested(DEPTH - 1)).is_ok());
-        let error = check(&nested(DEPTH)).map_err(|error| error.to_string());
+        assert!(check(&nested(MAX_NESTING - 1)).is_ok());
+        let error = check(&nested(MAX_NESTING)).map_err(|error| error.to_string());
         assert!(error.is_err_and(|message| message.contains("more than 256 brackets")));
     }
 
@@ -300,7 +303,7 @@ mod tests {
         let (ty, negative) = (group("f64"), group("- y"));
         let item = quote::quote! { fn m(x: #ty) -> #ty { [x * #sum, (#negative).abs()] } };
         assert_eq!(
-            with(item, &TokenStream::new(), &TokenStream::new()).to_string(),
+            insert_in_body(item, &TokenStream::new(), &TokenStream::new()).to_string(),
             "fn m (x : f64) -> f64 { [x * (1.0 + 2.0) , ((- y)) . abs ()] }"
         );
     }
@@ -310,7 +313,7 @@ mod tests {
         let item: TokenStream = "mod m { #![allow(dead_code)] #[model] fn m() {} }".parse().unwrap();
         let (first, last) = ("use a;".parse().unwrap(), "struct B;".parse().unwrap());
         assert_eq!(
-            with(without_marks(item), &first, &last).to_string(),
+            insert_in_body(without_marks(item), &first, &last).to_string(),
             "mod m { #! [allow (dead_code)] use a ; fn m () { } struct B ; }"
         );
     }

@@ -3,7 +3,7 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error, unsupported};
 use super::items::TypeItem;
-use super::modules::Lead;
+use super::modules::PathTarget;
 use super::value::{Definition, Generic, Integer, IntegerType, Value};
 use quote::quote;
 use std::rc::Rc;
@@ -44,7 +44,7 @@ impl Type {
     }
 
     /// The type of a tuple's element.
-    pub fn part(&self, index: usize) -> Type {
+    pub fn tuple_element(&self, index: usize) -> Type {
         match self {
             Type::Tuple(parts) => parts.get(index).cloned().unwrap_or_default(),
             _ => Type::Unknown,
@@ -80,31 +80,31 @@ impl Evaluator {
     /// The type that tokens stand for in a scope. What is not known (type parameters that nothing
     /// has fixed yet, types from outside, `impl Fn`) is `Unknown`: values bring their own.
     pub fn resolve(&mut self, ty: &syn::Type, scope: &Rc<Scope>) -> Result<Type> {
-        self.resolve_within(ty, scope, 0)
+        self.resolve_nested(ty, scope, 0)
     }
 
-    fn resolve_within(&mut self, ty: &syn::Type, scope: &Rc<Scope>, depth: usize) -> Result<Type> {
+    fn resolve_nested(&mut self, ty: &syn::Type, scope: &Rc<Scope>, depth: usize) -> Result<Type> {
         if depth > 64 {
             return Err(error(&ty, "this type is nested too deeply, or defined in terms of itself"));
         }
         Ok(match ty {
             syn::Type::Array(array) => {
-                let element = self.resolve_within(&array.elem, scope, depth + 1)?;
+                let element = self.resolve_nested(&array.elem, scope, depth + 1)?;
                 Type::Array(Rc::new(element), self.length(&array.len, scope)?)
             }
             syn::Type::Slice(slice) => {
-                Type::Array(Rc::new(self.resolve_within(&slice.elem, scope, depth + 1)?), None)
+                Type::Array(Rc::new(self.resolve_nested(&slice.elem, scope, depth + 1)?), None)
             }
             syn::Type::Tuple(tuple) => {
                 let mut parts = Vec::with_capacity(tuple.elems.len());
                 for part in &tuple.elems {
-                    parts.push(self.resolve_within(part, scope, depth + 1)?);
+                    parts.push(self.resolve_nested(part, scope, depth + 1)?);
                 }
                 Type::Tuple(Rc::new(parts))
             }
-            syn::Type::Reference(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
-            syn::Type::Paren(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
-            syn::Type::Group(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
+            syn::Type::Reference(inner) => self.resolve_nested(&inner.elem, scope, depth + 1)?,
+            syn::Type::Paren(inner) => self.resolve_nested(&inner.elem, scope, depth + 1)?,
+            syn::Type::Group(inner) => self.resolve_nested(&inner.elem, scope, depth + 1)?,
             syn::Type::Path(path) if path.qself.is_none() => {
                 self.resolve_path(&path.path, scope, depth + 1)?
             }
@@ -127,14 +127,14 @@ impl Evaluator {
             .take(path.segments.len() - 1)
             .map(|module| module.ident.to_string())
             .collect();
-        let place = match self.lead(&modules, scope, &mut Vec::new()) {
-            Lead::Module(module) => module,
-            Lead::Elsewhere if modules.is_empty() => scope.clone(),
+        let place = match self.resolve_module_path(&modules, scope, &mut Vec::new()) {
+            PathTarget::Module(module) => module,
+            PathTarget::Elsewhere if modules.is_empty() => scope.clone(),
             // What is in a module that the macro does not see is none of the user's own types.
-            Lead::Elsewhere => return self.resolve_known(path, last, &name, scope),
+            PathTarget::Elsewhere => return self.resolve_builtin_type(path, last, &name, scope),
         };
         let mut renamed = None;
-        for around in place.chain() {
+        for around in place.enclosing_scopes() {
             match &around.names {
                 Names::SelfType(ty, _) if name == "Self" => return Ok(ty.clone()),
                 Names::Types(types) => {
@@ -152,7 +152,7 @@ impl Evaluator {
                             let arguments = self.generic_arguments(&last.arguments, scope)?;
                             let inner = self.generic_scope(&alias.generics, &around);
                             self.bind_turbofish(&alias.generics, &arguments, &inner);
-                            return self.resolve_within(&alias.ty, &inner, depth + 1);
+                            return self.resolve_nested(&alias.ty, &inner, depth + 1);
                         }
                         None => {}
                     }
@@ -163,11 +163,11 @@ impl Evaluator {
                 _ => {}
             }
         }
-        self.resolve_known(path, last, &renamed.unwrap_or(name), scope)
+        self.resolve_builtin_type(path, last, &renamed.unwrap_or(name), scope)
     }
 
     /// The type of a name that is not the user's own: of the language, or of nalgebra.
-    fn resolve_known(
+    fn resolve_builtin_type(
         &mut self,
         path: &syn::Path,
         last: &syn::PathSegment,
@@ -209,7 +209,7 @@ impl Evaluator {
                         last,
                         "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`",
                     ));
-                } else if let Some(ty) = IntegerType::named(name) {
+                } else if let Some(ty) = IntegerType::by_name(name) {
                     Type::Integer(ty)
                 } else if let Some((rows, columns)) = matrix_alias(name) {
                     Type::Matrix(Some(rows), Some(columns))
@@ -229,7 +229,7 @@ impl Evaluator {
         let saved = std::mem::replace(&mut self.scope, scope.clone());
         let value = self.expression(length, &Type::Integer(IntegerType::Usize));
         self.scope = saved;
-        match self.finished(value, length)? {
+        match self.into_value(value, length)? {
             Value::Uninitialised => Ok(None),
             value => self.usize(&value, length).map(Some),
         }
@@ -273,7 +273,7 @@ impl Evaluator {
                     let saved = std::mem::replace(&mut self.scope, scope.clone());
                     let value = self.expression(expression, &Type::Unknown);
                     self.scope = saved;
-                    match self.finished(value, expression)? {
+                    match self.into_value(value, expression)? {
                         Value::Integer(integer) => generics.push(Generic::Const(integer)),
                         Value::Bool(value) => {
                             let value = i128::from(value);
@@ -281,7 +281,7 @@ impl Evaluator {
                         }
                         Value::Uninitialised => generics.push(Generic::Type(Type::Unknown)),
                         other => {
-                            let kind = other.kind();
+                            let kind = other.description();
                             return Err(error(expression, format!("expected an integer, found {kind}")));
                         }
                     }
@@ -322,7 +322,7 @@ impl Evaluator {
                     let field = self.type_of(field);
                     self.unify(ty, &field, &scope);
                 }
-                let arguments = self.bound(&definition.generics, &scope);
+                let arguments = self.bound_arguments(&definition.generics, &scope);
                 Type::Struct(definition, Rc::new(arguments))
             }
             Value::Reference(place) => {

@@ -44,7 +44,7 @@ impl Units {
             let Self { x: of_x, z: of_z, u: of_u, p: of_p, .. } = &mut self;
             for (names, units) in [(x, of_x), (z, of_z), (u, of_u), (p, of_p)] {
                 units.resize(names.len(), String::new());
-                let meant = names.iter().zip(units).filter(|(variable, _)| means(name, variable));
+                let meant = names.iter().zip(units).filter(|(variable, _)| name_matches(name, variable));
                 meant.for_each(|(_, to)| to.clone_from(&unit));
             }
         }
@@ -100,7 +100,7 @@ fn of_text(text: &str) -> String {
 
 /// Whether a name of a list means a variable, as in `casados::ocp`: `x` all states, `x.cart` all
 /// that is in it.
-fn means(name: &str, variable: &str) -> bool {
+fn name_matches(name: &str, variable: &str) -> bool {
     let rest = |variable: &str| {
         variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
     };
@@ -109,12 +109,13 @@ fn means(name: &str, variable: &str) -> bool {
 }
 
 /// Units with their own names, which take a prefix.
-const PREFIXED: [&str; 27] = [
+const UNITS_WITH_PREFIX: [&str; 27] = [
     "m", "g", "s", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F", "Ω", "Ohm",
     "S", "Wb", "T", "H", "lm", "L", "bar", "eV",
 ];
 /// Units without a prefix.
-const PLAIN: [&str; 12] = ["%", "‰", "°", "°C", "deg", "min", "h", "d", "rpm", "ha", "Bq", "1"];
+const UNITS_WITHOUT_PREFIX: [&str; 12] =
+    ["%", "‰", "°", "°C", "deg", "min", "h", "d", "rpm", "ha", "Bq", "1"];
 const PREFIXES: [&str; 11] = ["p", "n", "µ", "μ", "u", "m", "c", "d", "k", "M", "G"];
 
 /// Products and quotients of powers of units: `m/s²`, `kg m^2`, `W/(m² K)`, `1/s`.
@@ -136,13 +137,15 @@ fn is_power(factor: &str) -> bool {
 }
 
 fn is_base(base: &str) -> bool {
-    let prefixed = |prefix| base.strip_prefix(prefix).is_some_and(|rest| PREFIXED.contains(&rest));
-    PLAIN.contains(&base) || PREFIXED.contains(&base) || PREFIXES.into_iter().any(prefixed)
+    let prefixed = |prefix| base.strip_prefix(prefix).is_some_and(|rest| UNITS_WITH_PREFIX.contains(&rest));
+    UNITS_WITHOUT_PREFIX.contains(&base)
+        || UNITS_WITH_PREFIX.contains(&base)
+        || PREFIXES.into_iter().any(prefixed)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Units, is_unit, means, of_attributes};
+    use super::{Units, is_unit, name_matches, of_attributes};
     use crate::language::Variables;
     use syn::parse_quote;
 
@@ -183,7 +186,11 @@ mod tests {
 
     #[test]
     fn a_list_names_variables() {
-        assert!(means("x", "x[0]") && means("cart", "x.cart.place") && !means("x[1]", "x[10]"));
+        assert!(
+            name_matches("x", "x[0]")
+                && name_matches("cart", "x.cart.place")
+                && !name_matches("x[1]", "x[10]")
+        );
         let documentation: [syn::Attribute; 1] = [parse_quote!(
             #[doc = " A cart, pushed.\n\n - `x[0]`: position, m\n - `x[1]`: m/s.\n * u: force, kN\n - `t`: s"]
         )];

@@ -3,7 +3,7 @@
 use super::arithmetic::Operator;
 use super::call::Arguments;
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator, error};
+use super::evaluator::{Evaluated, Evaluator, TokenSpan, error};
 use super::implementation::Implementation;
 use super::items::Symbol;
 use super::methods::{self, Receiver};
@@ -20,7 +20,7 @@ impl Evaluator {
         receiver: &Receiver,
         name: &str,
         turbofish: &[Generic],
-        at: At,
+        at: TokenSpan,
     ) -> Result<Option<(Function, Value)>> {
         if self.implementations.is_empty() {
             return Ok(None);
@@ -58,7 +58,7 @@ impl Evaluator {
             Names::SelfType(_, written) => written.is_none(),
             _ => false,
         };
-        methods::is_inherent(ty, name) && !self.scope.chain().any(is_generic)
+        methods::is_inherent(ty, name) && !self.scope.enclosing_scopes().any(is_generic)
     }
 
     /// The user's method for a receiver of a type.
@@ -67,7 +67,7 @@ impl Evaluator {
         receiver: &Receiver,
         (ty, symbol): (Type, Symbol),
         turbofish: &[Generic],
-        at: At,
+        at: TokenSpan,
     ) -> Result<Option<(Function, Value)>> {
         let value = receiver.value(self, at)?;
         let Some((implementation, item)) = self.find_function(symbol, &ty) else { return Ok(None) };
@@ -89,7 +89,7 @@ impl Evaluator {
         &mut self,
         receiver: &Receiver,
         builtin: &Builtin,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Option<(Function, Value)>> {
         let value = receiver.value(self, at)?;
         let ty = self.type_of(&value);
@@ -103,7 +103,7 @@ impl Evaluator {
     /// The implementations of a generic trait for one type, of which the arguments of a call choose
     /// one: `impl From<A> for X` and `impl From<B> for X`. Only the function itself if it is not of
     /// such a trait.
-    pub(super) fn overloads(&mut self, function: &Function) -> Vec<Function> {
+    pub(super) fn implementations_of_trait(&mut self, function: &Function) -> Vec<Function> {
         let Some((implementation, ty)) = &function.owner else { return Vec::new() };
         let generic = |implementation: &Implementation| {
             let last = implementation.of.as_ref()?.segments.last()?;
@@ -115,7 +115,7 @@ impl Evaluator {
         for other in self.implementations.clone() {
             if let Some(item) = other.functions.get(&symbol)
                 && generic(&other).is_some_and(|name| name == of)
-                && self.fitting(&other, ty).is_some()
+                && self.matching_impl_scope(&other, ty).is_some()
             {
                 several.push(Function {
                     item: item.clone(),
@@ -129,7 +129,12 @@ impl Evaluator {
     }
 
     /// Of several functions the only one that takes these arguments.
-    pub(super) fn choose(&mut self, several: Vec<Function>, arguments: &[Value], at: At) -> Result<Function> {
+    pub(super) fn choose(
+        &mut self,
+        several: Vec<Function>,
+        arguments: &[Value],
+        at: TokenSpan,
+    ) -> Result<Function> {
         let mut fitting = Vec::new();
         for function in several {
             if self.takes(&function, arguments) {
@@ -148,8 +153,8 @@ impl Evaluator {
     /// Whether the types of arguments are those of a function, as far as they are known.
     fn takes(&mut self, function: &Function, arguments: &[Value]) -> bool {
         let Some((implementation, ty)) = &function.owner else { return false };
-        let Some(scope) = self.fitting(implementation, ty) else { return false };
-        let scope = Scope::inside(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
+        let Some(scope) = self.matching_impl_scope(implementation, ty) else { return false };
+        let scope = Scope::child_scope(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
         let inputs = &function.item.sig.inputs;
         inputs.len() == arguments.len()
             && inputs.iter().zip(arguments).all(|(input, value)| match input {
@@ -167,7 +172,7 @@ impl Evaluator {
         &mut self,
         receiver: &Receiver,
         expected: &Type,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated<Option<Value>> {
         let symbol = self.symbol_of("from");
         if !self.implementations.iter().any(|implementation| implementation.functions.contains_key(&symbol)) {
@@ -177,7 +182,7 @@ impl Evaluator {
         let mut fitting = Vec::new();
         for implementation in self.implementations.clone() {
             let Some(item) = implementation.functions.get(&symbol) else { continue };
-            if self.fitting(&implementation, expected).is_none() {
+            if self.matching_impl_scope(&implementation, expected).is_none() {
                 continue;
             }
             let function = Function {
@@ -207,7 +212,7 @@ impl Evaluator {
         operator: Operator,
         a: &Value,
         b: &Value,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Option<Value>> {
         let (of, method) = operator.method();
         self.user_method(of, method, a, vec![b.clone()], at)
@@ -222,7 +227,7 @@ impl Evaluator {
         method: &str,
         a: &Value,
         arguments: Vec<Value>,
-        at: At,
+        at: TokenSpan,
     ) -> Result<Option<Value>> {
         if self.implementations.is_empty() {
             return Ok(None);
@@ -238,8 +243,9 @@ impl Evaluator {
             if last.ident != of && !(of == "Index" && last.ident == "IndexMut") {
                 continue;
             }
-            let Some(scope) = self.fitting(implementation, &own) else { continue };
-            let scope = Scope::inside(&scope, Names::SelfType(own.clone(), implementation.self_type.clone()));
+            let Some(scope) = self.matching_impl_scope(implementation, &own) else { continue };
+            let scope =
+                Scope::child_scope(&scope, Names::SelfType(own.clone(), implementation.self_type.clone()));
             let right = match &last.arguments {
                 syn::PathArguments::AngleBracketed(written) => {
                     written.args.iter().find_map(|argument| match argument {
@@ -267,7 +273,7 @@ impl Evaluator {
             let result = self.deeper(at, |evaluator| {
                 evaluator.call_function(&function, Arguments::Values(values), &Type::Unknown, at)
             });
-            return self.finished(result, at).map(Some);
+            return self.into_value(result, at).map(Some);
         }
         Ok(None)
     }

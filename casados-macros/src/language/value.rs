@@ -95,7 +95,7 @@ impl Value {
     }
 
     /// What it is, for errors: "an integer".
-    pub fn kind(&self) -> &'static str {
+    pub fn description(&self) -> &'static str {
         match self {
             Value::Uninitialised => "a variable without a value",
             Value::Real(_) => "an `f64`",
@@ -147,7 +147,7 @@ pub enum IntegerType {
 
 impl IntegerType {
     /// The type of a name: `usize`.
-    pub fn named(name: &str) -> Option<IntegerType> {
+    pub fn by_name(name: &str) -> Option<IntegerType> {
         use IntegerType::*;
         Some(match name {
             "i8" => I8,
@@ -306,16 +306,16 @@ pub struct Closure {
     /// What it sees.
     pub scope: Rc<Scope>,
     /// The functions that were being executed where it was written.
-    pub calls: Option<Rc<Calls>>,
+    pub calls: Option<Rc<CallStack>>,
 }
 
 /// The functions that are being executed, innermost first.
 #[derive(Debug)]
-pub struct Calls {
+pub struct CallStack {
     /// This one.
     pub function: Rc<syn::ItemFn>,
     /// Those that called it.
-    pub parent: Option<Rc<Calls>>,
+    pub parent: Option<Rc<CallStack>>,
 }
 
 /// A function that the macro sees.

@@ -4,10 +4,10 @@ use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 
 /// Conditions count as powers of two; so many have one of their own. Sums of them are exact in
 /// single precision up to sixteen times as many.
-const WEIGHTS: usize = 20;
+const MAX_CONDITION_WEIGHTS: usize = 20;
 
 /// What a model's equations depend on that changes where they are not smooth.
-pub struct Branches {
+pub struct BranchIndicators {
     /// How many conditions and tables there are.
     pub count: usize,
     /// `Σ 2ⁱ` over the conditions that hold, and the pieces of linear tables.
@@ -18,7 +18,11 @@ pub struct Branches {
 
 /// The conditions of comparisons, of the signs in `abs` and `signum`, and tables, as far as they
 /// may change within an interval: `is_constant` says which variables do not.
-pub fn find(graph: &mut Graph, residual: &[Node], is_constant: impl Fn(u32) -> bool) -> Option<Branches> {
+pub fn find(
+    graph: &mut Graph,
+    residual: &[Node],
+    is_constant: impl Fn(u32) -> bool,
+) -> Option<BranchIndicators> {
     let (mut conditions, mut kinks, mut knots) = (Vec::new(), Vec::new(), Vec::new());
     let zero = graph.constant(0.0);
     for node in graph.reachable(residual) {
@@ -26,12 +30,13 @@ pub fn find(graph: &mut Graph, residual: &[Node], is_constant: impl Fn(u32) -> b
             Op::Compare(..) => conditions.push(node),
             Op::Unary(Unary::Abs | Unary::Signum, a) => conditions.push(graph.compare(Compare::Lt, a, zero)),
             Op::Unary(Unary::Table(table), a) => {
-                let [kink, knot] = table.pieces().map(|piece| graph.unary(Unary::Table(piece), a));
+                let [kink, knot] = table.piece_indicators().map(|piece| graph.unary(Unary::Table(piece), a));
                 kinks.push(kink);
                 knots.push(knot);
             }
             Op::Binary(Binary::Table(table), a, b) => {
-                let [kink, knot] = table.pieces().map(|piece| graph.binary(Binary::Table(piece), a, b));
+                let [kink, knot] =
+                    table.piece_indicators().map(|piece| graph.binary(Binary::Table(piece), a, b));
                 kinks.push(kink);
                 knots.push(knot);
             }
@@ -39,19 +44,23 @@ pub fn find(graph: &mut Graph, residual: &[Node], is_constant: impl Fn(u32) -> b
         }
     }
     let [conditions, kinks, knots] =
-        [conditions, kinks, knots].map(|nodes| changing(graph, nodes, &is_constant));
+        [conditions, kinks, knots].map(|nodes| time_varying_nodes(graph, nodes, &is_constant));
     let count = conditions.len() + kinks.len();
     let mut weigh = |(index, condition): (usize, Node)| {
-        let weight = graph.constant(f64::from(1u32 << (index % WEIGHTS)));
+        let weight = graph.constant(f64::from(1u32 << (index % MAX_CONDITION_WEIGHTS)));
         graph.select(condition, weight, zero)
     };
     let weighted: Vec<Node> = conditions.into_iter().enumerate().map(&mut weigh).collect();
     let mut sum = |nodes: &[Node]| nodes.iter().fold(zero, |sum, &node| graph.binary(Binary::Add, sum, node));
-    (count > 0).then(|| Branches { count, kinks: sum(&[weighted, kinks].concat()), knots: sum(&knots) })
+    (count > 0).then(|| BranchIndicators {
+        count,
+        kinks: sum(&[weighted, kinks].concat()),
+        knots: sum(&knots),
+    })
 }
 
 /// Those that depend on what changes, each once.
-fn changing(graph: &Graph, mut nodes: Vec<Node>, is_constant: impl Fn(u32) -> bool) -> Vec<Node> {
+fn time_varying_nodes(graph: &Graph, mut nodes: Vec<Node>, is_constant: impl Fn(u32) -> bool) -> Vec<Node> {
     nodes.sort_unstable();
     nodes.dedup();
     let depend = graph.dependencies(&nodes);

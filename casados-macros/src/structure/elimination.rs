@@ -54,7 +54,7 @@ impl Complex {
     fn minus(self, b: Self) -> Self {
         Self { re: self.re - b.re, im: self.im - b.im }
     }
-    fn over(self, b: Self) -> Self {
+    fn divide(self, b: Self) -> Self {
         let d = b.re * b.re + b.im * b.im;
         Self { re: (self.re * b.re + self.im * b.im) / d, im: (self.im * b.re - self.re * b.im) / d }
     }
@@ -69,7 +69,7 @@ const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
 const VANISHING: f64 = 1e-10;
 
 /// The matrix during elimination.
-struct Active {
+struct ActiveMatrix {
     /// By row, by column: values at the samples, and whether the block is trivial.
     rows: Vec<BTreeMap<u32, (Vec<Complex>, bool)>>,
     /// Rows that have an entry in the column.
@@ -84,7 +84,7 @@ struct Active {
     at_rest: usize,
 }
 
-impl Active {
+impl ActiveMatrix {
     fn new(size: usize, entries: &[Entry], at_rest: usize) -> Self {
         let samples = entries.first().map_or(0, |e| e.values.len());
         let mut active = Self {
@@ -181,7 +181,7 @@ impl Active {
                 });
                 target.1 = false;
                 for k in 0..samples {
-                    let change = factor[k].over(pivot[k]).times(pivot_row[&c].0[k]);
+                    let change = factor[k].divide(pivot[k]).times(pivot_row[&c].0[k]);
                     target.0[k] = target.0[k].minus(change);
                 }
             }
@@ -199,25 +199,25 @@ impl Active {
 /// A plan has no more updates than this; each is an element of a table. A full matrix of 66
 /// equations has as many. Beyond it there is none, and the engine eliminates the whole matrix with
 /// pivots that it looks for.
-const UPDATES: usize = 100_000;
+const MAX_UPDATES: usize = 100_000;
 
 /// The plan for a matrix of `size` equations and unknowns, whose last samples are those `at_rest`;
 /// an empty one where it would be too long.
 pub fn plan(size: usize, entries: &[Entry], at_rest: usize) -> Plan {
-    let mut active = Active::new(size, entries, at_rest);
+    let mut active = ActiveMatrix::new(size, entries, at_rest);
     let mut steps = Vec::with_capacity(size);
     let mut updates = 0;
     for _ in 0..size {
         let Some((row, column)) = active.choose() else { break };
         let (lower, upper) = active.eliminate(row, column);
         updates += lower.len() * upper.len();
-        if updates > UPDATES {
+        if updates > MAX_UPDATES {
             return Plan::default();
         }
         steps.push((row, column, lower, upper));
     }
-    in_order(&mut steps);
-    schedule(&steps)
+    sort_rows(&mut steps);
+    number_blocks(&steps)
 }
 
 type Step = (u32, u32, Vec<u32>, Vec<u32>);
@@ -225,7 +225,7 @@ type Step = (u32, u32, Vec<u32>, Vec<u32>);
 /// Rows of every step in the order in which they are eliminated: what the next pivot waits for is
 /// updated first. Columns in the opposite order: on the way back what was found last is met last,
 /// and the rest of the sum does not wait for it.
-fn in_order(steps: &mut [Step]) {
+fn sort_rows(steps: &mut [Step]) {
     let rows: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.0, k)).collect();
     let columns: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.1, k)).collect();
     for (_, _, lower, upper) in steps {
@@ -235,7 +235,7 @@ fn in_order(steps: &mut [Step]) {
 }
 
 /// Numbers the blocks pivot by pivot, and looks up every update.
-fn schedule(steps: &[Step]) -> Plan {
+fn number_blocks(steps: &[Step]) -> Plan {
     let mut plan = Plan::default();
     for (row, column, lower, upper) in steps {
         let begin = plan.blocks.len() as u32;
@@ -265,7 +265,7 @@ mod tests {
     }
 
     /// `P A Q = (I + L)(P + U)` at the first sample, by the tables of the plan.
-    fn reconstruct(size: usize, entries: &[Entry], plan: &Plan) -> f64 {
+    fn reconstruction_error(size: usize, entries: &[Entry], plan: &Plan) -> f64 {
         let mut blocks: HashMap<(u32, u32), f64> = plan.blocks.iter().map(|&at| (at, 0.0)).collect();
         for entry in entries {
             *blocks.get_mut(&(entry.row, entry.column)).expect("the plan has every entry") =
@@ -320,7 +320,7 @@ mod tests {
             }
         }
         let plan = plan(n as usize, &entries, 0);
-        assert!(reconstruct(n as usize, &entries, &plan) < 1e-13);
+        assert!(reconstruction_error(n as usize, &entries, &plan) < 1e-13);
         // The full row and column go last, so that there is hardly any fill.
         assert!(plan.blocks.len() <= entries.len() + 2, "{} of {}", plan.blocks.len(), entries.len());
     }

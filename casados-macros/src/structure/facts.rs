@@ -60,7 +60,7 @@ pub fn find(
         outside.then(|| if variable < end_x { variable - nx } else { variable - end_z + nx })
     };
     let trivial: Vec<u32> = (0..).zip(&terms).filter(trivial).map(|(row, _)| row).collect();
-    let curved = Curved::find(hessian, ends);
+    let curved = NonlinearVariables::find(hessian, ends);
     Facts {
         linear_in_state: independent(&|variable| variable < end_z),
         constant_matrix: independent(&|variable| variable < end_z || variable == time),
@@ -78,12 +78,12 @@ pub fn find(
 }
 
 /// What second derivatives are made of.
-struct Curved {
+struct NonlinearVariables {
     variables: BTreeSet<u32>,
     diagonal_controls: Vec<(u32, u32)>,
 }
 
-impl Curved {
+impl NonlinearVariables {
     fn find(hessian: &[Entry], ends: [u32; 5]) -> Self {
         let [nx, end_x, end_z, ..] = ends;
         let mut variables: BTreeSet<u32> = hessian.iter().flat_map(|entry| [entry.0, entry.1]).collect();

@@ -26,7 +26,7 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
         }
     }
     let name = |unknown: usize| match model.variables.x.get(unknown) {
-        Some(name) => derivative(name),
+        Some(name) => derivative_name(name),
         None => format!("`{}`", model.variables.z[unknown - nx as usize]),
     };
     let way_out = match model.reduction {
@@ -45,7 +45,7 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
 /// over- and underdetermined (the Dulmage-Mendelsohn decomposition).
 pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Result<()> {
     let count = rows.len();
-    let matching = match_rows(rows, count);
+    let matching = maximum_matching(rows, count);
     if matching.iter().all(Option::is_some) {
         return Ok(());
     }
@@ -64,12 +64,12 @@ pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Resul
     let number = |equation: &usize| equation.to_string();
     let mut sentences = Vec::new();
     for (equations, unknowns) in &parts[0] {
-        let subject = phrase("equation", "equations", equations, number);
+        let subject = count_phrase("equation", "equations", equations, number);
         let s = if equations.len() == 1 { "s" } else { "" };
         sentences.push(if unknowns.is_empty() {
             format!("{subject} contain{s} {}", words.nothing)
         } else {
-            format!("{subject} determine{s} only {}", list(unknowns, name))
+            format!("{subject} determine{s} only {}", listed_names(unknowns, name))
         });
     }
     for (unknowns, equations) in &parts[1] {
@@ -77,9 +77,9 @@ pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Resul
         let object = match equations.len() {
             0 => "by no equation".into(),
             1 => format!("only by equation {}", equations[0]),
-            _ => format!("only by equations {}", list(equations, number)),
+            _ => format!("only by equations {}", listed_names(equations, number)),
         };
-        sentences.push(format!("{} {verb} determined {object}", list(unknowns, name)));
+        sentences.push(format!("{} {verb} determined {object}", listed_names(unknowns, name)));
     }
     let message = format!("{}: {} (equations are counted from 0)", sentences.join("; "), words.conclusion);
     // At every equation concerned; several that come from the same tokens are one.
@@ -103,7 +103,7 @@ pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Resul
 
 /// For each column the row that it is matched with: a matching of maximum size, by augmenting
 /// paths.
-fn match_rows(rows: &[Vec<usize>], columns: usize) -> Vec<Option<usize>> {
+fn maximum_matching(rows: &[Vec<usize>], columns: usize) -> Vec<Option<usize>> {
     let mut matching: Vec<Option<usize>> = vec![None; columns];
     for start in 0..rows.len() {
         // Breadth first; each column remembers the row from which it was reached.
@@ -199,23 +199,23 @@ fn components(
 }
 
 /// The name of the derivative of a state: that of `x[3]` is `xdot[3]`.
-fn derivative(state: &str) -> String {
+fn derivative_name(state: &str) -> String {
     match state.strip_prefix("x[") {
         Some(rest) => format!("`xdot[{rest}`"),
         None => format!("the derivative of `{state}`"),
     }
 }
 
-fn phrase<'a>(one: &str, many: &str, items: &'a [usize], name: impl Fn(&'a usize) -> String) -> String {
-    format!("{} {}", if items.len() == 1 { one } else { many }, list(items, name))
+fn count_phrase<'a>(one: &str, many: &str, items: &'a [usize], name: impl Fn(&'a usize) -> String) -> String {
+    format!("{} {}", if items.len() == 1 { one } else { many }, listed_names(items, name))
 }
 
 /// `a`, `a and b`, `a, b and c`; of many the first ones and their number.
-fn list<'a>(items: &'a [usize], name: impl Fn(&'a usize) -> String) -> String {
-    const SHOWN: usize = 8;
-    let mut names: Vec<String> = items.iter().take(SHOWN).map(name).collect();
-    if items.len() > SHOWN {
-        names.push(format!("{} more", items.len() - SHOWN));
+fn listed_names<'a>(items: &'a [usize], name: impl Fn(&'a usize) -> String) -> String {
+    const MAX_SHOWN: usize = 8;
+    let mut names: Vec<String> = items.iter().take(MAX_SHOWN).map(name).collect();
+    if items.len() > MAX_SHOWN {
+        names.push(format!("{} more", items.len() - MAX_SHOWN));
     }
     match names.pop() {
         Some(last) if names.is_empty() => last,

@@ -3,7 +3,7 @@
 //! stage, so that they are no unknowns of the elimination: `casados_core::model::Kinematic`.
 
 use super::Model;
-use super::samples::{Position, Term};
+use super::samples::{NewtonEntry, Term};
 use crate::graph::{Degree, Entry};
 use std::collections::BTreeMap;
 
@@ -66,9 +66,9 @@ fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinemat
 
 /// The Newton matrix without the equations and the derivatives of kinematic states: of `k_q = c
 /// (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is a part of that of `v`.
-pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<Position>) -> Vec<Position> {
-    let mut left: BTreeMap<(u32, u32), Position> = BTreeMap::new();
-    for Position { row, column, terms } in positions {
+pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<NewtonEntry>) -> Vec<NewtonEntry> {
+    let mut left: BTreeMap<(u32, u32), NewtonEntry> = BTreeMap::new();
+    for NewtonEntry { row, column, terms } in positions {
         if kinematic.iter().any(|of| of.equation == row) {
             continue;
         }
@@ -80,7 +80,7 @@ pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<Position>) -> V
             }
             None => (column, terms),
         };
-        let position = left.entry((row, column)).or_insert(Position { row, column, terms: Vec::new() });
+        let position = left.entry((row, column)).or_insert(NewtonEntry { row, column, terms: Vec::new() });
         position.terms.extend(terms);
         position.terms.sort_by_key(|term| (term.order, term.by, term.entry));
     }

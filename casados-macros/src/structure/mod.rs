@@ -15,12 +15,12 @@ mod tests;
 
 use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Sampling, Variables};
-use branches::Branches;
+use branches::BranchIndicators;
 pub use elimination::Plan;
 pub use facts::Facts;
 use kinematic::Kinematic;
 pub use reduction::times;
-use samples::Position;
+use samples::NewtonEntry;
 use std::collections::{BTreeSet, HashSet};
 use tables::Tables;
 
@@ -72,7 +72,7 @@ pub struct Analysis {
     /// How the Newton matrix is eliminated.
     pub elimination: Elimination,
     /// The conditions that may change within an interval, if there are any.
-    pub branches: Option<Branches>,
+    pub branches: Option<BranchIndicators>,
     /// What was differentiated, if the index was reduced.
     pub reduction: Option<Reduction>,
 }
@@ -119,7 +119,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     let reduced = reduction::reduce(&mut model)?;
     let mut analysis = analyse_index_one(model)?;
     let singular = if asked { reduction::rank::check(&analysis, reduced.is_some())? } else { [0; 2] };
-    if let Some(reduction::Reduced { differentiated, rates, invariants, projection }) = reduced {
+    if let Some(reduction::ReducedModel { differentiated, rates, invariants, projection }) = reduced {
         let invariants = analyse_function(invariants);
         let projection = projection.map(analyse_function);
         analysis.reduction = Some(Reduction { differentiated, rates, singular, invariants, projection });
@@ -136,7 +136,7 @@ fn analyse_index_one(mut model: Model) -> syn::Result<Analysis> {
     let facts =
         facts::find(&model.graph, &model.residual, (jacobian, *blocks, constant), hessian, linear, ends);
     let explicit = explicit(&model, jacobian, ends);
-    let nonlinear = nonlinear(hessian, ends);
+    let nonlinear = has_nonlinear_pair(hessian, ends);
     let curved = hessian.iter().filter(|entry| facts.curved.contains(&entry.0));
     let symmetric = curved.map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum();
     let elimination = elimination(&model, jacobian, *blocks, &facts.trivial);
@@ -202,10 +202,10 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
     let varying = values.iter().zip(&constant).filter(|(_, constant)| !**constant).map(|(value, _)| *value);
     let residual_jacobian: Vec<Node> = model.residual.iter().copied().chain(varying).collect();
     let operations = Operations {
-        residual: graph.operations(&model.residual),
-        residual_jacobian: graph.operations(&residual_jacobian),
-        adjoint: graph.operations(&gradient),
-        hessian: graph.operations(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
+        residual: graph.operation_count(&model.residual),
+        residual_jacobian: graph.operation_count(&residual_jacobian),
+        adjoint: graph.operation_count(&gradient),
+        hessian: graph.operation_count(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
     };
     Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
@@ -216,7 +216,7 @@ fn newton_matrix(
     jacobian: &[Entry],
     blocks: [usize; 6],
     trivial: &[u32],
-) -> (Vec<Kinematic>, Vec<Position>) {
+) -> (Vec<Kinematic>, Vec<NewtonEntry>) {
     let nx = model.variables.x.len() as u32;
     let kinematic = kinematic::find(model, (jacobian, blocks), trivial);
     let positions = kinematic::condense(nx, &kinematic, samples::pattern(jacobian, blocks, nx));
@@ -275,7 +275,7 @@ fn check_length(model: &Model) -> syn::Result<()> {
 }
 
 /// Whether the Hessian has an entry for two unknowns of which it is one, whatever the states are.
-fn nonlinear(hessian: &[Entry], [nx, end_x, end_z, ..]: [u32; 5]) -> Vec<bool> {
+fn has_nonlinear_pair(hessian: &[Entry], [nx, end_x, end_z, ..]: [u32; 5]) -> Vec<bool> {
     let unknown = |variable: u32| match variable {
         derivative if derivative < nx => Some(derivative as usize),
         algebraic => (end_x..end_z).contains(&algebraic).then(|| (algebraic - nx) as usize),

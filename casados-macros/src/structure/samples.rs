@@ -5,18 +5,18 @@
 //! size) and a range (no point is outside).
 
 use super::elimination::{Complex, Entry};
-use crate::graph::{Graph, Node, Point};
+use crate::graph::{EvaluationPoint, Graph, Node};
 use crate::language::Sampling;
 use std::collections::BTreeMap;
 
 /// Sample points that are wanted, and how many may be drawn to get them: at some the model has no
 /// finite value.
 const POINTS: usize = 12;
-const DRAWS: usize = 200;
+const MAX_DRAWS: usize = 200;
 
 /// A structural non-zero of the Newton matrix: a sum of terms.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Position {
+pub struct NewtonEntry {
     pub row: u32,
     pub column: u32,
     pub terms: Vec<Term>,
@@ -35,8 +35,8 @@ pub struct Term {
 }
 
 /// The pattern `f_ẋ ∪ f_x ∪ f_z`, by row, then by column.
-pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Vec<Position> {
-    let mut positions: BTreeMap<(u32, u32), Position> = BTreeMap::new();
+pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Vec<NewtonEntry> {
+    let mut positions: BTreeMap<(u32, u32), NewtonEntry> = BTreeMap::new();
     for (entry, &(row, variable, _)) in jacobian.iter().enumerate().take(blocks[3]) {
         // Variables are (ẋ, x, z, ...), unknowns are (k, z).
         let column = if variable < nx { variable } else { variable - nx };
@@ -53,11 +53,11 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
     let mut random = Random::default();
     let points = Points { graph, nodes, samplings, constants: constants(&mut random, opaque) };
     let mut found = Vec::new();
-    for draw in 0..DRAWS {
+    for draw in 0..MAX_DRAWS {
         if found.len() == POINTS {
             break;
         }
-        let values = points.at(&mut random, draw);
+        let values = points.point_values(&mut random, draw);
         if values.iter().all(|value| value.is_finite()) {
             found.push(values);
         }
@@ -70,7 +70,7 @@ pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usi
 /// there, or at their nominal values, or as near to zero as their range allows.
 pub fn sample(
     graph: &Graph,
-    (jacobian, positions): (&[(u32, u32, Node)], &[Position]),
+    (jacobian, positions): (&[(u32, u32, Node)], &[NewtonEntry]),
     samplings: &[Sampling],
     states: usize,
     opaque: usize,
@@ -92,23 +92,29 @@ pub fn sample(
         used.all(|term| values[term.entry as usize].is_finite())
     };
     let mut found = 0;
-    for draw in 0..DRAWS {
+    for draw in 0..MAX_DRAWS {
         if found == POINTS {
             break;
         }
-        let values = points.at(&mut random, draw);
+        let values = points.point_values(&mut random, draw);
         if is_finite(&values) {
             found += 1;
-            add(&mut entries, positions, &values, &mut random);
+            append_sample(&mut entries, positions, &values, &mut random);
         }
     }
     let values = points.at_rest(&mut random, states);
-    let at_rest = if is_finite(&values) { add(&mut entries, positions, &values, &mut random) } else { 0 };
+    let at_rest =
+        if is_finite(&values) { append_sample(&mut entries, positions, &values, &mut random) } else { 0 };
     (entries, at_rest)
 }
 
 /// Appends the values of the non-zeros at a point with some `hμ`; with how many.
-fn add(entries: &mut [Entry], positions: &[Position], values: &[f64], random: &mut Random) -> usize {
+fn append_sample(
+    entries: &mut [Entry],
+    positions: &[NewtonEntry],
+    values: &[f64],
+    random: &mut Random,
+) -> usize {
     const SIZES: usize = 2;
     for _ in 0..SIZES {
         // Eigenvalues of A lie in the right half-plane; the step size may be anything.
@@ -144,7 +150,7 @@ struct Points<'a> {
 
 impl Points<'_> {
     /// The values at a point.
-    fn at(&self, random: &mut Random, draw: usize) -> Vec<f64> {
+    fn point_values(&self, random: &mut Random, draw: usize) -> Vec<f64> {
         let point: Vec<f64> =
             self.samplings.iter().map(|sampling| coordinate(random, draw, *sampling)).collect();
         self.evaluate(&point)
@@ -168,12 +174,13 @@ impl Points<'_> {
     }
 
     fn evaluate(&self, point: &[f64]) -> Vec<f64> {
-        self.graph.evaluate(self.nodes, Point { variables: point, opaque: &self.constants, seeds: &[] })
+        self.graph
+            .evaluate(self.nodes, EvaluationPoint { variables: point, opaque: &self.constants, seeds: &[] })
     }
 }
 
 /// The block is the identity, whatever the step size and the point.
-pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Position) -> bool {
+pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &NewtonEntry) -> bool {
     match position.terms[..] {
         [Term { entry, order: 0, .. }] => graph.value(jacobian[entry as usize].2) == Some(1.0),
         _ => false,
@@ -182,7 +189,7 @@ pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Posi
 
 /// A coordinate of the point with this number.
 fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
-    let anywhere = anywhere(random, draw);
+    let anywhere = unbounded_coordinate(random, draw);
     match (sampling.nominal, sampling.range) {
         (None, None) => anywhere,
         (Some(nominal), _) if draw == 0 => nominal,
@@ -194,7 +201,7 @@ fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
 
 /// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any
 /// magnitude.
-fn anywhere(random: &mut Random, draw: usize) -> f64 {
+fn unbounded_coordinate(random: &mut Random, draw: usize) -> f64 {
     let value = random.between(-1.0, 1.0);
     match draw % 4 {
         0 => value,

@@ -62,13 +62,13 @@ mod tests {
     }
 
     #[test]
-    fn a_full_matrix_is_one() {
+    fn full_matrix_is_one_supernode() {
         assert_eq!(find(&of(3, |_, _| true)), [3, 0, 0]);
         assert_eq!(find(&of(6, |_, _| true)), [4, 0, 0, 0, 2, 0]);
     }
 
     #[test]
-    fn points_beside_each_other_are_one_each() {
+    fn diagonal_pivots_are_single() {
         let chain = of(12, |row, column| (row / 3).abs_diff(column / 3) <= 1);
         assert_eq!(find(&chain), [3, 0, 0, 3, 0, 0, 3, 0, 0, 3, 0, 0]);
         let lines = of(4, |row, column| row.abs_diff(column) == 1);

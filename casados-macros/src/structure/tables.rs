@@ -3,7 +3,7 @@
 
 use super::elimination::Plan;
 use super::kinematic::Kinematic;
-use super::samples::{Position, Term};
+use super::samples::{NewtonEntry, Term};
 use super::supernodes;
 use std::collections::{HashMap, HashSet};
 
@@ -21,7 +21,7 @@ pub struct Tables {
     pub supernodes: Vec<[u32; 2]>,
     /// For each state `(equation, entry, velocity)`; empty if no state is kinematic.
     pub kinematic: Vec<[u32; 3]>,
-    pub dependents: Vec<Dependent>,
+    pub dependents: Vec<KinematicDependence>,
 }
 
 /// `casados_core::model::Pivot`
@@ -49,7 +49,7 @@ pub struct Assembly {
 }
 
 /// `casados_core::model::Dependent`
-pub struct Dependent {
+pub struct KinematicDependence {
     pub entry: u32,
     pub state: u32,
     pub first: bool,
@@ -59,7 +59,7 @@ pub struct Dependent {
 /// The tables of a plan for so many equations and states.
 pub fn of(
     plan: &Plan,
-    positions: &[Position],
+    positions: &[NewtonEntry],
     identity: &[bool],
     kinematic: &[Kinematic],
     [equations, nx]: [usize; 2],
@@ -81,7 +81,7 @@ pub fn of(
         updates: updates(plan, &positions),
         assembly: assembly(plan, &positions),
         kinematic: rows_of_states(nx, kinematic),
-        dependents: dependents(kinematic),
+        dependents: kinematic_dependences(kinematic),
         slots,
         slot_of_equation,
     }
@@ -117,7 +117,7 @@ fn pivots(plan: &Plan, slots: &[u32], identity: &[bool]) -> (Vec<Pivot>, Vec<[u3
 
 /// What blocks are made of, those of a kind one after the other, fill first: what is done to them
 /// then has no branches that nobody can foresee.
-fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Assembly> {
+fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &NewtonEntry>) -> Vec<Assembly> {
     let mut rows = Vec::new();
     for (place, block) in plan.blocks.iter().zip(0u32..) {
         let terms = positions.get(place).map_or(&[][..], |position| &position.terms);
@@ -136,7 +136,7 @@ fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Asse
 }
 
 /// For each update its block, and whether nothing is there before.
-fn updates(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Update> {
+fn updates(plan: &Plan, positions: &HashMap<(u32, u32), &NewtonEntry>) -> Vec<Update> {
     let is_empty = |block: &u32| !positions.contains_key(&plan.blocks[*block as usize]);
     let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32).filter(is_empty).collect();
     plan.updates.iter().map(|&block| Update { block, first: empty.remove(&block) }).collect()
@@ -153,10 +153,10 @@ fn rows_of_states(nx: usize, kinematic: &[Kinematic]) -> Vec<[u32; 3]> {
 }
 
 /// The entries by which other equations depend on kinematic states, by velocities.
-fn dependents(kinematic: &[Kinematic]) -> Vec<Dependent> {
+fn kinematic_dependences(kinematic: &[Kinematic]) -> Vec<KinematicDependence> {
     let of_state = |of: &Kinematic| {
         let (state, count) = (of.state, of.dependents.len());
-        let row = move |(index, &entry): (usize, &u32)| Dependent {
+        let row = move |(index, &entry): (usize, &u32)| KinematicDependence {
             entry,
             state,
             first: index == 0,

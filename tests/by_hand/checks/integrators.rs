@@ -77,7 +77,7 @@ impl<const FAULT: u8> Integrator for Closed<FAULT> {
     fn statistics(&self) -> Statistics {
         Statistics::default()
     }
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
@@ -87,7 +87,7 @@ impl<const FAULT: u8> Integrator for Closed<FAULT> {
         self.evaluate(x0[0], u[0], h, 1.0);
         Ok(&self.result)
     }
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
@@ -97,7 +97,7 @@ impl<const FAULT: u8> Integrator for Closed<FAULT> {
         self.evaluate(x0[0], u[0], h, 1.0);
         Ok(&self.result)
     }
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
@@ -112,7 +112,7 @@ impl<const FAULT: u8> Integrator for Closed<FAULT> {
         self.adjoint.grad_p = first.grad_p;
         Ok(&self.adjoint)
     }
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,

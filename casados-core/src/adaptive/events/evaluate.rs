@@ -2,7 +2,7 @@
 
 use super::Event;
 use crate::error::{Error, Place};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::model::{ArrayK, ArrayV, Dae, VectorX};
 use crate::result::Dense;
 use crate::scalar::Real;
@@ -51,7 +51,7 @@ pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 /// [`Error::NonFiniteFunction`]
 pub(super) fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
     let at = Place { step, stage: 0, iteration: 0 };
-    match not_finite(values) {
+    match find_non_finite(values) {
         None => Ok(()),
         Some((output, value)) => Err(Error::NonFiniteFunction { function, output, value, at }),
     }

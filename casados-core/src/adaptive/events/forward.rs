@@ -1,7 +1,7 @@
 //! Derivatives over the parts between events, forwards.
 
 use super::*;
-use crate::integrator::blocks::{advance, fill, identity};
+use crate::integrator::chain_rule::{chain_states, fill, identity};
 use crate::memory::allocate;
 use crate::result::Forward;
 
@@ -15,7 +15,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         second: bool,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
         let [mut v, mut next] = match self.sensitivities.take() {
             Some(there) => there,
@@ -40,7 +40,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             if k == 0 {
                 solution.nominal.z0 = local.nominal.z0;
             }
-            advance(local, &v, &mut next);
+            chain_states(local, &v, &mut next);
             core::mem::swap(&mut v, &mut next);
             if second {
                 rows_of(local, &mut own)?;
@@ -59,10 +59,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         let [v, _] = self.sensitivities.insert([v, next]);
         let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
-        if let Some((index, _)) = not_finite(v) {
+        if let Some((index, _)) = find_non_finite(v) {
             return Err(Error::Overflow { step: 0, index });
         }
         let mut result = HybridForward {

@@ -36,14 +36,14 @@ use crate::adaptive::sensitivities::{chain, dynamic};
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
 use crate::error::{Argument, Error, Place};
-use crate::finite::{check_named, not_finite};
-use crate::integrator::blocks::Rows;
+use crate::finite::{check_named, find_non_finite};
+use crate::integrator::chain_rule::StateSensitivities;
 use crate::linalg::axpy;
 use crate::memory::{allocate, push};
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
-use crate::quadrature::{Integrand, OptionalIntegrand, begin, finish, reborrow};
+use crate::quadrature::{Integrand, OptionalIntegrand, finish_integrand, reborrow, reset_integrand};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, listed, plain};
@@ -122,7 +122,7 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     /// What is known about the moments of the events of a call.
     moments: Moments<M, T>,
     /// Derivatives over the parts up to now, and memory for the next ones.
-    sensitivities: Option<[Box<Rows<M, T>>; 2]>,
+    sensitivities: Option<[Box<StateSensitivities<M, T>>; 2]>,
     /// Memory of second derivatives.
     second: Option<Box<second::Second<M, T>>>,
 }
@@ -216,11 +216,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         h: T,
     ) -> Result<HybridForward<M, T>, Error> {
-        self.forward_along(x0, u, h, None)
+        self.forward_with_quadrature(x0, u, h, None)
     }
 
     /// As [`Hybrid::forward`], with an integrand.
-    pub(super) fn forward_along(
+    pub(super) fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -244,11 +244,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        self.adjoint_along(x0, u, h, lambda, None)
+        self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
 
     /// As [`Hybrid::solve`], with an integrand: the steps are taken again, to rounding.
-    pub(super) fn solve_along(
+    pub(super) fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -267,7 +267,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<Moments<M, T>, Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         let mut moments = core::mem::take(&mut self.moments);
         moments.clear();
         let mut x = *x0;
@@ -286,12 +286,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         Ok(moments)
     }
 
     /// As [`Hybrid::adjoint`], with an integrand.
-    pub(super) fn adjoint_along(
+    pub(super) fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,

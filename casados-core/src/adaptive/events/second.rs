@@ -17,8 +17,8 @@ use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::adaptive::engine::Engine;
 use crate::adaptive::point::At;
 use crate::error::{Argument, Error};
-use crate::finite::{check_named, not_finite};
-use crate::integrator::blocks::{Rows, Square, add, element, fill, identity};
+use crate::finite::{check_named, find_non_finite};
+use crate::integrator::chain_rule::{FullHessian, StateSensitivities, add, element, fill, identity};
 use crate::linalg::axpy;
 use crate::memory::allocate;
 use crate::model::{
@@ -79,11 +79,11 @@ listed!([M: Dae, T: Real] HybridHessian<M, T> { forward, adjoint, h_xx, h_xu, h_
 #[zeroable(bound = "T: Zeroable")]
 pub(super) struct Second<M: Dae, T: Plain> {
     /// The Hessian over the state that was reached, `u` and `p`, and one in the making.
-    h: Square<M, T>,
-    sum: Square<M, T>,
-    product: Square<M, T>,
+    h: FullHessian<M, T>,
+    sum: FullHessian<M, T>,
+    product: FullHessian<M, T>,
     /// `S'`, and `E` of all variables.
-    s: [Rows<M, T>; 2],
+    s: [StateSensitivities<M, T>; 2],
     e: ArrayV<M, ArrayW<M, T>>,
     /// Derivatives of `ẋ`, a row for each direction.
     slopes: ArrayW<M, ArrayX<M, T>>,
@@ -150,7 +150,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
         adjoint.check()?;
         let (nx, nu, h) = (M::Shape::NX, M::Shape::NU, second.h.as_ref());
-        if let Some((index, _)) = not_finite(ArrayW::<M, T>::flat(h)) {
+        if let Some((index, _)) = find_non_finite(ArrayW::<M, T>::flat(h)) {
             return Err(Error::Overflow { step: 0, index });
         }
         // To the last bit symmetric: of the two that differ by rounding the lower one.

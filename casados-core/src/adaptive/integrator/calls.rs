@@ -26,7 +26,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         Statistics { steps, iterations, residuals, jacobians, factorizations, dense }
     }
 
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -40,7 +40,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         Ok(&self.base.result)
     }
 
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -53,7 +53,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         Ok(&self.done(span)?.hessian.first.forward)
     }
 
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -70,7 +70,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         Ok(&self.done(span)?.adjoint)
     }
 
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,

@@ -12,7 +12,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// See [`Integrator`]; those of Newton's method with steps that are kept.
     pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
-        self.forward_along(x0, u, h, None)
+        self.forward_with_quadrature(x0, u, h, None)
     }
 
     /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as
@@ -27,7 +27,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.adjoint_along(x0, u, h, lambda, None)
+        self.adjoint_with_quadrature(x0, u, h, lambda, None)
     }
 
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as
@@ -42,6 +42,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.hessian_along(x0, u, h, lambda, None)
+        self.hessian_with_quadrature(x0, u, h, lambda, None)
     }
 }

@@ -11,7 +11,7 @@ use super::columns::Columns;
 use crate::adaptive::segment::filled;
 use crate::error::Error;
 use crate::function::{Function, MatrixYP, MatrixYU, MatrixYX};
-use crate::integrator::blocks::fill;
+use crate::integrator::chain_rule::fill;
 use crate::model::{
     ArrayW, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };

@@ -23,10 +23,12 @@ use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
 use crate::error::{Argument, Error};
 use crate::finite::{check_input, check_named, check_output};
-use crate::integrator::blocks::{element, fill};
+use crate::integrator::chain_rule::{element, fill};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
-use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish, reborrow};
+use crate::quadrature::{
+    AdjointOnlyIntegrand, OptionalIntegrand, finish_integrand, reborrow, reset_integrand,
+};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -129,7 +131,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// As [`Piecewise::solve`], with an integrand: the steps are taken again, to rounding.
-    pub(super) fn solve_along(
+    pub(super) fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
@@ -173,7 +175,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// As [`Piecewise::forward`], with an integrand.
-    pub(super) fn forward_along<Q: Spanning<M, T>>(
+    pub(super) fn forward_with_quadrature<Q: Spanning<M, T>>(
         &mut self,
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
@@ -189,7 +191,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// As [`Piecewise::hessian`], with an integrand.
-    pub(super) fn hessian_along<Q: Spanning<M, T>>(
+    pub(super) fn hessian_with_quadrature<Q: Spanning<M, T>>(
         &mut self,
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
@@ -218,11 +220,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
-        self.adjoint_along(x0, controls, ends, lambda, None)
+        self.adjoint_with_quadrature(x0, controls, ends, lambda, None)
     }
 
     /// As [`Piecewise::adjoint`], with an integrand.
-    pub(super) fn adjoint_along(
+    pub(super) fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
@@ -298,7 +300,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
             let history = core::mem::take(&mut segment.history);
             let (mut frozen, state, memory, v) = segment.open(integrator)?;
-            let mut part = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let mut part = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
             frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
             let hessian = &memory.hessian;
             adjoint.grad_x0 = hessian.first.grad_x0;

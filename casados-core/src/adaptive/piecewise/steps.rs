@@ -98,7 +98,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         x0: &VectorX<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut x = *x0;
         for (k, segment) in segments.iter_mut().enumerate().take(*count) {
@@ -109,7 +109,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             x = integrator.base.result.x;
             collect(nominal, &integrator.base.result, k);
         }
-        finish(&mut along)
+        finish_integrand(&mut along)
     }
 
     /// The same with derivatives, and what those of second order need; with an integrand and what
@@ -121,7 +121,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         mut along: OptionalIntegrand<'_, '_, M, T>,
         mut sums: Option<&mut Sums<M, T>>,
     ) -> Result<PiecewiseForward<M, T>, Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         let Self { integrator, segments, count, nominal, v: [v, next], .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let (nx, width) = (M::Shape::NX, at.all());
@@ -175,7 +175,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             fill(du, |r, c| v[r * width + at.u(k) + c]);
         }
         result.nominal = *nominal;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         sums.map_or(Ok(()), |sums| sums.check())?;
         check_output(v, 0)?;
         Ok(result)

@@ -21,11 +21,16 @@ use crate::adaptive::step::{Span, Workspace};
 use crate::adaptive::tape::Tape;
 use crate::error::Error;
 use crate::finite::{check_forward, check_output};
-use crate::integrator::blocks::{Rows, Square, add, advance, algebraic, element, identity, split, states};
+use crate::integrator::chain_rule::{
+    FullHessian, StateSensitivities, add, chain_states, element, identity, write_algebraic, write_blocks,
+    write_states,
+};
 use crate::linalg::axpy;
 use crate::memory::extend;
 use crate::model::{ArrayK, ArrayW, Dae, VectorX, VectorZ};
-use crate::quadrature::{Backwards, Chained, Integrand, OptionalIntegrand, begin, finish};
+use crate::quadrature::{
+    AdjointOnlyIntegrand, ChainRuleIntegrand, Integrand, OptionalIntegrand, finish_integrand, reset_integrand,
+};
 use crate::result::{Adjoint, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Plain, Shape};
@@ -39,13 +44,13 @@ pub struct Memory<M: Dae, T: Plain> {
     pub hessian: Hessian<M, T>,
     pub adjoint: Adjoint<M, T>,
     /// `V_n`, and `V_{n+1}`.
-    v: [Rows<M, T>; 2],
+    v: [StateSensitivities<M, T>; 2],
     lambda: VectorX<M, T>,
     /// The gradient of all steps.
     gradient: ArrayW<M, T>,
     /// The Hessian of one step times `D`, and the sum of all.
-    product: Square<M, T>,
-    sum: Square<M, T>,
+    product: FullHessian<M, T>,
+    sum: FullHessian<M, T>,
 }
 
 /// What derivatives are taken of.
@@ -134,13 +139,13 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         x0: &VectorX<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         self.steps::<B>(state, x0, |replays, taken, _| {
             let mut chained = chain(&mut along, None, false);
             let nominal = replays.solve(taken, dynamic(&mut chained))?;
             Ok((nominal.x, nominal.z))
         })?;
-        finish(&mut along)
+        finish_integrand(&mut along)
     }
 
     /// The solution and its derivatives; `history` takes `V_n` of each step, if it is wanted.
@@ -155,7 +160,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         mut history: Option<&mut Vec<T>>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        begin(&mut along);
+        reset_integrand(&mut along);
         let second = history.is_some();
         let Memory { v: [v, next], hessian, .. } = memory;
         let result = &mut hessian.first.forward;
@@ -167,19 +172,19 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             }
             let mut chained = chain(&mut along, Some(v), second);
             let forward = replays.forward(taken, dynamic(&mut chained))?;
-            advance(forward, v, next);
+            chain_states(forward, v, next);
             if step + 1 == count && B::ENDS_ON_STAGE {
-                algebraic(forward, v, result);
+                write_algebraic(forward, v, result);
             }
             *v = *next;
             Ok((forward.nominal.x, forward.nominal.z))
         })?;
-        states(v, result);
+        write_states(v, result);
         if const { !B::ENDS_ON_STAGE && M::Shape::NZ > 0 } {
             let y = self.end()?;
             let (x, Workspace { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
             let at = At { x: &x, u, p: parameters, t: self.span.end };
-            algebraic(self.consistent.forward(&at, &y)?, v, result);
+            write_algebraic(self.consistent.forward(&at, &y)?, v, result);
         }
         if const { M::Shape::NZ > 0 } {
             let Workspace { u, parameters, start, .. } = &mut *self.base;
@@ -191,7 +196,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             }
         }
         result.nominal = self.base.result;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         check_forward(result, count)
     }
 
@@ -217,7 +222,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
-            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
             let local = B::replays(state).adjoint(&taken, now, dynamic(&mut backwards));
             let local = local.map_err(|error| in_step(error, step))?;
             now.as_mut_slice().copy_from_slice(local.grad_x0.as_slice());
@@ -262,7 +267,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
-            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
             let second = B::replays(state).hessian(&taken, now, dynamic(&mut backwards));
             let second = second.map_err(|error| in_step(error, step))?;
             *now = second.first.grad_x0;
@@ -278,7 +283,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 axpy(T::ONE, second.as_ref(), sum.as_mut());
             }
         }
-        split(sum, hessian);
+        write_blocks(sum, hessian);
         let others = &gradient.as_ref()[nx..];
         hessian.first.grad_x0 = *now;
         hessian.first.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
@@ -295,10 +300,10 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
 /// The integrand of one step of an interval, or of one of several intervals.
 pub(super) fn chain<'a, M: Dae, T: Real>(
     along: &'a mut OptionalIntegrand<'_, '_, M, T>,
-    v: Option<&'a Rows<M, T>>,
+    v: Option<&'a StateSensitivities<M, T>>,
     second: bool,
-) -> Option<Chained<'a, M, T>> {
-    along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
+) -> Option<ChainRuleIntegrand<'a, M, T>> {
+    along.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, second })
 }
 
 pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(

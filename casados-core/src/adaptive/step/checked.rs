@@ -20,10 +20,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.statistics.jacobians += 1;
         M::residual_jacobian::<T>(if middle { foreseen } else { point }, f, jacobian);
         let at = Place { step, stage: 0, iteration: 0 };
-        if let Some((equation, value)) = not_finite(f.as_ref()) {
+        if let Some((equation, value)) = find_non_finite(f.as_ref()) {
             return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
         }
-        if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
+        if let Some((entry, value)) = find_non_finite(jacobian.as_ref()) {
             let equation = M::STRUCTURE.jacobian.at(entry).0;
             return Err(Error::NonFiniteModel { quantity: Quantity::Jacobian, equation, value, at });
         }

@@ -17,7 +17,7 @@ use crate::adaptive::tape::Tape;
 use crate::adaptive::tolerances::Tolerances;
 use crate::adaptive::variational::Variational;
 use crate::error::{Error, Place, Quantity, Refusal};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};

@@ -1,26 +1,26 @@
 //! What is remembered, and what is forgotten.
 
-use crate::casadi::cache::{Answer, Cache, Given, key};
+use crate::casadi::cache::{Cache, ComputedDerivatives, IntervalResults, key};
 use alloc::vec;
 
-fn known(value: f64) -> Answer<()> {
-    let mut answer = Answer::default();
+fn results_with_value(value: f64) -> IntervalResults<()> {
+    let mut answer = IntervalResults::default();
     answer.value.set(1)[0] = value;
     answer
 }
 
-fn store(cache: &mut Cache<()>, input: f64, answer: &mut Answer<()>) {
+fn store(cache: &mut Cache<()>, input: f64, answer: &mut IntervalResults<()>) {
     store_as(cache, key(&[input]), input, answer);
 }
 
 /// Stores what was asked for, with the derivatives that there are.
-fn store_as(cache: &mut Cache<()>, key: u64, input: f64, answer: &mut Answer<()>) {
+fn store_as(cache: &mut Cache<()>, key: u64, input: f64, answer: &mut IntervalResults<()>) {
     let second = answer.lambda.get().map(|lambda| self::key(lambda));
-    let given = Given { jacobian: answer.jacobian.get().is_some(), second };
+    let given = ComputedDerivatives { jacobian: answer.jacobian.get().is_some(), second };
     cache.store(key, &[input], answer, given);
 }
 
-fn find(cache: &Cache<()>, input: f64) -> Option<&Answer<()>> {
+fn find(cache: &Cache<()>, input: f64) -> Option<&IntervalResults<()>> {
     cache.find(key(&[input]), &[input])
 }
 
@@ -28,19 +28,19 @@ fn find(cache: &Cache<()>, input: f64) -> Option<&Answer<()>> {
 fn the_oldest_inputs_are_forgotten() {
     let mut cache = Cache::new(2, true);
     for input in [1.0, 2.0, 3.0] {
-        store(&mut cache, input, &mut known(10.0 * input));
+        store(&mut cache, input, &mut results_with_value(10.0 * input));
     }
     assert!(find(&cache, 1.0).is_none());
     for input in [2.0, 3.0] {
         assert_eq!(find(&cache, input).unwrap().value.get().unwrap(), &[10.0 * input]);
     }
-    store(&mut cache, 4.0, &mut known(40.0));
+    store(&mut cache, 4.0, &mut results_with_value(40.0));
     assert!(find(&cache, 2.0).is_none() && find(&cache, 3.0).is_some());
     // Bits count: zeros of both signs are two inputs.
-    store(&mut cache, 0.0, &mut known(0.0));
+    store(&mut cache, 0.0, &mut results_with_value(0.0));
     assert!(find(&cache, -0.0).is_none() && find(&cache, 0.0).is_some());
     let mut none = Cache::new(0, true);
-    store(&mut none, 1.0, &mut known(1.0));
+    store(&mut none, 1.0, &mut results_with_value(1.0));
     assert!(find(&none, 1.0).is_none());
 }
 
@@ -48,12 +48,12 @@ fn the_oldest_inputs_are_forgotten() {
 #[test]
 fn equal_keys_are_no_equal_inputs() {
     let mut cache = Cache::new(2, true);
-    store_as(&mut cache, 7, 1.0, &mut known(10.0));
-    store_as(&mut cache, 7, 2.0, &mut known(20.0));
+    store_as(&mut cache, 7, 1.0, &mut results_with_value(10.0));
+    store_as(&mut cache, 7, 2.0, &mut results_with_value(20.0));
     assert!(cache.find(7, &[1.0]).is_none());
     assert_eq!(cache.find(7, &[2.0]).unwrap().value.get().unwrap(), &[20.0]);
-    store_as(&mut cache, 8, 3.0, &mut known(30.0));
-    store_as(&mut cache, 9, 4.0, &mut known(40.0));
+    store_as(&mut cache, 8, 3.0, &mut results_with_value(30.0));
+    store_as(&mut cache, 9, 4.0, &mut results_with_value(40.0));
     assert!(cache.find(7, &[2.0]).is_none() && cache.find(8, &[3.0]).is_some());
 }
 
@@ -77,15 +77,15 @@ fn keys_of_like_inputs_differ() {
 #[test]
 fn answers_to_the_same_inputs_are_joined() {
     let mut cache = Cache::new(2, true);
-    store(&mut cache, 1.0, &mut known(1.0));
-    let mut gradient = Answer::default();
+    store(&mut cache, 1.0, &mut results_with_value(1.0));
+    let mut gradient = IntervalResults::default();
     gradient.lambda.set(1)[0] = 5.0;
     gradient.gradient.set(1)[0] = 50.0;
     store(&mut cache, 1.0, &mut gradient);
     let entry = find(&cache, 1.0).unwrap();
     assert_eq!((entry.value.get().unwrap()[0], entry.gradient.get().unwrap()[0]), (1.0, 50.0));
     // A Hessian of other multipliers takes the gradient of the former ones along.
-    let mut hessian = Answer::default();
+    let mut hessian = IntervalResults::default();
     hessian.lambda.set(1)[0] = 6.0;
     hessian.hessian.set(1)[0] = 600.0;
     store(&mut cache, 1.0, &mut hessian);
@@ -97,7 +97,7 @@ fn answers_to_the_same_inputs_are_joined() {
 #[test]
 fn derivatives_are_kept_from_when_some_are_asked_for_again() {
     let derivative = |lambda: f64| {
-        let mut answer = known(1.0);
+        let mut answer = results_with_value(1.0);
         answer.jacobian.set(1)[0] = 2.0;
         answer.lambda.set(1)[0] = lambda;
         answer.hessian.set(1)[0] = 3.0;
@@ -111,11 +111,11 @@ fn derivatives_are_kept_from_when_some_are_asked_for_again() {
         let entry = find(&cache, 1.0).unwrap();
         assert!(entry.value.get().is_some() && entry.jacobian.get().is_none());
         // Of other inputs nobody has got any.
-        cache.missed(key(&[2.0]), &[2.0], true, Some(&[5.0]));
+        cache.record_miss(key(&[2.0]), &[2.0], true, Some(&[5.0]));
         store(&mut cache, 1.0, &mut derivative(5.0));
         assert!(find(&cache, 1.0).unwrap().hessian.get().is_none());
 
-        cache.missed(key(&[1.0]), &[1.0], jacobian, Some(&[lambda]));
+        cache.record_miss(key(&[1.0]), &[1.0], jacobian, Some(&[lambda]));
         store(&mut cache, 1.0, &mut derivative(5.0));
         let entry = find(&cache, 1.0).unwrap();
         assert_eq!(entry.jacobian.get().is_some(), again, "{jacobian} {lambda}");

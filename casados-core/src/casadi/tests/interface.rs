@@ -3,7 +3,7 @@
 
 use crate::casadi::ffi::{self, Side};
 use crate::casadi::function::{Call, Port, Signature};
-use crate::casadi::library::{Client, Failure, Library};
+use crate::casadi::library::{CallFailure, FunctionLibrary, Library};
 use crate::casadi::sparsity::Sparsity;
 use crate::error::Error;
 use alloc::vec;
@@ -12,7 +12,7 @@ use core::ptr::{null, null_mut};
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// The sum of two inputs, of three numbers and of one; it fails below zero and panics above 100.
-struct Sum(Vec<Signature>, &'static AtomicUsize);
+struct SumLibrary(Vec<Signature>, &'static AtomicUsize);
 
 /// What a thread has, which counts itself.
 struct Counted(&'static AtomicUsize);
@@ -23,7 +23,7 @@ impl Drop for Counted {
     }
 }
 
-impl Sum {
+impl SumLibrary {
     fn new(workers: &'static AtomicUsize) -> Self {
         let port = |name, length| Port::new(name, Sparsity::vector(length));
         let signature = Signature {
@@ -34,21 +34,21 @@ impl Sum {
     }
 }
 
-impl Client for Sum {
+impl FunctionLibrary for SumLibrary {
     type Worker = Counted;
     fn signatures(&self) -> &[Signature] {
         &self.0
     }
-    fn worker(&self) -> Result<Counted, Failure> {
+    fn worker(&self) -> Result<Counted, CallFailure> {
         self.1.fetch_add(1, Ordering::Relaxed);
         Ok(Counted(self.1))
     }
-    fn evaluate(&self, _: &mut Counted, _: usize, call: &mut dyn Call) -> Result<(), Failure> {
+    fn evaluate(&self, _: &mut Counted, _: usize, call: &mut dyn Call) -> Result<(), CallFailure> {
         let (mut a, mut b) = ([0.0; 3], [0.0; 1]);
         call.read(0, &mut a);
         call.read(1, &mut b);
         if b[0] < 0.0 {
-            return Err(Failure("below zero".into()));
+            return Err(CallFailure("below zero".into()));
         }
         assert!(b[0] <= 100.0, "on purpose");
         assert!(!call.wants(2) && call.output(2).is_none());
@@ -66,7 +66,7 @@ impl Client for Sum {
 }
 
 /// A call with two inputs and two outputs.
-fn call(library: &Library<Sum>, inputs: [Option<&[f64]>; 2], id: i32) -> Option<([f64; 3], [f64; 1])> {
+fn call(library: &Library<SumLibrary>, inputs: [Option<&[f64]>; 2], id: i32) -> Option<([f64; 3], [f64; 1])> {
     let (mut c, mut d) = ([f64::NAN; 3], [f64::NAN; 1]);
     let arguments = inputs.map(|input| input.map_or(null(), <[f64]>::as_ptr));
     let mut results = [c.as_mut_ptr(), d.as_mut_ptr()];
@@ -78,7 +78,7 @@ fn call(library: &Library<Sum>, inputs: [Option<&[f64]>; 2], id: i32) -> Option<
 #[test]
 fn pointers_become_calls() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
-    static LIBRARY: Library<Sum> = Library::new(|| Ok(Sum::new(&WORKERS)));
+    static LIBRARY: Library<SumLibrary> = Library::new(|| Ok(SumLibrary::new(&WORKERS)));
     ffi::refer(&LIBRARY);
     let id = ffi::check_out(&LIBRARY);
     let (a, b) = ([1.0, 2.0, 3.0], [10.0]);
@@ -118,7 +118,7 @@ fn pointers_become_calls() {
 #[test]
 fn threads_have_memory_of_their_own() {
     static WORKERS: AtomicUsize = AtomicUsize::new(0);
-    static LIBRARY: Library<Sum> = Library::new(|| Ok(Sum::new(&WORKERS)));
+    static LIBRARY: Library<SumLibrary> = Library::new(|| Ok(SumLibrary::new(&WORKERS)));
     let ids: Vec<i32> = (0..4).map(|_| ffi::check_out(&LIBRARY)).collect();
     assert_eq!(ids, [0, 1, 2, 3]);
     ffi::release(&LIBRARY, 2);
@@ -140,7 +140,7 @@ fn threads_have_memory_of_their_own() {
 /// A panic of what makes the client is a library without functions.
 #[test]
 fn a_client_that_cannot_be_made() {
-    static LIBRARY: Library<Sum> = Library::new(|| panic!("on purpose"));
+    static LIBRARY: Library<SumLibrary> = Library::new(|| panic!("on purpose"));
     assert_eq!(ffi::count(&LIBRARY, 0, Side::Input), 0);
     assert_eq!(call(&LIBRARY, [None, None], ffi::check_out(&LIBRARY)), None);
     assert_eq!(ffi::integrations(&LIBRARY), 0);
@@ -149,7 +149,8 @@ fn a_client_that_cannot_be_made() {
 /// What cannot be made has no functions, and says why.
 #[test]
 fn functions_that_have_no_memory() {
-    static LIBRARY: Library<Sum> = Library::new(|| Err(Error::OutOfMemory { bytes: usize::MAX }.into()));
+    static LIBRARY: Library<SumLibrary> =
+        Library::new(|| Err(Error::OutOfMemory { bytes: usize::MAX }.into()));
     assert_eq!(ffi::count(&LIBRARY, 0, Side::Input), 0);
     assert_eq!(call(&LIBRARY, [None, None], ffi::check_out(&LIBRARY)), None);
 }

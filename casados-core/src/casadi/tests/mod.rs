@@ -4,12 +4,12 @@ mod cache;
 mod interface;
 
 use super::dependence::{self, Dimensions};
-use super::entries::{Entries, Slot};
+use super::entries::{EntryTerm, MatrixSum};
 use super::function::Port;
 use super::groups::groups;
 use super::second::Blocks;
 use super::signature::{Entry, Output, Shape, Source};
-use super::sparsity::{Relation, Sparsity};
+use super::sparsity::{Dependence, Sparsity};
 use crate::structure::Pattern;
 use alloc::borrow::ToOwned;
 use alloc::vec;
@@ -44,24 +44,24 @@ fn patterns_are_compressed_columns() {
 
 #[test]
 fn relations_have_blocks() {
-    let mut relation = Relation::zero(2, 3);
+    let mut relation = Dependence::zero(2, 3);
     relation.set(0, 2);
     relation.set(1, 0);
     assert_eq!(relation.block(0..2, 1..3).entries(), [(0, 1)]);
     assert_eq!(relation.transposed_block(0..2, 1..3).entries(), [(1, 0)]);
     let other = relation.clone();
-    assert!(relation.join(0, &other, 1));
-    assert!(!relation.join(0, &other, 1));
+    assert!(relation.add_row(0, &other, 1));
+    assert!(!relation.add_row(0, &other, 1));
     assert_eq!(relation.row(0), [true, false, true]);
 }
 
 /// `ẋ₀ = u − x₀`, `ẋ₁ = x₀ − x₁`, `ẋ₂ = x₁`: variables `(ẋ, x, u)`.
 const CASCADE: Pattern = Pattern { rows: &[0, 1, 2, 0, 1, 1, 2, 0], columns: &[0, 1, 2, 3, 3, 4, 4, 6] };
-const OF_CASCADE: Dimensions = Dimensions { nx: 3, nz: 0, nw: 4 };
+const CASCADE_DIMENSIONS: Dimensions = Dimensions { nx: 3, nz: 0, nw: 4 };
 
 #[test]
 fn implicit_methods_depend_on_all_that_leads_there() {
-    let variables = dependence::variables(OF_CASCADE, CASCADE, None);
+    let variables = dependence::variables(CASCADE_DIMENSIONS, CASCADE, None);
     let states = variables.block(3..6, 0..4);
     // The last state is no argument of anybody.
     let expected = [[1, 0, 0, 1], [1, 1, 0, 1], [1, 1, 1, 1]];
@@ -70,12 +70,12 @@ fn implicit_methods_depend_on_all_that_leads_there() {
 
 #[test]
 fn explicit_methods_reach_an_equation_further_with_each_evaluation() {
-    let states = |depth| dependence::variables(OF_CASCADE, CASCADE, Some(depth)).block(3..6, 0..4);
+    let states = |depth| dependence::variables(CASCADE_DIMENSIONS, CASCADE, Some(depth)).block(3..6, 0..4);
     let once = [[1, 0, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]];
     assert_eq!(states(1), Sparsity::new(3, 4, |row, column| once[row][column] == 1));
     let twice = [[1, 0, 0, 1], [1, 1, 0, 1], [1, 1, 1, 0]];
     assert_eq!(states(2), Sparsity::new(3, 4, |row, column| twice[row][column] == 1));
-    assert_eq!(states(3), dependence::variables(OF_CASCADE, CASCADE, None).block(3..6, 0..4));
+    assert_eq!(states(3), dependence::variables(CASCADE_DIMENSIONS, CASCADE, None).block(3..6, 0..4));
 }
 
 /// `z₀ = x₀` is equation 1, `ẋ₀ = z₁` is 2, and `z₁ = z₀ p` is 0: no equation is where its unknown
@@ -89,7 +89,7 @@ fn equations_are_matched_with_unknowns() {
     // By way of the state, which depends on the other one.
     assert_eq!(variables.row(1), [true, false, true]);
     assert_eq!(variables.row(4), [false, true, false]);
-    let mut hessian = Relation::zero(3, 3);
+    let mut hessian = Dependence::zero(3, 3);
     dependence::curvature(&variables, Pattern { rows: &[5], columns: &[4] }, &mut hessian);
     assert_eq!(hessian.block(0..3, 0..3).entries(), [(2, 1), (1, 2)]);
 }
@@ -98,11 +98,11 @@ fn equations_are_matched_with_unknowns() {
 fn second_derivatives_lie_in_blocks() {
     let blocks = Blocks([2, 1, 3]);
     assert_eq!(blocks.len(), 4 + 2 + 1 + 6 + 3 + 9);
-    assert_eq!(blocks.place(0, 0), [0, 1, 2]);
-    assert_eq!((blocks.place(0, 1), blocks.place(1, 0)), ([4, 1, 2], [4, 2, 1]));
-    assert_eq!((blocks.place(1, 2), blocks.place(2, 1)), ([13, 1, 1], [13, 1, 1]));
-    assert_eq!((blocks.place(0, 2), blocks.place(2, 0)), ([7, 1, 2], [7, 2, 1]));
-    assert_eq!(blocks.place(2, 2), [16, 1, 3]);
+    assert_eq!(blocks.block_layout(0, 0), [0, 1, 2]);
+    assert_eq!((blocks.block_layout(0, 1), blocks.block_layout(1, 0)), ([4, 1, 2], [4, 2, 1]));
+    assert_eq!((blocks.block_layout(1, 2), blocks.block_layout(2, 1)), ([13, 1, 1], [13, 1, 1]));
+    assert_eq!((blocks.block_layout(0, 2), blocks.block_layout(2, 0)), ([7, 1, 2], [7, 2, 1]));
+    assert_eq!(blocks.block_layout(2, 2), [16, 1, 3]);
     // Every place is that of one pair, or of both orders of one.
     let mut count = [0; 25];
     (0..6).for_each(|i| (0..6).for_each(|j| count[blocks.index(i, j)] += 1));
@@ -131,24 +131,24 @@ fn names_make_groups() {
 
 #[test]
 fn matrices_are_sums_of_numbers_of_stages() {
-    let node = |index| Slot::Node { stage: 0, index };
-    let interval = |stage, block, index| Slot::Interval { stage, block, index };
+    let node = |index| EntryTerm::Node { stage: 0, index };
+    let interval = |stage, block, index| EntryTerm::Interval { stage, block, index };
     // Column 0 at a distance of two, an entry of two intervals, a node and a constant, a constant
     // alone; and entries one behind the other of one block and of two.
     let terms = vec![
-        ([0, 1], Slot::Constant(100.0)),
+        ([0, 1], EntryTerm::Constant(100.0)),
         ([0, 1], node(2)),
         ([0, 0], node(1)),
         ([1, 0], node(3)),
         ([2, 0], node(5)),
         ([0, 1], interval(0, 1, 0)),
         ([0, 1], interval(1, 0, 1)),
-        ([2, 1], Slot::Constant(-1.0)),
+        ([2, 1], EntryTerm::Constant(-1.0)),
         ([0, 2], interval(0, 0, 1)),
         ([1, 2], interval(0, 0, 2)),
         ([2, 2], interval(0, 1, 1)),
     ];
-    let entries = Entries::new(3, 3, terms);
+    let entries = MatrixSum::new(3, 3, terms);
     assert_eq!(entries.sparsity.entries(), [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)]);
     let mut matrix = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
     let mut values = [f64::NAN; 8];
@@ -163,14 +163,14 @@ fn matrices_are_sums_of_numbers_of_stages() {
     // Written again, and where a block is not there: zeros.
     assert_eq!(write(&matrix, &[4.0, 9.0]), expected);
     assert_eq!(write(&matrix, &[]), [10.0, 30.0, 50.0, 1025.0, -10.0, 70.0, 80.0, 0.0]);
-    entries.clear_node(0, &mut matrix);
+    entries.zero_node_terms(0, &mut matrix);
     assert_eq!(matrix, [0.0, 0.0, 0.0, 0.0, 4.0, 0.0]);
 }
 
 #[test]
 fn names_and_places_of_two_intervals() {
     // `y = (y₀)` over `w = (x₀, x₁, u)`, no parameter.
-    let (mut value, mut hessian) = (Relation::zero(1, 3), Relation::zero(3, 3));
+    let (mut value, mut hessian) = (Dependence::zero(1, 3), Dependence::zero(3, 3));
     value.set(0, 1);
     value.set(0, 2);
     hessian.set(1, 2);

@@ -1,13 +1,13 @@
 //! The calls of an integrator whose intervals are divided.
 
-use super::super::blocks;
-use super::{Divided, HessianMemory, Integrator, dynamic};
+use super::super::chain_rule;
+use super::{Divided, HessianMemory, Integrator, as_dyn_integrand};
 use crate::error::{Argument, Error};
 use crate::finite::{check_forward, check_gradient, check_named, check_second};
 use crate::linalg::axpy;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
-use crate::quadrature::{Backwards, OptionalIntegrand, begin, finish};
+use crate::quadrature::{AdjointOnlyIntegrand, OptionalIntegrand, finish_integrand, reset_integrand};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix};
@@ -37,21 +37,21 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         self.statistics
     }
 
-    fn solve_along(
+    fn solve_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.begin(h)?;
-        begin(&mut along);
-        self.nominal(x0, u, h, &mut along)?;
-        finish(&mut along)?;
+        self.begin_call(h)?;
+        reset_integrand(&mut along);
+        self.solve_parts(x0, u, h, &mut along)?;
+        finish_integrand(&mut along)?;
         Ok(&I::Memory::nominal(&mut self.nominal)?.result)
     }
 
-    fn forward_along(
+    fn forward_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -61,16 +61,16 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
     where
         I::Memory: WithForward,
     {
-        self.begin(h)?;
-        begin(&mut along);
-        self.sweep(x0, u, h, false, &mut along, |_, _, _| Ok(()))?;
-        finish(&mut along)?;
+        self.begin_call(h)?;
+        reset_integrand(&mut along);
+        self.differentiate_parts(x0, u, h, false, &mut along, |_, _, _| Ok(()))?;
+        finish_integrand(&mut along)?;
         let result = &I::Memory::forward(&mut self.forward)?.result;
         check_forward(result, 0)?;
         Ok(result)
     }
 
-    fn adjoint_along(
+    fn adjoint_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -82,18 +82,24 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         I::Memory: WithAdjoint<1>,
     {
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        self.begin(h)?;
-        begin(&mut along);
-        self.nominal(x0, u, h, &mut along)?;
-        finish(&mut along)?;
+        self.begin_call(h)?;
+        reset_integrand(&mut along);
+        self.solve_parts(x0, u, h, &mut along)?;
+        finish_integrand(&mut along)?;
         *I::Memory::adjoint(&mut self.adjoint)? = Adjoint::zeroed();
         let mut now = *lambda;
         for k in (0..N).rev() {
-            let length = self.part(k, h)?;
+            let length = self.begin_part(k, h)?;
             let Self { integrator, nominal, adjoint, .. } = self;
             let memory = I::Memory::nominal(nominal)?;
-            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
-            let part = integrator.adjoint_along(&memory.states[k], u, length, &now, dynamic(&mut backwards));
+            let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
+            let part = integrator.adjoint_with_quadrature(
+                &memory.states[k],
+                u,
+                length,
+                &now,
+                as_dyn_integrand(&mut backwards),
+            );
             let part = part.and_then(|part| {
                 let result = I::Memory::adjoint(adjoint)?;
                 now.as_mut_slice().copy_from_slice(part.grad_x0.as_slice());
@@ -101,7 +107,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
                 axpy(T::ONE, part.grad_p.as_slice(), result.grad_p.as_mut_slice());
                 Ok(())
             });
-            self.count();
+            self.add_part_statistics();
             part?;
         }
         let result = I::Memory::adjoint(&mut self.adjoint)?;
@@ -111,7 +117,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         Ok(result)
     }
 
-    fn hessian_along(
+    fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -123,15 +129,15 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
         I::Memory: WithHessian,
     {
         check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        self.begin(h)?;
-        begin(&mut along);
-        self.sweep(x0, u, h, true, &mut along, |this, k, x| {
+        self.begin_call(h)?;
+        reset_integrand(&mut along);
+        self.differentiate_parts(x0, u, h, true, &mut along, |this, k, x| {
             I::Memory::nominal(&mut this.nominal)?.states[k] = *x;
             let v = &I::Memory::forward(&mut this.forward)?.v[0];
             I::Memory::hessian(&mut this.hessian)?.history[k].clone_from(v);
             Ok(())
         })?;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         let result = &mut I::Memory::hessian(&mut self.hessian)?.result;
         result.first.forward.clone_from(&I::Memory::forward(&mut self.forward)?.result);
         result.first.grad_u = VectorU::<M, T>::zeroed();
@@ -141,21 +147,22 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
             *row = ArrayW::<M, T>::zeroed();
         }
         for k in (0..N).rev() {
-            let length = self.part(k, h)?;
+            let length = self.begin_part(k, h)?;
             let Self { integrator, nominal, hessian, .. } = self;
             let x = I::Memory::nominal(nominal)?.states[k];
-            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
-            let part = integrator.hessian_along(&x, u, length, &now, dynamic(&mut backwards));
+            let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
+            let part =
+                integrator.hessian_with_quadrature(&x, u, length, &now, as_dyn_integrand(&mut backwards));
             let part = part.and_then(|part| {
                 let HessianMemory { result, history, product, sum } = I::Memory::hessian(hessian)?;
                 now = part.first.grad_x0;
                 axpy(T::ONE, part.first.grad_u.as_slice(), result.first.grad_u.as_mut_slice());
                 axpy(T::ONE, part.first.grad_p.as_slice(), result.first.grad_p.as_mut_slice());
                 let v = ArrayW::<M, T>::flat(history[k].as_ref());
-                blocks::add::<M, T>(|r, c| blocks::element(part, r, c), v, [product, sum]);
+                chain_rule::add::<M, T>(|r, c| chain_rule::element(part, r, c), v, [product, sum]);
                 Ok(())
             });
-            self.count();
+            self.add_part_statistics();
             part?;
         }
         let HessianMemory { result, sum, .. } = I::Memory::hessian(&mut self.hessian)?;
@@ -165,7 +172,7 @@ impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Inte
                 axpy(T::ONE, second.as_ref(), sum.as_mut());
             }
         }
-        blocks::split(sum, result);
+        chain_rule::write_blocks(sum, result);
         let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &result.first;
         check_forward(forward, 0)?;
         check_gradient(grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice())?;

@@ -9,13 +9,15 @@
 
 mod calls;
 
-use super::blocks::{Rows, Square, advance, algebraic, identity, states};
+use super::chain_rule::{
+    FullHessian, StateSensitivities, chain_states, identity, write_algebraic, write_states,
+};
 use super::{Integrator, U, X};
 use crate::error::{Argument, Error};
 use crate::finite::check_input;
 use crate::memory::{Family, Memory, WithForward};
 use crate::model::{Dae, VectorX};
-use crate::quadrature::{Chained, Integrand, OptionalIntegrand};
+use crate::quadrature::{ChainRuleIntegrand, Integrand, OptionalIntegrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::{Field, Real};
 use crate::shape::Plain;
@@ -53,13 +55,13 @@ pub struct Divided<I: Integrator, const N: usize> {
     integrator: I,
     time: I::Number,
     statistics: Statistics,
-    nominal: Place<I, NominalMemory<I::Model, I::Number, N>>,
+    nominal: NominalStorage<I, NominalMemory<I::Model, I::Number, N>>,
     forward: <I::Memory as Memory>::Forward<ForwardMemory<I::Model, I::Number>>,
     adjoint: <I::Memory as Memory>::Adjoint<Adjoints<I::Model, I::Number>>,
     hessian: <I::Memory as Memory>::Hessian<HessianMemory<I::Model, I::Number, N>>,
 }
 
-type Place<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
+type NominalStorage<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
 
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
@@ -74,7 +76,7 @@ struct NominalMemory<M: Dae, T: Real, const N: usize> {
 struct ForwardMemory<M: Dae, T: Real> {
     result: Forward<M, T>,
     /// `V` at the start of a part, and at its end.
-    v: [Rows<M, T>; 2],
+    v: [StateSensitivities<M, T>; 2],
 }
 
 /// Results of `adjoint`.
@@ -89,10 +91,10 @@ impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
 struct HessianMemory<M: Dae, T: Real, const N: usize> {
     result: Hessian<M, T>,
     /// `V` at the start of each part.
-    history: [Rows<M, T>; N],
+    history: [StateSensitivities<M, T>; N],
     /// `∇²(λᵀx)` of a part times `D`, and the sum of all parts.
-    product: Square<M, T>,
-    sum: Square<M, T>,
+    product: FullHessian<M, T>,
+    sum: FullHessian<M, T>,
 }
 
 impl<I: Integrator, const N: usize> Divided<I, N> {
@@ -116,25 +118,25 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     }
 
     /// Before a call.
-    fn begin(&mut self, h: I::Number) -> Result<(), Error> {
+    fn begin_call(&mut self, h: I::Number) -> Result<(), Error> {
         self.statistics = Statistics::default();
         check_input(Argument::H, &[h])
     }
 
     /// Before a part: its time, and its length.
-    fn part(&mut self, part: usize, h: I::Number) -> Result<I::Number, Error> {
+    fn begin_part(&mut self, part: usize, h: I::Number) -> Result<I::Number, Error> {
         let count = I::Number::from_f64(N as f64);
         self.integrator.set_time(self.time + h * I::Number::from_f64(part as f64) / count)?;
         Ok(h / count)
     }
 
     /// After a part.
-    fn count(&mut self) {
+    fn add_part_statistics(&mut self) {
         self.statistics.add(&self.integrator.statistics());
     }
 
     /// The solution, with the states where parts start.
-    fn nominal(
+    fn solve_parts(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -143,11 +145,11 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     ) -> Result<(), Error> {
         let (mut x, mut z0) = (*x0, None);
         for k in 0..N {
-            let length = self.part(k, h)?;
+            let length = self.begin_part(k, h)?;
             let mut chained = chain(along, None, false);
-            let part = self.integrator.solve_along(&x, u, length, dynamic(&mut chained));
+            let part = self.integrator.solve_with_quadrature(&x, u, length, as_dyn_integrand(&mut chained));
             let part = part.copied();
-            self.count();
+            self.add_part_statistics();
             let part = part?;
             let memory = I::Memory::nominal(&mut self.nominal)?;
             memory.states[k] = x;
@@ -159,7 +161,7 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     }
 
     /// The solution and its derivatives, with what `keep` wants to know where parts start.
-    fn sweep(
+    fn differentiate_parts(
         &mut self,
         x0: &X<Self>,
         u: &U<Self>,
@@ -176,13 +178,13 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
         identity::<I::Model, _>(now);
         for k in 0..N {
             keep(self, k, &x)?;
-            let length = self.part(k, h)?;
+            let length = self.begin_part(k, h)?;
             let Self { integrator, forward, .. } = self;
             let ForwardMemory { result, v: [now, next] } = I::Memory::forward(forward)?;
             let mut chained = chain(along, (k > 0).then_some(&*now), second);
-            let part = integrator.forward_along(&x, u, length, dynamic(&mut chained));
+            let part = integrator.forward_with_quadrature(&x, u, length, as_dyn_integrand(&mut chained));
             let part = part.map(|part| {
-                advance(part, now, next);
+                chain_states(part, now, next);
                 if k == 0 {
                     result.clone_from(part);
                 } else {
@@ -191,13 +193,13 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
                     (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp) = first;
                 }
                 if k + 1 == N {
-                    states(next, result);
-                    algebraic(part, now, result);
+                    write_states(next, result);
+                    write_algebraic(part, now, result);
                 }
                 core::mem::swap(now, next);
                 x = part.nominal.x;
             });
-            self.count();
+            self.add_part_statistics();
             part?;
         }
         Ok(())
@@ -207,13 +209,13 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 /// The integrand of a part.
 fn chain<'a, M: Dae, T: Real>(
     along: &'a mut OptionalIntegrand<'_, '_, M, T>,
-    v: Option<&'a Rows<M, T>>,
+    v: Option<&'a StateSensitivities<M, T>>,
     second: bool,
-) -> Option<Chained<'a, M, T>> {
-    along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
+) -> Option<ChainRuleIntegrand<'a, M, T>> {
+    along.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, second })
 }
 
-fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
+fn as_dyn_integrand<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
 ) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {

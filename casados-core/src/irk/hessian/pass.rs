@@ -13,7 +13,7 @@ use super::matrix_adjoint::{MatrixAdjoint, is_worth};
 use super::output::Triangle;
 use super::products::{COLUMNS, Square, Subtract};
 use crate::error::{Error, Place, Quantity};
-use crate::finite::{check_gradient, check_second, not_finite};
+use crate::finite::{check_gradient, check_second, find_non_finite};
 use crate::irk::adjoint::Backward;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{ArrayC, all_columns};
@@ -112,7 +112,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
             self.backward.step(&mut parts, kept, n, step, &mut along)?;
             let Parts { work, coefficients, .. } = &mut parts;
             self.curvature(work, coefficients, n, step);
-            if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
+            if let Some((entry, value)) = find_non_finite(self.entries.as_ref().as_flattened()) {
                 return Err(Error::NonFiniteModel {
                     quantity: Quantity::Hessian,
                     equation: M::STRUCTURE.hessian.get(entry / S).map_or(0, |(row, _)| row),

@@ -13,7 +13,7 @@
 //! shrinking. Then they have converged too if either is small: more cannot be known.
 
 use crate::error::{Error, Place, Quantity};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::Work;
 use crate::linalg::slot;
@@ -148,10 +148,10 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             value,
             at: Place { step, stage, iteration },
         };
-        if let Some((index, value)) = not_finite(f.as_flattened()) {
+        if let Some((index, value)) = find_non_finite(f.as_flattened()) {
             return Err(error(Quantity::Residual, index / S, index % S, value));
         }
-        if let Some((index, value)) = not_finite(jacobian.as_flattened()) {
+        if let Some((index, value)) = find_non_finite(jacobian.as_flattened()) {
             return Err(error(Quantity::Jacobian, M::STRUCTURE.jacobian.at(index / S).0, index % S, value));
         }
         Ok(())

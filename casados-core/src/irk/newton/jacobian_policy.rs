@@ -65,7 +65,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
         let jacobian = operations.residual_jacobian as f64;
         // One for all stages, where they are not evaluated side by side.
         let middle = if E::LANES > 1 { jacobian / s } else { jacobian };
-        let (products, terms) = (plan.products() + inverses, plan.assembly.len() as f64);
+        let (products, terms) = (plan.block_product_count() + inverses, plan.assembly.len() as f64);
         let of_blocks = (jacobian + (products + terms / s) * s * s) / Self::ITERATION;
         [of_blocks, (middle + (products + terms) * 4.0) / Self::ITERATION]
     };

@@ -2,7 +2,7 @@
 
 use super::dense_fallback::unknown_name;
 use crate::error::{Error, Started};
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::stages::initial_guess::InitialGuess;
 use crate::irk::workspace::Work;
@@ -95,11 +95,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     fn has_value(&self, equation: usize) -> bool {
         let jacobian = self.linear.jacobian.as_ref();
         for (row, _, values) in entries::<M, _>(jacobian) {
-            if row == equation && not_finite(values).is_some() {
+            if row == equation && find_non_finite(values).is_some() {
                 return false;
             }
         }
-        self.f.as_ref().get(equation).is_some_and(|f| not_finite(f).is_none())
+        self.f.as_ref().get(equation).is_some_and(|f| find_non_finite(f).is_none())
     }
 
     fn place_point(&mut self, variable: usize, value: [T; S]) {

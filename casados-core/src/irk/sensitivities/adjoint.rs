@@ -6,7 +6,7 @@ use crate::irk::driver::Arguments;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithAdjoint};
 use crate::model::{Dae, MatrixXC, VectorU, VectorX};
-use crate::quadrature::{OptionalIntegrand, begin, finish};
+use crate::quadrature::{OptionalIntegrand, finish_integrand, reset_integrand};
 use crate::result::Adjoint;
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -69,7 +69,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithAdjoint<C>,
     {
         self.run.needs(check_named::<M, T>(Argument::Lambda, seeds))?;
-        begin(&mut along);
+        reset_integrand(&mut along);
         let memory = self.run.needs(W::adjoint(&mut self.adjoint))?;
         let count = self.run.options.steps;
         // On the way forth only the last step is linearised: it is where the way back begins.
@@ -87,7 +87,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             memory.backward.step(&mut parts, &mut None, n, step, &mut along)?;
         }
         memory.finish(parts.work)?;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         self.sweep = None;
         self.run.keep()?;
         Ok(&memory.result)

@@ -9,7 +9,7 @@ use crate::irk::forward::memory::{ForwardMemory, StepOf};
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithDirectional, WithForward};
 use crate::model::{Dae, VectorU, VectorX};
-use crate::quadrature::{OptionalIntegrand, begin, finish};
+use crate::quadrature::{OptionalIntegrand, finish_integrand, reset_integrand};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -124,7 +124,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         self.sweep = None;
-        begin(&mut along);
+        reset_integrand(&mut along);
         let ForwardMemory { result, pass, .. } = self.run.needs(W::forward(&mut self.forward))?;
         let distant = to.is_some();
         let to = to.unwrap_or(&mut result.forward);
@@ -138,7 +138,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
         })?;
         pass.finish::<W::Fallback>(&parts.work.result, count - 1, to)?;
-        finish(&mut along)
+        finish_integrand(&mut along)
     }
 
     /// After a successful call, whose stages and their derivatives are kept.

@@ -8,7 +8,7 @@ use crate::irk::hessian::pass::HessianMemory;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithHessian};
 use crate::model::{Dae, VectorU, VectorX, VectorZ};
-use crate::quadrature::{OptionalIntegrand, begin, finish, reborrow};
+use crate::quadrature::{OptionalIntegrand, finish_integrand, reborrow, reset_integrand};
 use crate::result::Hessian;
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -41,7 +41,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        self.hessian_along(x0, u, h, lambda, &[], None)
+        self.hessian_with_quadrature(x0, u, h, lambda, &[], None)
     }
 
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the
@@ -74,12 +74,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        self.hessian_along(x0, u, h, lambda, nu.as_slice(), None)
+        self.hessian_with_quadrature(x0, u, h, lambda, nu.as_slice(), None)
     }
 
     /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an
     /// integrand.
-    pub(crate) fn hessian_along(
+    pub(crate) fn hessian_with_quadrature(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -110,7 +110,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         self.run.needs(check_named::<M, T>(Argument::Lambda, lambda))?;
         self.run.needs(check_named::<M, T>(Argument::Nu, nu))?;
-        begin(&mut along);
+        reset_integrand(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
         let forward = &mut self.run.needs(W::forward(&mut self.forward))?.pass;
@@ -133,7 +133,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             Ok(())
         })?;
         forward.finish::<W::Fallback>(&parts.work.result, count - 1, &mut to.first.forward)?;
-        finish(&mut along)?;
+        finish_integrand(&mut along)?;
         let ahead = if distant { to.h_xx.as_slice() } else { &[] };
         pass.run(parts, kept, [lambda, nu], ahead, reborrow(&mut along))?;
         pass.finish::<W::Fallback>(along.as_ref().and_then(|integrand| integrand.second()), to)?;

@@ -6,7 +6,7 @@ use crate::linalg::{kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes};
-use crate::shape::{Shape, assign};
+use crate::shape::{Shape, copy_into};
 
 /// Where the unknowns of the stages start.
 pub(crate) enum InitialGuess<'a, M: Dae, E: Lanes, const S: usize> {
@@ -34,7 +34,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         match (from, before, &coefficients.next) {
             (InitialGuess::Previous(steps) | InitialGuess::Solution(steps), ..) => {
                 if let Some(step) = steps.get(n) {
-                    assign(y, &step.y);
+                    copy_into(y, &step.y);
                 }
             }
             (_, Some(before), Some(next)) if const { F::INTERVALS } => {

@@ -42,7 +42,7 @@ pub(in crate::ocp) fn keep<S: Shape, T: Real>(
     }
     let (z, rows) =
         part_mut(all, k * (nz + nz * n), nz + nz * n).split_at_mut_checked(nz).unwrap_or_default();
-    crate::qp::assign(z, step.z);
+    crate::qp::copy_common(z, step.z);
     let [dx, du, dp] = step.dz;
     let of_free = free.columns(dp, nz).map(|(w, column)| (S::NX + w, column));
     let of_states = dx.chunks_exact(nz).enumerate();
@@ -172,7 +172,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let free = self.free.view();
         let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
-        let (v, multipliers) = self.iterate.vectors();
+        let (v, multipliers) = self.iterate.variables_and_costates();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let nodes = Nodes { step_length: self.step_length, ..nodes };
         let has_points = self.inner.count() > 0;

@@ -52,7 +52,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (free, Problem { dynamics, .. }) = (free.view(), problem.parts());
         check_pieces::<P::Dynamics, T>(dynamics)?;
         let parts = split::<P, T>(data.as_mut(), layout);
-        let (v, multipliers) = iterate.vectors();
+        let (v, multipliers) = iterate.variables_and_costates();
         let there = nodes::<P::Shape, T>(v, multipliers, &[], (parts.p, free), parts.times);
         let mut pieces = inner.pieces::<P::Shape>();
         pieces.forward(&there, true, &mut |nodes, sink| dynamics.linearise(nodes, sink))?;
@@ -65,7 +65,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let Self { problem, iterate, data, free, inner, .. } = self;
             let Problem { dynamics, .. } = problem.parts();
             let parts = split::<P, T>(data.as_mut(), layout);
-            let (v, multipliers) = iterate.vectors();
+            let (v, multipliers) = iterate.variables_and_costates();
             let there =
                 nodes::<P::Shape, T>(v, multipliers, parts.weights, (parts.p, free.view()), parts.times);
             inner
@@ -73,7 +73,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 .backward(&there, &mut |nodes, sink| curvature.run(dynamics, nodes, sink))?;
         }
         let Self { qp, iterate, inner, free, .. } = self;
-        let ((v, _), ld, mut objective) = (iterate.vectors(), inputs_apart::<P::Shape, T>(layout), T::ZERO);
+        let ((v, _), ld, mut objective) =
+            (iterate.variables_and_costates(), inputs_apart::<P::Shape, T>(layout), T::ZERO);
         let mut stages = qp.stages_mut();
         inner.pieces::<P::Shape>().emit(intervals, true, C::EXACT, |k, step| {
             let Some(mut stage) = stages.next() else { return };
@@ -97,7 +98,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (free, Problem { dynamics, .. }) = (free.view(), problem.parts());
         check_pieces::<P::Dynamics, T>(dynamics)?;
         let data = split::<P, T>(data.as_mut(), layout);
-        let (v, multipliers) = at.unwrap_or(iterate).vectors();
+        let (v, multipliers) = at.unwrap_or(iterate).variables_and_costates();
         let there = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let mut pieces = inner.pieces::<P::Shape>();
         pieces.forward(&there, false, &mut |nodes, sink| dynamics.simulate(nodes, sink))?;
@@ -137,8 +138,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let place = (j - 1) * intervals + k;
                 let PieceMemory { weights, forces, .. } = &mut inner.pieces;
                 let (forces, weights) = (part_mut(forces, place * nx, nx), part_mut(weights, place * nz, nz));
-                crate::qp::assign(forces, terms.gradient);
-                crate::qp::assign(weights, part(terms.gradient, n, nz));
+                crate::qp::copy_common(forces, terms.gradient);
+                crate::qp::copy_common(weights, part(terms.gradient, n, nz));
                 for (row, column) in columns.chunks_exact(terms.ld.max(1)).take(P::Path::ROWS).enumerate() {
                     let mu = multiplier(&stage, node_rows::<P, T>() + (j - 1) * P::Path::ROWS + row);
                     forces.iter_mut().zip(column).for_each(|(force, &slope)| *force = *force + mu * slope);
@@ -172,7 +173,7 @@ fn multiplier<T: Real>(stage: &SolutionStage<'_, T>, row: usize) -> T {
 
 /// The distance of stages in vectors `v`.
 fn inputs_apart<S: Shape, T>(layout: Layout) -> usize {
-    crate::qp::pad::<T>(inputs::<S>(layout.free))
+    crate::qp::padded_len::<T>(inputs::<S>(layout.free))
 }
 
 /// Where rows of a stage are written.

@@ -2,8 +2,9 @@
 //! point.
 
 use crate::qp::{
-    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, is_marked,
-    larger, marked, pad, part, part_mut, scale, subtract, subtract_column, symmetric,
+    Columns, QpView, Residuals, Solution, StageDims, add_transposed, bound_residuals, copy_common, dot,
+    is_marked, marked_indices, nan_max, padded_len, part, part_mut, scale, subtract, subtract_column,
+    symmetric,
 };
 use crate::scalar::{Packed, Real, Registers, compiled};
 
@@ -54,11 +55,11 @@ fn conditions<T: Real, E: Packed<T>>(
     let mut arriving: &[T] = &[];
     let (periodic, shared) = (qp.periodic(), qp.shared());
     let last = qp.dims().len().saturating_sub(1);
-    let ld = pad::<T>(qp.dims().iter().map(|stage| stage.nx + stage.nu).max().unwrap_or(0));
+    let ld = padded_len::<T>(qp.dims().iter().map(|stage| stage.nx + stage.nu).max().unwrap_or(0));
     let (scratch, joint) = scratch.split_at_mut_checked(2 * ld).unwrap_or_default();
     let joint = part_mut(joint, 0, ld);
     joint.fill(T::ZERO);
-    let (all, _) = at.vectors();
+    let (all, _) = at.variables_and_costates();
     let mut begin = 0;
     let mut stages = at.stages().peekable();
     for (k, stage) in qp.stages().enumerate() {
@@ -80,7 +81,7 @@ fn conditions<T: Real, E: Packed<T>>(
             grow(&mut residuals.dynamics, gap);
         }
         // The gradient with another sign.
-        assign(sum, view.gradient);
+        copy_common(sum, view.gradient);
         symmetric::<T, E>(sum, view.hessian, ld, v, n);
         scale::<T, E>(sum, -T::ONE);
         subtract::<T, E>(sum, matrix, point.dynamics, n, view.next);
@@ -126,10 +127,10 @@ fn joint_residuals<T: Real>(qp: QpView<'_, T>, at: &Point<'_, T>, joint: &[T], r
     let (Some(first), last) = (stages.next(), stages.next_back()) else { return };
     joint.iter().for_each(|&sum| grow(&mut residuals.stationarity, sum));
     let get = |values: &[T], i: usize| values.get(i).copied().unwrap_or(T::ZERO);
-    for i in marked(qp.periodic()) {
+    for i in marked_indices(qp.periodic()) {
         grow(&mut residuals.dynamics, get(first.x, i) - last.map_or(T::ZERO, |last| get(last.x, i)));
     }
-    for j in marked(qp.shared()) {
+    for j in marked_indices(qp.shared()) {
         for &u in at.stages().filter_map(|stage| stage.u.get(j)) {
             grow(&mut residuals.dynamics, u - get(first.u, j));
         }
@@ -139,5 +140,5 @@ fn joint_residuals<T: Real>(qp: QpView<'_, T>, at: &Point<'_, T>, joint: &[T], r
 /// The larger size; NaN stays.
 #[inline(always)]
 pub(in crate::ocp) fn grow<T: Real>(largest: &mut f64, value: T) {
-    *largest = larger(*largest, value.abs().to_f64());
+    *largest = nan_max(*largest, value.abs().to_f64());
 }

@@ -18,7 +18,7 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{Arrays, StageDims, add_symmetric, assign, pad, part, part_mut};
+use crate::qp::{Arrays, StageDims, add_symmetric, copy_common, padded_len, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -70,7 +70,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Self { problem, qp, iterate, data, step_length, free, .. } = self;
         let free = free.view();
         let data = split::<P, T>(data.as_mut(), layout);
-        let (v, multipliers) = iterate.vectors();
+        let (v, multipliers) = iterate.variables_and_costates();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, (data.p, free), data.times);
         let nodes = Nodes { step_length: *step_length, ..nodes };
@@ -120,7 +120,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let free = free.view();
         let data = split::<P, T>(data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
-        let (v, _) = iterate.vectors();
+        let (v, _) = iterate.variables_and_costates();
         let mut objective = T::ZERO;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
@@ -162,7 +162,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if k < intervals {
                 let cost = if let Some(w) = w {
                     let before = part_mut(data.scratch, 0, terms.gradient.len());
-                    assign(before, terms.gradient);
+                    copy_common(before, terms.gradient);
                     let cost = stage_cost.add(&point, node.reference, place, terms)?;
                     terms.add_duration(w + P::Shape::NX, [cost, duration], before, C::EXACT);
                     cost
@@ -216,7 +216,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout @ Layout { intervals, .. } = self.layout();
         let Self { qp, iterate, data, .. } = self;
         let data = split::<P, T>(data.as_mut(), layout);
-        let (v, _) = iterate.vectors();
+        let (v, _) = iterate.variables_and_costates();
         let ld = ld_of::<P::Shape, T>(layout);
         for (k, mut stage) in qp.stages_mut().enumerate() {
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
@@ -242,7 +242,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
     pub(in crate::ocp) fn forget_gradients(&mut self) {
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
@@ -255,7 +255,7 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
 
     /// Adds `½ δ ‖v − v̄‖²` to the objective of the QP at the iterate `v̄`.
     pub(in crate::ocp) fn regularise(&mut self, delta: T) {
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
@@ -295,5 +295,5 @@ pub(super) fn shift_limits<T: Real>(
 
 /// The distance of stages in vectors `v`.
 pub(super) const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
-    pad::<T>(inputs::<S>(layout.free))
+    padded_len::<T>(inputs::<S>(layout.free))
 }

@@ -19,7 +19,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{IntegralTerms, IntervalResult, Nodes, Sink};
 use crate::ocp::formulation::instance::inside::memory::{PieceMemory, Sizes};
 use crate::qp::element::get;
-use crate::qp::{assign, part, part_mut};
+use crate::qp::{copy_common, part, part_mut};
 use crate::scalar::Real;
 
 /// What integrates a piece of all intervals.
@@ -47,7 +47,7 @@ impl<T: Real> Pieces<'_, T> {
         let Self { sizes, parts, memory } = self;
         let (sizes, [nx, nu, _, nz]) = (*sizes, sizes.dims);
         let PieceMemory { found, v, totals, product, .. } = &mut **memory;
-        assign(v, nodes.v);
+        copy_common(v, nodes.v);
         totals.fill(T::ZERO);
         begin(sizes, found, nodes);
         for (j, ends) in parts.windows(2).enumerate() {
@@ -57,8 +57,8 @@ impl<T: Real> Pieces<'_, T> {
                 let width = sizes.place();
                 let both = part_mut(found, (k * sizes.places() + j) * width, 2 * width);
                 let (start, end) = both.split_at_mut_checked(width).unwrap_or_default();
-                assign(end, step.x);
-                assign(part_mut(start, nx, nz), step.z);
+                copy_common(end, step.x);
+                copy_common(part_mut(start, nx, nz), step.z);
                 let total = part_mut(totals, k * sizes.total(), sizes.total());
                 let IntegralTerms { value, x, u, p, hessian: [xx, xu, uu], hessian_p: [xp, up, pp] } =
                     step.cost;
@@ -89,7 +89,7 @@ impl<T: Real> Pieces<'_, T> {
             })?;
             let begins_another = j + 2 < parts.len();
             for k in 0..if begins_another { nodes.len() } else { 0 } {
-                assign(part_mut(v, k * nodes.ld[0], nx), sizes.at(found, k, j + 1).x);
+                copy_common(part_mut(v, k * nodes.ld[0], nx), sizes.at(found, k, j + 1).x);
             }
         }
         Ok(())
@@ -106,7 +106,7 @@ impl<T: Real> Pieces<'_, T> {
         let PieceMemory {
             found, v, multipliers: [of_ends, before], weights, forces, totals, product, ..
         } = &mut **memory;
-        assign(of_ends, nodes.multipliers);
+        copy_common(of_ends, nodes.multipliers);
         for k in 0..n {
             // Blocks of integral costs are those of Gauss and Newton.
             part_mut(totals, k * sizes.total(), sizes.total())
@@ -116,7 +116,7 @@ impl<T: Real> Pieces<'_, T> {
         }
         for (j, ends) in parts.windows(2).enumerate().rev() {
             for k in 0..if j > 0 { n } else { 0 } {
-                assign(part_mut(v, k * nodes.ld[0], nx), sizes.at(found, k, j).x);
+                copy_common(part_mut(v, k * nodes.ld[0], nx), sizes.at(found, k, j).x);
             }
             let here = Nodes {
                 v: if j == 0 { nodes.v } else { v.as_slice() },
@@ -198,7 +198,7 @@ fn begin<T: Real>(sizes: Sizes, found: &mut [T], nodes: &Nodes<'_, T>) {
     let [nx, _, _, nz] = sizes.dims;
     for (k, interval) in nodes.iter().enumerate() {
         let place = part_mut(found, k * sizes.places() * sizes.place(), sizes.place());
-        assign(place, interval.x);
+        copy_common(place, interval.x);
         let columns = part_mut(place, nx + nz, nx * sizes.inputs());
         columns.fill(T::ZERO);
         columns.iter_mut().step_by(nx + 1).take(nx).for_each(|one| *one = T::ONE);
@@ -216,7 +216,7 @@ fn chain_rows<T: Real>([rows, nx]: [usize; 2], d: &[T], [a, b, p]: [&[T]; 3], to
     let mut inputs = inputs.map(Some);
     for (c, (to, column)) in to.chunks_exact_mut(rows.max(1)).zip(d.chunks_exact(nx.max(1))).enumerate() {
         match if c < nx { None } else { inputs.next().flatten() } {
-            Some(direct) => assign(to, direct),
+            Some(direct) => copy_common(to, direct),
             None => to.fill(T::ZERO),
         }
         for (a, &by) in a.chunks_exact(rows.max(1)).zip(column).filter(|(_, by)| **by != T::ZERO) {

@@ -171,7 +171,7 @@ fn transfer_with_free<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::qp::pad;
+    use crate::qp::padded_len;
     use alloc::vec;
     use alloc::vec::Vec;
 
@@ -180,13 +180,13 @@ mod tests {
     fn every_size() {
         for (nx, nu) in (1..20).flat_map(|nx| [0, 1, 3, 8].map(|nu| (nx, nu))) {
             let number = |i: usize, j: usize| ((i * 7 + j * 13 + 5) % 11) as f64 - 5.0;
-            let (n, ld) = (nx + nu, pad::<f64>(nx + nu));
+            let (n, ld) = (nx + nu, padded_len::<f64>(nx + nu));
             let [a, b] = [0..nx, nx..n]
                 .map(|columns| columns.flat_map(|j| (0..nx).map(move |i| number(i, j))).collect::<Vec<_>>());
             let next: Vec<f64> = (0..nx).map(|i| number(i, 50)).collect();
             let mut point: Vec<f64> = (0..n).map(|j| number(70, j)).collect();
             point.resize(ld, 0.0);
-            let (mut matrix, mut offset) = (vec![0.0; nx * ld], vec![0.0; pad::<f64>(nx)]);
+            let (mut matrix, mut offset) = (vec![0.0; nx * ld], vec![0.0; padded_len::<f64>(nx)]);
             let (columns, target, shift) = ([&a[..], &b[..]], &mut matrix[..], &mut offset[..]);
             Transfer { columns, next: &next, point: &point, matrix: target, ld, offset: shift }.run();
             for i in 0..nx {

@@ -16,7 +16,7 @@ use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::program::{Parts, Program, intervals_end};
-use crate::qp::{Arrays, Solution, StageDims, assign, part, part_mut};
+use crate::qp::{Arrays, Solution, StageDims, copy_common, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -36,7 +36,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout @ Layout { intervals, .. } = self.layout();
         let (nx, free) = (P::Shape::NX, self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
-        let (v, multipliers) = at.vectors();
+        let (v, multipliers) = at.variables_and_costates();
         let (mut objective, mut of_stages) = (arrival::cost(data.arrival, at), [T::ZERO; 2]);
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let nodes = Nodes { step_length: self.step_length, ..nodes };
@@ -45,7 +45,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if P::Dynamics::LIFTED {
                 of_stages = add_stages(of_stages, step.stages);
             }
-            assign(part_mut(ends, k * nx, nx), step.x);
+            copy_common(part_mut(ends, k * nx, nx), step.x);
         };
         if self.inner.count() > 0 {
             #[cfg(feature = "alloc")]
@@ -108,7 +108,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// point, whose `ends` are given: what a second-order correction solves.
     pub(in crate::ocp) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
         let Parts { qp, given, .. } = P::split(self);
-        let ((v, _), mut begin, mut row) = (at.vectors(), 0, 0);
+        let ((v, _), mut begin, mut row) = (at.variables_and_costates(), 0, 0);
         let (mut ends, values) = ends.split_at_checked(intervals_end(qp.dims())).unwrap_or_default();
         for mut stage in qp.stages_mut() {
             let count = stage.dims().ng;
@@ -121,7 +121,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let columns = matrix.get(next * ld..).unwrap_or_default();
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
-            assign(lower, part(values, row, count));
+            copy_common(lower, part(values, row, count));
             shift_limits(
                 columns,
                 [n, ld],

@@ -8,8 +8,8 @@
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::Program;
 use crate::qp::element::set;
-use crate::qp::interior::{at, is_first_fixed};
-use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, assign, is_marked, part, part_mut};
+use crate::qp::interior::{at, is_initial_state_fixed};
+use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, copy_common, is_marked, part, part_mut};
 use crate::scalar::Real;
 use core::ops::Range as Stages;
 
@@ -88,7 +88,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// With a number for each row, and scratch over the variables of a stage.
     pub(in crate::ocp) fn find_units(&self, rows: &mut [T], scratch: &mut [T]) -> Sizes {
         rows.fill(T::ONE);
-        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         for span in self.problem.spans(qp.dims.len()) {
             let last = span.end.saturating_sub(1);
             let (path, terminal) = (span.start..last, last..span.end);
@@ -125,7 +125,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         least: f64,
         scratch: &mut [T],
     ) -> Option<f64> {
-        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
         let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
         let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * force);
@@ -134,7 +134,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// The largest size of variables and of their bounds, at least one.
     pub(in crate::ocp) fn largest_size(&self) -> f64 {
-        let mut largest = self.iterate.vectors().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
+        let mut largest =
+            self.iterate.variables_and_costates().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
         for stage in self.qp().stages() {
             for bounds in [stage.x_bounds(), stage.u_bounds()] {
                 for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
@@ -240,11 +241,11 @@ fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut
 
 /// Both of them, with units of rows.
 fn slopes_and_changes<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
-    let ([mut largest, mut most], fixed) = ([T::ZERO; 2], is_first_fixed(qp));
+    let ([mut largest, mut most], fixed) = ([T::ZERO; 2], is_initial_state_fixed(qp));
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
-        assign(gradient, part(view.gradient, 0, place.ld));
+        copy_common(gradient, part(view.gradient, 0, place.ld));
         add_symmetric(gradient, view.hessian, place.ld, v, place.n);
         let curvatures = view.hessian.iter().step_by(place.ld + 1);
         let given = if fixed && place.stage == 0 { place.nx } else { 0 };

@@ -9,7 +9,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::solution::outcome::Outcome;
 use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};
-use crate::qp::{HeapSolution, assign, each, room};
+use crate::qp::{HeapSolution, copy_common, each, try_reserve};
 use crate::scalar::Real;
 
 impl<P, S, T> BatchOcp<P, S, T>
@@ -66,8 +66,8 @@ where
             of_seed.clear();
             seed(instance, ocp, of_seed);
             let found = factors.adjoint(of_seed)?;
-            assign(x0, found.x0);
-            assign(p, found.p);
+            copy_common(x0, found.x0);
+            copy_common(p, found.p);
             ocp.adjoint_by_references(factors, references)
         })
     }
@@ -83,8 +83,8 @@ where
         curvature: C,
     ) -> Result<Gradients<'_, T>, OcpError> {
         self.gradients(curvature, |_, ocp, factors, _, [x0, p, references]| {
-            assign(x0, factors.value_gradient_x0());
-            assign(p, factors.value_gradient_p());
+            copy_common(x0, factors.value_gradient_x0());
+            copy_common(p, factors.value_gradient_p());
             ocp.value_gradient_by_references(references)
         })
     }
@@ -156,7 +156,7 @@ where
     ) -> Result<&[Result<(), OcpError>], OcpError> {
         let (threads, smoothing) = (self.hire()?, self.smoothing);
         let Self { instances, workers, forward, statuses, outcomes, .. } = self;
-        room(forward, instances.len().saturating_sub(forward.len()))?;
+        try_reserve(forward, instances.len().saturating_sub(forward.len()))?;
         while let Some(ocp) = instances.get(forward.len()) {
             forward.push(Sensitivities::new(ocp)?);
         }

@@ -3,7 +3,7 @@
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::solution::sensitivities::references;
-use crate::qp::{part, reserve, take_mut};
+use crate::qp::{part, take_mut, try_resize};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -118,9 +118,9 @@ impl<T: Real> Memory<T> {
     pub fn places(&mut self, count: usize) -> Result<impl Iterator<Item = Place<'_, T>> + Send, OcpError> {
         let [nx, np, nr] = self.dims;
         super::refill(&mut self.statuses, count, || Ok(()))?;
-        reserve(&mut self.x0, count * nx)?;
-        reserve(&mut self.p, count * np)?;
-        reserve(&mut self.references, count * nr)?;
+        try_resize(&mut self.x0, count * nx)?;
+        try_resize(&mut self.p, count * np)?;
+        try_resize(&mut self.references, count * nr)?;
         let (mut x0, mut p, mut references) = (&mut *self.x0, &mut *self.p, &mut *self.references);
         Ok(self.statuses.iter_mut().map(move |status| {
             (status, [take_mut(&mut x0, nx), take_mut(&mut p, np), take_mut(&mut references, nr)])

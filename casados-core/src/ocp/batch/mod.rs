@@ -20,7 +20,7 @@ use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::nlp::sqp::HeapSqp;
 use crate::ocp::solution::outcome::Outcome;
 use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};
-use crate::qp::{HeapSolution, each, room, threads};
+use crate::qp::{HeapSolution, each, threads, try_reserve};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 use gradients::Memory;
@@ -107,9 +107,9 @@ where
     /// [`OcpError::OutOfMemory`]
     pub fn new(ocp: &HeapOcp<P, T>, count: usize, solver: S) -> Result<Self, OcpError> {
         let (mut instances, mut workers) = (Vec::new(), Vec::new());
-        room(&mut instances, count)?;
+        try_reserve(&mut instances, count)?;
         instances.resize_with(count, || ocp.clone());
-        room(&mut workers, 1)?;
+        try_reserve(&mut workers, 1)?;
         workers.push(Worker { solver, adjoint: None });
         Ok(Self {
             threads: usize::MAX,
@@ -183,7 +183,7 @@ where
     fn hire(&mut self) -> Result<usize, OcpError> {
         let threads = threads(self.threads.min(self.instances.len()));
         let more = threads.saturating_sub(self.workers.len());
-        room(&mut self.workers, more)?;
+        try_reserve(&mut self.workers, more)?;
         while let Some(worker) = self.workers.first().filter(|_| self.workers.len() < threads) {
             let worker = worker.clone();
             self.workers.push(worker);
@@ -195,7 +195,7 @@ where
 /// As many as that, all new.
 fn refill<V>(list: &mut Vec<V>, count: usize, value: impl FnMut() -> V) -> Result<(), OcpError> {
     list.clear();
-    room(list, count)?;
+    try_reserve(list, count)?;
     list.resize_with(count, value);
     Ok(())
 }

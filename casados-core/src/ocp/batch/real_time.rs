@@ -6,7 +6,7 @@ use crate::ocp::feedback::real_time::HeapRealTime;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{HeapInteriorPoint, assign, each, part, reserve, room, threads};
+use crate::qp::{HeapInteriorPoint, copy_common, each, part, threads, try_reserve, try_resize};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -79,11 +79,11 @@ impl<P: Formulation<T> + Clone, T: Real> BatchRealTime<P, GaussNewton, T> {
     /// [`OcpError::OutOfMemory`]
     pub fn new(ocp: &HeapOcp<P, T>, count: usize) -> Result<Self, OcpError> {
         let (mut controllers, mut u, mut workers) = (Vec::new(), Vec::new(), Vec::new());
-        room(&mut controllers, count)?;
+        try_reserve(&mut controllers, count)?;
         for _ in 0..count {
             controllers.push(HeapRealTime::new(ocp.clone())?);
         }
-        reserve(&mut u, count.saturating_mul(P::Shape::NU))?;
+        try_resize(&mut u, count.saturating_mul(P::Shape::NU))?;
         workers.resize(threads(count), ());
         let mut statuses = Vec::new();
         refill(&mut statuses, count, || Ok(()))?;
@@ -168,7 +168,7 @@ where
         each(threads, items, |(), (i, ((controller, status), u))| {
             if status.is_ok() {
                 *status = controller.iterate(part(x, i * nx, nx), &mut || false).and_then(|_| {
-                    assign(u, controller.ocp().stage(0)?.u);
+                    copy_common(u, controller.ocp().stage(0)?.u);
                     Ok(())
                 });
             }

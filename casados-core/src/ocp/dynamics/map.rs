@@ -89,7 +89,7 @@ impl<F: Function, T: Real> Map<F, T> {
             }
             let (mut hessian, mut hessian_p) = ([&[][..]; 3], [&[][..]; 3]);
             if second {
-                crate::qp::assign(self.mu.as_mut(), interval.multipliers);
+                crate::qp::copy_common(self.mu.as_mut(), interval.multipliers);
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
                     let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };

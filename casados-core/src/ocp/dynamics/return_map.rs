@@ -208,7 +208,7 @@ impl<G: Function, T: Real> End<G, T> {
         if derivatives == 1 {
             return;
         }
-        crate::qp::assign(self.pi.as_mut(), pi);
+        crate::qp::copy_common(self.pi.as_mut(), pi);
         G::hessian::<T>(&self.v, &self.pi, &mut self.hessian);
         for ((row, column), &value) in G::STRUCTURE.hessian.iter().zip(self.hessian.as_ref()) {
             let (row, column) = (row - nx, column - nx);

@@ -11,7 +11,7 @@ use crate::ocp::formulation::functions::dynamics::{
 };
 use crate::ocp::formulation::functions::pattern::Origin;
 use crate::ocp::formulation::names::Names;
-use crate::qp::room;
+use crate::qp::try_reserve;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -171,7 +171,7 @@ fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -
 /// An empty list with room for so many.
 fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
-    Ok(room(list, length)?)
+    Ok(try_reserve(list, length)?)
 }
 
 impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {

@@ -204,7 +204,7 @@ macro_rules! single {
                 each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
                     integrator.begin(at)?;
                     let lambda = vector(at.multipliers);
-                    Ok(integrator.hessian_along(x, u, at.h, &lambda, $(at.$nu,)? None)?.into())
+                    Ok(integrator.hessian_with_quadrature(x, u, at.h, &lambda, $(at.$nu,)? None)?.into())
                 })
             }
         }
@@ -260,7 +260,7 @@ macro_rules! single {
                     integral.prepare();
                     let lambda = vector(at.multipliers);
                     let along: Option<&mut dyn Integrand<M, T>> = Some(&mut *integral);
-                    let result = integrator.hessian_along(x, u, at.h, &lambda, $(at.$nu,)? along)?;
+                    let result = integrator.hessian_with_quadrature(x, u, at.h, &lambda, $(at.$nu,)? along)?;
                     // The Hessian is that of both together: what the integral would add is in it.
                     let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 3], ..integral.terms() };
                     Ok(IntervalResult { cost, ..result.into() })

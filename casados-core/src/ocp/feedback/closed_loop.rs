@@ -12,7 +12,7 @@ use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::nlp::watch::Watch;
-use crate::qp::{QpSolver, assign, each, room, threads, zeros};
+use crate::qp::{QpSolver, copy_common, each, threads, try_reserve, zeros};
 use crate::scalar::Real;
 use crate::shape::{Matrix as _, Shape};
 use alloc::vec::Vec;
@@ -77,7 +77,7 @@ impl<P: Formulation<T>, S: QpSolver<T>, C: Curvature<P::Dynamics, T>, T: Real> C
     for HeapRealTime<P, S, C, T>
 {
     fn control(&mut self, x: &[T], u: &mut [T]) -> Result<(), OcpError> {
-        assign(u, self.prepare()?.feedback(x)?.u);
+        copy_common(u, self.prepare()?.feedback(x)?.u);
         self.shift();
         Ok(())
     }
@@ -93,7 +93,7 @@ impl<P: Formulation<T>, S: OcpSolver<P, T>, T: Real> Controller<P, T> for (HeapO
         if !solver.solve(ocp)?.is_solved() {
             return Err(OcpError::NoSolution);
         }
-        assign(u, ocp.stage(0)?.u);
+        copy_common(u, ocp.stage(0)?.u);
         ocp.shift();
         Ok(())
     }
@@ -135,7 +135,7 @@ pub fn plant<I: Integrator>(
         integrator.set_parameters(&p)?;
         integrator.set_time(sample.time)?;
         let end = integrator.solve(&vector(x), &vector(u), sample.length)?;
-        assign(x, end.x.as_slice());
+        copy_common(x, end.x.as_slice());
         Ok(())
     }
 }
@@ -194,7 +194,7 @@ pub fn closed_loop<P: Formulation<T>, T: Real>(
 ) -> Result<ClosedLoop<T>, OcpError> {
     let (mut x, mut u) = (zeros(P::Shape::NX)?, zeros(P::Shape::NU)?);
     let mut recorder = Recorder::new(controller.problem(), x0, samples)?;
-    assign(&mut x, x0);
+    copy_common(&mut x, x0);
     let length = recorder.length;
     for index in 0..samples {
         let sample = Sample { index, time: T::from_whole(index) * length, length };
@@ -256,11 +256,11 @@ pub fn closed_loops<W: Send, R: Send>(
 ) -> Result<Vec<R>, OcpError> {
     let (mut workers, mut results): (Vec<W>, Vec<Option<R>>) = (Vec::new(), Vec::new());
     let threads = threads(count);
-    room(&mut workers, threads)?;
+    try_reserve(&mut workers, threads)?;
     for _ in 0..threads.min(count) {
         workers.push(make()?);
     }
-    room(&mut results, count)?;
+    try_reserve(&mut results, count)?;
     results.resize_with(count, || None);
     each(&mut workers, results.iter_mut().enumerate(), |worker, (index, result)| {
         *result = Some(run(worker, index));

@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::data::{Node, is_algebraic, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::solution::trajectory::{Kind, Series, Trajectory, names};
-use crate::qp::{Bounds, part, part_mut, room, zeros};
+use crate::qp::{Bounds, part, part_mut, try_reserve, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::string::ToString;
@@ -110,12 +110,12 @@ impl<T: Real> Recorder<T> {
             durations: Vec::new(),
             failures: Vec::new(),
         };
-        room(&mut recorder.x, (samples.saturating_add(1)).saturating_mul(P::Shape::NX))?;
-        room(&mut recorder.u, samples.saturating_mul(P::Shape::NU))?;
-        room(&mut recorder.g, samples.saturating_mul(P::Path::ROWS))?;
+        try_reserve(&mut recorder.x, (samples.saturating_add(1)).saturating_mul(P::Shape::NX))?;
+        try_reserve(&mut recorder.u, samples.saturating_mul(P::Shape::NU))?;
+        try_reserve(&mut recorder.g, samples.saturating_mul(P::Path::ROWS))?;
         recorder.g.clear();
-        room(&mut recorder.costs, samples)?;
-        room(&mut recorder.durations, samples)?;
+        try_reserve(&mut recorder.costs, samples)?;
+        try_reserve(&mut recorder.durations, samples)?;
         Ok(recorder)
     }
 

@@ -237,8 +237,8 @@ fn measure<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
     let Ocp { qp, iterate, .. } = &mut *ocp;
     if let (Some(mut stage), Some(first)) = (qp.stage_mut(0), iterate.stages().next()) {
         let bounds = stage.x_bounds_mut();
-        crate::qp::assign(bounds.lower, first.x);
-        crate::qp::assign(bounds.upper, first.x);
+        crate::qp::copy_common(bounds.lower, first.x);
+        crate::qp::copy_common(bounds.upper, first.x);
     }
     ocp.residuals().0
 }
@@ -248,7 +248,7 @@ fn size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut
     ocp: &Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,
 ) -> f64 {
-    let pairs = ocp.iterate.vectors().0.iter().zip(solution.vectors().0);
+    let pairs = ocp.iterate.variables_and_costates().0.iter().zip(solution.variables_and_costates().0);
     pairs.fold(T::ZERO, |size, (&v, &w)| size.max((w - v).abs())).to_f64()
 }
 
@@ -283,7 +283,7 @@ fn energy<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsM
 ) -> f64 {
     let layout = ocp.layout();
     let data = split::<P, T>(ocp.data.as_mut(), layout);
-    let ((from, _), (to, _)) = (ocp.iterate.vectors(), solution.vectors());
+    let ((from, _), (to, _)) = (ocp.iterate.variables_and_costates(), solution.variables_and_costates());
     let (mut energy, mut begin) = (T::ZERO, 0);
     for stage in ocp.qp.view().stages() {
         let view = stage.arrays();

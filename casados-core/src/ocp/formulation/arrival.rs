@@ -56,7 +56,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Labels::states::<P, T>(Part::InitialState, 0).check_vector(mean, nx)?;
         Labels::states::<P, T>(Part::Arrival, 0).check_length(weight, nx * nx)?;
         let mut matrix = <P::Shape as Shape>::MatrixXX::<T>::zeroed();
-        crate::qp::assign(matrix.as_mut_slice(), weight);
+        crate::qp::copy_common(matrix.as_mut_slice(), weight);
         check_matrix::<T, _>(&matrix, true).map_err(|Fault { place, value, allowed }| {
             let x = <P::Dynamics as Dynamics<T>>::NAMES.x;
             let states = place.map(|state| x.get(state).copied().unwrap_or_default());
@@ -64,8 +64,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })?;
         let layout = self.layout();
         let arrival = split::<P, T>(self.data.as_mut(), layout).arrival;
-        crate::qp::assign(arrival, mean);
-        crate::qp::assign(arrival.get_mut(nx..).unwrap_or_default(), weight);
+        crate::qp::copy_common(arrival, mean);
+        crate::qp::copy_common(arrival.get_mut(nx..).unwrap_or_default(), weight);
         Ok(self)
     }
 }

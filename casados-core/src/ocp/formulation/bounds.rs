@@ -13,7 +13,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{BoundsMut, QpError, QpField, Side, StageDims, check};
 use crate::scalar::Real;
 use crate::shape::Shape;
-use crate::structure::means;
+use crate::structure::name_matches;
 use core::ops::{Range, RangeBounds};
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -45,16 +45,18 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         stages: &impl RangeBounds<usize>,
     ) -> Result<[Range<usize>; 3], OcpError> {
         let known = self.names();
-        let find = |part, names: &[&str], count| match names.iter().any(|variable| means(name, variable)) {
-            true => range(part, stages, count),
-            false => Ok(0..0),
-        };
+        let find =
+            |part, names: &[&str], count| match names.iter().any(|variable| name_matches(name, variable)) {
+                true => range(part, stages, count),
+                false => Ok(0..0),
+            };
         let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
         let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
         // They are the same at all stages.
         let is_free =
             known.p.iter().enumerate().any(|(p, name_of_p)| self.is_meant_and_free(name, p, name_of_p));
-        let is_algebraic = P::Dynamics::ALGEBRAIC && known.z.iter().any(|variable| means(name, variable));
+        let is_algebraic =
+            P::Dynamics::ALGEBRAIC && known.z.iter().any(|variable| name_matches(name, variable));
         if of_states.is_empty() && of_controls.is_empty() && !is_free && !is_algebraic {
             let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
             return Err(OcpError::UnknownName { name: Text::new(name), known });
@@ -63,7 +65,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     fn is_meant_and_free(&self, name: &str, parameter: usize, name_of_it: &str) -> bool {
-        means(name, name_of_it) && self.free.view().of(parameter).is_some()
+        name_matches(name, name_of_it) && self.free.view().of(parameter).is_some()
     }
 
     /// Does something to the bounds of every variable that a name means.
@@ -84,7 +86,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let free = self.free.view();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
             let is_given = |index: usize| k == 0 && (index < given || index >= integrals);
-            let meant = |(_, variable): &(usize, &&str)| means(name, variable);
+            let meant = |(_, variable): &(usize, &&str)| name_matches(name, variable);
             if of_states.contains(&k) {
                 let states = known.x.iter().enumerate().filter(meant).map(|(index, _)| index);
                 states.filter(|&i| !is_given(i)).for_each(|i| visit(&mut stage.x_bounds_mut(), i));
@@ -94,7 +96,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 controls.for_each(|(j, _)| visit(&mut stage.u_bounds_mut(), free.count() + j));
             }
             if of_free.contains(&k) {
-                let meant = known.p.iter().enumerate().filter(|(_, variable)| means(name, variable));
+                let meant = known.p.iter().enumerate().filter(|(_, variable)| name_matches(name, variable));
                 let meant = meant.filter_map(|(parameter, _)| free.of(parameter));
                 meant.for_each(|w| visit(&mut stage.u_bounds_mut(), w));
             }
@@ -104,7 +106,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// What the first variable that a name means is called, from some stage on.
     pub(in crate::ocp) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
         let known = self.names();
-        let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
+        let position = |names: &[&str]| names.iter().position(|variable| name_matches(name, variable));
         match [known.x, known.u, known.z, known.p].map(position) {
             [Some(index), ..] => (Labels::states::<P, T>(Part::StateBounds, stage), index),
             [_, Some(index), ..] => (Labels::controls::<P, T>(Part::ControlBounds, stage), index),
@@ -157,10 +159,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
                 let begin = k * path_rows::<P, T>(layout);
-                crate::qp::assign(crate::qp::part_mut(bounds, begin, rows), given);
+                crate::qp::copy_common(crate::qp::part_mut(bounds, begin, rows), given);
                 for point in if part == Part::PathBounds { 1..points + 1 } else { 0..0 } {
                     let row = inner_path_row::<P, T>(0, point);
-                    crate::qp::assign(crate::qp::part_mut(bounds, begin + row, rows), given);
+                    crate::qp::copy_common(crate::qp::part_mut(bounds, begin + row, rows), given);
                 }
             }
         }
@@ -225,7 +227,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout = self.layout();
         let data = split::<P, T>(self.data.as_mut(), layout);
         for k in range {
-            crate::qp::assign(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
+            crate::qp::copy_common(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
         }
         Ok(self)
     }
@@ -246,7 +248,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout = self.layout();
         let data = split::<P, T>(self.data.as_mut(), layout);
         for k in range {
-            crate::qp::assign(crate::qp::part_mut(data.references, k * length, length), reference);
+            crate::qp::copy_common(crate::qp::part_mut(data.references, k * length, length), reference);
         }
         Ok(self)
     }
@@ -301,7 +303,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let layout = self.layout();
         let data = split::<P, T>(self.data.as_mut(), layout);
         let begin = intervals * P::StageCost::REFERENCES;
-        crate::qp::assign(crate::qp::part_mut(data.references, begin, length), reference);
+        crate::qp::copy_common(crate::qp::part_mut(data.references, begin, length), reference);
         Ok(self)
     }
 

@@ -60,7 +60,7 @@ impl Labels {
     /// # Errors
     /// [`OcpError::InvalidValue`]
     pub fn check_finite<T: Real>(self, values: &[T]) -> Result<(), OcpError> {
-        match crate::finite::not_finite(values) {
+        match crate::finite::find_non_finite(values) {
             None => Ok(()),
             Some((index, value)) => Err(self.invalid(index, value)),
         }

@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::StageDims;
 use crate::scalar::Real;
-use crate::structure::means;
+use crate::structure::name_matches;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,
@@ -43,7 +43,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn periodic(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
         let mut found = false;
-        for (i, _) in known.x.iter().enumerate().filter(|(_, state)| means(name, state)) {
+        for (i, _) in known.x.iter().enumerate().filter(|(_, state)| name_matches(name, state)) {
             found |= self.qp.make_periodic(i);
         }
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
@@ -89,7 +89,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn shared(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
         let (mut found, free) = (false, self.free.count());
-        for (j, _) in known.u.iter().enumerate().filter(|(_, control)| means(name, control)) {
+        for (j, _) in known.u.iter().enumerate().filter(|(_, control)| name_matches(name, control)) {
             found |= self.qp.share(free + j);
         }
         if found { Ok(self) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }

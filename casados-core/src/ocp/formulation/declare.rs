@@ -10,7 +10,7 @@ use crate::ocp::formulation::instance::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::problem::Formulation;
 use crate::scalar::Real;
 use crate::shape::Shape;
-use crate::structure::means;
+use crate::structure::name_matches;
 use alloc::vec::Vec;
 use core::ops::RangeBounds;
 
@@ -55,7 +55,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// ```
     pub fn free(&mut self, name: &str, range: impl RangeBounds<T>, guess: T) -> Result<&mut Self, OcpError> {
         let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
-        let meant = || known.p.iter().enumerate().filter(|(_, parameter)| means(name, parameter));
+        let meant = || known.p.iter().enumerate().filter(|(_, parameter)| name_matches(name, parameter));
         let Some((first, &name_of_first)) = meant().next() else {
             return Err(OcpError::UnknownParameter { name: Text::new(name), known });
         };

@@ -13,7 +13,7 @@ use crate::qp::element::set;
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use crate::shape::Shape;
-use crate::structure::means;
+use crate::structure::name_matches;
 use core::ops::{Range, RangeBounds};
 
 impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -70,7 +70,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
         let (known, nx) = (self.names(), P::Shape::NX);
         let mut inner = None;
         let variables = known.x.iter().chain(known.z).enumerate();
-        for (variable, _) in variables.filter(|(_, variable)| means(name, variable)) {
+        for (variable, _) in variables.filter(|(_, variable)| name_matches(name, variable)) {
             let has_rows = if variable < nx { self.inner.count() > 0 } else { P::Dynamics::ALGEBRAIC };
             if has_rows && is_bound && !stages.is_empty() && !self.inner.has(variable) {
                 inner.get_or_insert_with(|| self.inner.clone()).add(variable, nx);
@@ -98,7 +98,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         [of_states, ..]: &[Range<usize>; 3],
     ) -> Result<Range<usize>, OcpError> {
         let intervals = self.intervals();
-        if P::Dynamics::ALGEBRAIC && self.names().z.iter().any(|variable| means(name, variable)) {
+        if P::Dynamics::ALGEBRAIC && self.names().z.iter().any(|variable| name_matches(name, variable)) {
             return range(Part::AlgebraicBounds, stages, intervals);
         }
         Ok(of_states.start.min(intervals)..of_states.end.min(intervals))
@@ -113,7 +113,7 @@ pub(in crate::ocp) fn rows_of<'a, P: Formulation<T>, T: Real>(
     let first = node_rows::<P, T>() + inner.count() * P::Path::ROWS;
     let known = <P::Dynamics as Dynamics<T>>::NAMES;
     let meant = move |variable: usize| {
-        known.x.iter().chain(known.z).nth(variable).is_some_and(|variable| means(name, variable))
+        known.x.iter().chain(known.z).nth(variable).is_some_and(|variable| name_matches(name, variable))
     };
     let variables = inner.variables().iter().enumerate();
     variables.filter(move |(_, (variable, _))| meant(*variable)).map(move |(i, _)| first + i)

@@ -11,7 +11,7 @@ use crate::ocp::formulation::labels::output;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
-use crate::qp::{Bounds, Stage, StageDims, marked};
+use crate::qp::{Bounds, Stage, StageDims, marked_indices};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use core::fmt::{self, Display, Formatter};
@@ -87,11 +87,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut count = Count::default();
         self.bounds(f, &names, &mut count)?;
         let view = self.qp.view();
-        for i in marked(view.periodic()) {
+        for i in marked_indices(view.periodic()) {
             let name = names.x.get(i).copied().unwrap_or_default();
             writeln!(f, "         {name} at stage 0 = {name} at stage {intervals}")?;
         }
-        for j in marked(view.shared()).filter_map(|j| j.checked_sub(self.free.count())) {
+        for j in marked_indices(view.shared()).filter_map(|j| j.checked_sub(self.free.count())) {
             let name = names.u.get(j).copied().unwrap_or_default();
             writeln!(f, "         {name} the same at all stages")?;
         }

@@ -12,7 +12,7 @@ use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{Side, StageDims};
 use crate::scalar::Real;
-use crate::structure::means;
+use crate::structure::name_matches;
 use core::ops::RangeBounds;
 
 const BOTH: &[Side] = &[Side::Lower, Side::Upper];
@@ -99,7 +99,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         penalty: [T; 2],
     ) -> Result<&mut Self, OcpError> {
         let known = self.names();
-        let is_variable = known.x.iter().chain(known.u).chain(known.z).any(|variable| means(name, variable));
+        let is_variable =
+            known.x.iter().chain(known.u).chain(known.z).any(|variable| name_matches(name, variable));
         let is_path = (0..P::Path::ROWS).any(|row| output::<P::Path, _, T>(row).is_meant(name));
         let is_terminal = (0..P::Terminal::ROWS).any(|row| output::<P::Terminal, _, T>(row).is_meant(name));
         let end = if !is_variable && (is_path || is_terminal) {

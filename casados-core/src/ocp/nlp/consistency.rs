@@ -3,7 +3,7 @@
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{Bounds, QpField, Side, StageDims, marked};
+use crate::qp::{Bounds, QpField, Side, StageDims, marked_indices};
 use crate::scalar::Real;
 
 /// The largest hard lower bound and the least hard upper bound, each with its stage.
@@ -38,14 +38,14 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// between both where the upper one holds.
     pub(in crate::ocp) fn contradiction(&self, tolerance: f64) -> Option<Status> {
         let (qp, last) = (self.qp.view(), self.intervals());
-        let controls = marked(qp.shared()).map(|index| {
+        let controls = marked_indices(qp.shared()).map(|index| {
             let mut common = Interval::ALL;
             for (k, stage) in qp.stages().enumerate() {
                 common.intersect(&stage.u_bounds(), index, k);
             }
             (QpField::ControlBounds, index, common)
         });
-        let states = marked(qp.periodic()).map(|index| {
+        let states = marked_indices(qp.periodic()).map(|index| {
             let mut common = Interval::ALL;
             for (k, stage) in qp.stages().enumerate().filter(|&(k, _)| k == 0 || k == last) {
                 common.intersect(&stage.x_bounds(), index, k);

@@ -25,7 +25,7 @@ pub(super) enum Perturbed {
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Whether there is such a constraint at the iterate, where the QP was written.
     pub(super) fn has_vanishing_gradient(&self) -> bool {
-        let (qp, (v, _)) = (self.qp.view(), self.iterate.vectors());
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         Places::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
             let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();

@@ -4,7 +4,7 @@
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::program::Program;
 pub(in crate::ocp) use crate::qp::Violation as Worst;
-use crate::qp::{StageDims, pad, worst};
+use crate::qp::{StageDims, largest_violation, padded_len};
 use crate::scalar::Real;
 
 /// How many numbers remember the linear penalties.
@@ -42,7 +42,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         let mut row = 0;
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
             let StageDims { nx, nu, ng } = stage.dims();
-            let ld = pad::<T>(nx + nu);
+            let ld = padded_len::<T>(nx + nu);
             for (kind, begin) in [row, row + nx, row + ld].into_iter().enumerate() {
                 let bounds = match kind {
                     0 => stage.x_bounds_mut(),
@@ -57,7 +57,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
                     (*lower, *upper) = (now(below), now(above));
                 }
             }
-            row += ld + pad::<T>(ng);
+            row += ld + padded_len::<T>(ng);
         }
     }
 
@@ -84,7 +84,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     pub(in crate::ocp) fn worst(&self, memory: &[T], units: &[T]) -> (Option<Worst>, f64) {
         let mut pairs = memory.as_chunks().0.iter();
         let fixed = self.initial == Initial::Fixed;
-        worst(self.qp(), self.iterate.vectors().0, units, |place, row| {
+        largest_violation(self.qp(), self.iterate.variables_and_costates().0, units, |place, row| {
             let given = pairs.next().copied().unwrap_or([T::ZERO; 2]);
             if fixed && place.stage == 0 && row < place.nx { [T::ZERO; 2] } else { given }
         })

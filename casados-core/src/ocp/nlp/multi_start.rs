@@ -4,7 +4,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::solution::outcome::Outcome;
-use crate::qp::{HeapSolution, larger};
+use crate::qp::{HeapSolution, nan_max};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::cmp::Ordering;
@@ -106,7 +106,7 @@ impl<T> StartOutcome<T> {
     fn rank(&self) -> (u8, f64) {
         match &self.outcome {
             Ok(outcome) if outcome.is_solved() => (0, outcome.objective),
-            Ok(outcome) => (1, larger(outcome.residuals.largest(), 0.0)),
+            Ok(outcome) => (1, nan_max(outcome.residuals.largest(), 0.0)),
             Err(_) => (2, 0.0),
         }
     }

@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::nlp::degenerate::Perturbed;
 use crate::ocp::program::Program;
-use crate::qp::{Places, Solution, StageDims, assign, pad, part_mut};
+use crate::qp::{Places, Solution, StageDims, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -147,8 +147,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.roll_out(|ocp, k, end| {
             let layout @ Layout { intervals, .. } = ocp.layout();
             let data = split::<P, T>(ocp.data.as_mut(), layout);
-            let (v, _) = ocp.iterate.vectors();
-            let (ld, np) = (pad::<T>(inputs::<P::Shape>(layout.free)), P::Shape::NP);
+            let (v, _) = ocp.iterate.variables_and_costates();
+            let (ld, np) = (padded_len::<T>(inputs::<P::Shape>(layout.free)), P::Shape::NP);
             // Of two intervals, since the last one of a horizon may end with a map.
             let times = data.times.get(k..(k + 3).min(intervals + 1)).unwrap_or_default();
             let (v, p) = (v.get(k * ld..).unwrap_or_default(), data.p.get(k * np..).unwrap_or_default());
@@ -157,7 +157,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let Problem { dynamics, .. } = ocp.problem.parts();
             let result = dynamics.simulate(&nodes, &mut |interval, step| {
                 if interval == 0 {
-                    assign(end, step.x);
+                    copy_common(end, step.x);
                     has_end = true;
                 }
             });
@@ -195,12 +195,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.roll_out(|ocp, k, end| {
             let layout = ocp.layout();
             let data = split::<P, T>(ocp.data.as_mut(), layout);
-            let (v, _) = ocp.iterate.vectors();
+            let (v, _) = ocp.iterate.variables_and_costates();
             let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, ocp.free.view()), data.times);
             let Some(interval) = nodes.iter().nth(k) else { return Ok(()) };
             at(k, integrator.begin(&interval))?;
             let result = integrator.solve(&vector(interval.x), &vector(interval.u), interval.h);
-            assign(end, at(k, result)?.x.as_slice());
+            copy_common(end, at(k, result)?.x.as_slice());
             Ok(())
         })
     }
@@ -221,7 +221,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             integrate(self, interval, end).map_err(|error| self.end_of_simulation(interval, error))?;
             Labels::states::<P, T>(Part::States, interval + 1).check_finite(end)?;
             if let Some(next) = self.iterate.stage_mut(interval + 1) {
-                assign(next.x, end);
+                copy_common(next.x, end);
             }
         }
         self.join_states();

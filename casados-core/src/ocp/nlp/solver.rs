@@ -10,7 +10,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
-use crate::qp::room;
+use crate::qp::try_reserve;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
@@ -94,7 +94,7 @@ pub(super) fn iterate<P, T, D, M, S: Method<P, T, D, M>>(
         outcome.count(&row);
         #[cfg(feature = "alloc")]
         {
-            room(method.log(), 1)?;
+            try_reserve(method.log(), 1)?;
             method.log().push(row);
         }
         if !method.restart(ocp, state, end, &row)

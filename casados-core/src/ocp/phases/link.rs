@@ -6,7 +6,7 @@ use crate::ocp::formulation::free::Free;
 use crate::ocp::formulation::functions::constraint::{Constraint, Constraints, Spot};
 use crate::ocp::formulation::functions::point::{Terms, There, read};
 use crate::qp::element::set;
-use crate::qp::{assign, part_mut};
+use crate::qp::{copy_common, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
@@ -97,7 +97,7 @@ impl<T: Real> Link<T> for Continuous {
         mismatch("Continuous", "output", [dims.begins, dims.own])
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
-        assign(values, end.x);
+        copy_common(values, end.x);
         Ok(())
     }
     fn linearise(
@@ -106,7 +106,7 @@ impl<T: Real> Link<T> for Continuous {
         values: &mut [T],
         (columns, ld): (&mut [T], usize),
     ) -> Result<(), OcpError> {
-        assign(values, end.x);
+        copy_common(values, end.x);
         (0..values.len()).for_each(|i| set(columns, i * ld + i, T::ONE));
         Ok(())
     }

@@ -31,7 +31,9 @@ use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::instance::{HeapOcp, Initial, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::program::ends;
-use crate::qp::{HeapSolution, Qp, Solution, SolutionStage, StageDims, assign, pad, room, zeros};
+use crate::qp::{
+    HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, try_reserve, zeros,
+};
 use crate::scalar::Real;
 use alloc::boxed::Box;
 use alloc::vec;
@@ -164,13 +166,13 @@ impl<'a, T: Real> Phases<'a, T> {
         for (phase, decided) in self.phases.iter_mut().zip(decided) {
             phase.first = dims.len();
             let of_phase = phase.problem.qp().dims();
-            room(&mut dims, of_phase.len())?;
+            try_reserve(&mut dims, of_phase.len())?;
             let (nx, free) = (phase.size.nx, phase.size.free);
             dims.extend(of_phase.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
                 last.nu = decided;
             }
-            room(&mut self.trials, 1)?;
+            try_reserve(&mut self.trials, 1)?;
             self.trials.push(Trial { at: Solution::new(of_phase)?, ends: zeros(ends(of_phase))? });
         }
         let (rows, scratch) = (dims.iter().map(|stage| stage.ng).sum::<usize>(), scratch::<T>(&dims));
@@ -219,7 +221,7 @@ impl<'a, T: Real> Phases<'a, T> {
         let Some(Joined { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
         let mut start = zeros(size.given)?;
         if let Some(first) = problem.qp().stage(0) {
-            assign(&mut start, first.x_bounds().lower);
+            copy_common(&mut start, first.x_bounds().lower);
         }
         Ok(start)
     }
@@ -307,7 +309,7 @@ impl<'a, T: Real> Joined<'a, T> {
 fn scratch<T>(dims: &[StageDims]) -> usize {
     let of_stage = |stage: &StageDims| {
         let n = stage.nx + stage.nu;
-        (2 * n + 4) * pad::<T>(n)
+        (2 * n + 4) * padded_len::<T>(n)
     };
     dims.iter().map(of_stage).max().unwrap_or(0)
 }

@@ -10,7 +10,9 @@ use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::program::Parts;
 use crate::ocp::solution::outcome::Outcome;
-use crate::qp::{HeapSolution, QpError, QpField, QpView, Side, SolutionStage, assign, marked, part};
+use crate::qp::{
+    HeapSolution, QpError, QpField, QpView, Side, SolutionStage, copy_common, marked_indices, part,
+};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use core::ops::Range;
@@ -81,7 +83,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
             return;
         };
-        assign(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
+        copy_common(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
     }
 }
 
@@ -114,10 +116,10 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         if P::Dynamics::LIFTED {
             return Some("collocation, whose stages are variables: take an integrator");
         }
-        if marked(self.qp.view().periodic()).next().is_some() {
+        if marked_indices(self.qp.view().periodic()).next().is_some() {
             return Some("periodic states: a phase begins where the one before it ends");
         }
-        if marked(self.qp.view().shared()).any(|control| control >= free) {
+        if marked_indices(self.qp.view().shared()).any(|control| control >= free) {
             return Some("shared controls: take free parameters of the model, `free`");
         }
         if !is_first && matches!(self.initial, Initial::Fixed | Initial::Partly) {

@@ -13,8 +13,8 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::ocp::solution::outcome::Outcome;
 use crate::qp::{
-    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, assign, check,
-    part, part_mut, take_mut,
+    Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, check,
+    copy_common, part, part_mut, take_mut,
 };
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -88,7 +88,7 @@ impl<T: Real> Program<T> for Phases<'_, T> {
         let mut before = stages.next();
         if let (Some(size), Some(decided)) = (nexts.next(), before) {
             let first = take_mut(&mut ends, size.nx + size.free);
-            assign(first, start);
+            copy_common(first, start);
             transfer::begin(size, decided.u, first);
         }
         for (phase, trial) in phases.iter_mut().zip(trials) {
@@ -185,10 +185,10 @@ fn write_ends<T: Real>(size: Size, trial: &Trial<T>, ends: &mut &mut [T], values
     let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
     for (k, point) in trial.at.stages().enumerate().take(intervals) {
         let (x, w) = take_mut(ends, nx + free).split_at_mut_checked(nx).unwrap_or_default();
-        assign(x, part(phi, k * nx, nx));
-        assign(w, point.u);
+        copy_common(x, part(phi, k * nx, nx));
+        copy_common(w, point.u);
     }
-    assign(take_mut(values, g.len()), g);
+    copy_common(take_mut(values, g.len()), g);
 }
 
 impl<T: Real> Joined<'_, T> {
@@ -252,14 +252,14 @@ impl<T: Real> Phases<'_, T> {
         scratch: &mut [T],
         kind: Kind,
     ) -> Result<(), OcpError> {
-        let ((v, _), mut begin) = (at.vectors(), 0);
+        let ((v, _), mut begin) = (at.variables_and_costates(), 0);
         let (mut stages, mut points) = (qp.stages_mut(), at.stages());
         let nexts = self.nexts();
         if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
         {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
-            assign(offset, &self.start);
+            copy_common(offset, &self.start);
             transfer::begin_columns(first.size, point.x.len(), matrix, ld);
             begin += ld;
         }

@@ -10,8 +10,8 @@
 use super::phase::Size;
 use crate::qp::element::set;
 use crate::qp::{
-    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, assign, part,
-    part_mut,
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, copy_common,
+    part, part_mut,
 };
 use crate::scalar::Real;
 
@@ -45,21 +45,21 @@ fn load_stage<T: Real>(
     ] {
         let (x, w) = x.split_at_checked(nx).unwrap_or_default();
         let (to_w, to_u) = to_u.split_at_mut_checked(free).unwrap_or_default();
-        assign(to_x, x);
-        assign(to_w, w);
-        assign(to_u, u);
+        copy_common(to_x, x);
+        copy_common(to_w, w);
+        copy_common(to_u, u);
     }
-    assign(to.dynamics, from.dynamics);
-    assign(to.g_lower, from.g_lower);
-    assign(to.g_upper, from.g_upper);
+    copy_common(to.dynamics, from.dynamics);
+    copy_common(to.g_lower, from.g_lower);
+    copy_common(to.g_upper, from.g_upper);
     // What is decided has its bounds where it is.
     if let Some(before) = before {
         for (from, x, u) in
             [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
         {
             let (states, parameters) = from.split_at_checked(size.states().len()).unwrap_or_default();
-            assign(x.get_mut(size.states()).unwrap_or_default(), states);
-            assign(u, part(parameters, 0, free));
+            copy_common(x.get_mut(size.states()).unwrap_or_default(), states);
+            copy_common(u, part(parameters, 0, free));
         }
     }
 }
@@ -78,13 +78,13 @@ pub(super) fn store<T: Real>(
     ] {
         let (w, u) = u.split_at_checked(free).unwrap_or_default();
         let (first, second) = to_x.split_at_mut_checked(x.len()).unwrap_or_default();
-        assign(first, x);
-        assign(second, w);
-        assign(to_u, u);
+        copy_common(first, x);
+        copy_common(second, w);
+        copy_common(to_u, u);
     }
-    assign(to.dynamics, from.dynamics);
-    assign(to.g_lower, from.g_lower);
-    assign(to.g_upper, from.g_upper);
+    copy_common(to.dynamics, from.dynamics);
+    copy_common(to.g_lower, from.g_lower);
+    copy_common(to.g_upper, from.g_upper);
     if let Some((size, next)) = next {
         decide(size, &next, to.u, to.u_lower, to.u_upper);
     }
@@ -102,8 +102,8 @@ pub(super) fn decide<T: Real>(
         [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
     {
         let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
-        assign(states, x.get(size.states()).unwrap_or_default());
-        assign(parameters, u);
+        copy_common(states, x.get(size.states()).unwrap_or_default());
+        copy_common(parameters, u);
     }
 }
 
@@ -146,16 +146,16 @@ pub(super) fn bounds<T: Real>(
     for (to, (x, u)) in
         lists_mut(to.x_bounds_mut()).into_iter().zip(lists(&from.x_bounds()).into_iter().zip(of_u))
     {
-        assign(part_mut(to, 0, count), x);
+        copy_common(part_mut(to, 0, count), x);
         if place == Place::Inside {
-            assign(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
+            copy_common(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
         }
     }
     for (to, from) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_u) {
-        assign(to, from.get(free..).unwrap_or_default());
+        copy_common(to, from.get(free..).unwrap_or_default());
     }
     for (to, from) in lists_mut(to.g_bounds_mut()).into_iter().zip(lists(&from.g_bounds())) {
-        assign(to, from);
+        copy_common(to, from);
     }
 }
 
@@ -164,8 +164,8 @@ pub(super) fn decided_bounds<T: Real>(size: Size, first: &Stage<'_, T>, to: &mut
     let of_first = lists(&first.x_bounds()).into_iter().zip(lists(&first.u_bounds()));
     for (to, (x, u)) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_first) {
         let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
-        assign(states, x.get(size.states()).unwrap_or_default());
-        assign(parameters, part(u, 0, size.free));
+        copy_common(states, x.get(size.states()).unwrap_or_default());
+        copy_common(parameters, part(u, 0, size.free));
     }
 }
 
@@ -174,8 +174,8 @@ pub(super) fn begin<T: Real>(size: Size, decided: &[T], start: &mut [T]) {
     let (states, parameters) = decided.split_at_checked(size.states().len()).unwrap_or_default();
     let (x, w) = start.split_at_mut_checked(size.nx).unwrap_or_default();
     x.get_mut(size.given..).unwrap_or_default().fill(T::ZERO);
-    assign(x.get_mut(size.states()).unwrap_or_default(), states);
-    assign(w, parameters);
+    copy_common(x.get_mut(size.states()).unwrap_or_default(), states);
+    copy_common(w, parameters);
 }
 
 /// The same as columns of the QP, where what is decided are the variables from `first` on.
@@ -194,7 +194,7 @@ pub(super) fn qp<T: Real>(Size { nx, free, .. }: Size, from: &Stage<'_, T>, to: 
     let copy = |to: &mut [T], j: usize, from: &[T]| {
         let column = part_mut(to, j * ld, ld);
         let (own, behind) = column.split_at_mut_checked(n).unwrap_or_default();
-        assign(own, from);
+        copy_common(own, from);
         behind.fill(T::ZERO);
     };
     for j in 0..view.next {
@@ -206,7 +206,7 @@ pub(super) fn qp<T: Real>(Size { nx, free, .. }: Size, from: &Stage<'_, T>, to: 
             set(matrix, w * ld + w, T::ONE);
         }
         let (own, behind) = offset.split_at_mut_checked(nx).unwrap_or_default();
-        assign(own, view.offset);
+        copy_common(own, view.offset);
         behind.fill(T::ZERO);
     }
     for row in 0..bounds.lower.len() {
@@ -217,8 +217,8 @@ pub(super) fn qp<T: Real>(Size { nx, free, .. }: Size, from: &Stage<'_, T>, to: 
     for j in 0..n {
         copy(hessian, j, from_column(view.hessian, j));
     }
-    assign(gradient, part(view.gradient, 0, n));
+    copy_common(gradient, part(view.gradient, 0, n));
     let (lower, rest) = limits.split_at_mut_checked(*rows).unwrap_or_default();
-    assign(part_mut(lower, ld, bounds.lower.len()), bounds.lower);
-    assign(part_mut(rest, ld, bounds.upper.len()), bounds.upper);
+    copy_common(part_mut(lower, ld, bounds.lower.len()), bounds.lower);
+    copy_common(part_mut(rest, ld, bounds.upper.len()), bounds.upper);
 }

@@ -9,7 +9,7 @@ use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::solution::outcome::Outcome;
-use crate::qp::{Qp, QpError, QpField, Residuals, Side, Solution, StageDims, larger};
+use crate::qp::{Qp, QpError, QpField, Residuals, Side, Solution, StageDims, nan_max};
 use crate::scalar::Real;
 use core::ops::Range;
 
@@ -188,7 +188,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         let (mut residuals, penalties) = crate::ocp::assembly::kkt::residuals(qp.view(), iterate, scratch);
         if P::LIFTED {
             let [_, stages] = self.stages;
-            residuals.dynamics = larger(residuals.dynamics, stages.to_f64());
+            residuals.dynamics = nan_max(residuals.dynamics, stages.to_f64());
         }
         (residuals, self.objective.to_f64() + penalties)
     }

@@ -86,7 +86,7 @@ where
     ) -> Result<(), OcpError> {
         let layout = ocp.layout();
         let data = split::<Self, T>(ocp.data.as_mut(), layout);
-        let (v, multipliers) = ocp.iterate.vectors();
+        let (v, multipliers) = ocp.iterate.variables_and_costates();
         let p = (&*data.p, ocp.free.view());
         ocp.problem.dynamics.begin_stages(&nodes::<I::Shape, T>(v, multipliers, &[], p, data.times))
     }
@@ -97,9 +97,9 @@ where
     ) -> Result<(), OcpError> {
         let layout = ocp.layout();
         let data = split::<Self, T>(ocp.data.as_mut(), layout);
-        let (v, multipliers) = ocp.iterate.vectors();
+        let (v, multipliers) = ocp.iterate.variables_and_costates();
         let nodes = nodes::<I::Shape, T>(v, multipliers, &[], (data.p, ocp.free.view()), data.times);
-        let (step, _) = step.vectors();
+        let (step, _) = step.variables_and_costates();
         ocp.problem.dynamics.expand_stages(&nodes, &Nodes { v: step, ..nodes })
     }
 

@@ -179,7 +179,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let (layout, free) = (self.layout(), self.free.view());
         let data = split::<P, T>(&mut self.data, layout);
         let Problem { path, .. } = self.problem.parts();
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, free), data.times);
         let sizes = largest_states::<T>(self.iterate.stages(), P::Shape::NX)?;
         let mut inside = Inside::new::<P>()?;

@@ -161,7 +161,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
 
     /// A warning for each constraint, of its first stage.
     fn vanishing_gradients(&self, found: &mut Vec<Warning>) {
-        let (qp, (v, _)) = (self.qp(), self.iterate().vectors());
+        let (qp, (v, _)) = (self.qp(), self.iterate().variables_and_costates());
         for (place, stage) in Places::<T>::new(qp.dims()).zip(qp.stages()) {
             let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();

@@ -1,11 +1,11 @@
 //! The condensed problem: the recursion over the stages of a block.
 
-use super::plan::{Kind, Origin, blocks, limits};
+use super::plan::{Kind, Origin, blocks, row_bounds_and_penalties};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, PADDING_COLUMNS, Part, Source, product, subtract};
-use crate::qp::layout::{Places, StageDims, StageOffsets, assign, pad, part, part_mut, take_mut};
+use crate::qp::layout::{Places, StageDims, StageOffsets, copy_common, padded_len, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
-use crate::qp::stage::Row;
+use crate::qp::stage::ConstraintVector;
 use crate::scalar::{Packed, Real, Registers};
 use alloc::vec::Vec;
 
@@ -31,19 +31,20 @@ pub struct Work<'a, T> {
 }
 
 /// The largest dimensions.
-pub struct Largest {
+pub struct MaxDimensions {
     pub n: usize,
     pub nx: usize,
     pub rows: usize,
 }
 
 impl<'a, T: Real> Work<'a, T> {
-    pub fn lengths(largest: &Largest) -> [usize; 10] {
-        let (ld, ld_x, ld_z) = (pad::<T>(largest.n), pad::<T>(largest.nx), pad::<T>(largest.rows));
+    pub fn lengths(largest: &MaxDimensions) -> [usize; 10] {
+        let (ld, ld_x, ld_z) =
+            (padded_len::<T>(largest.n), padded_len::<T>(largest.nx), padded_len::<T>(largest.rows));
         let n = largest.n + PADDING_COLUMNS;
         [ld_z * n, ld_z * n, ld_x * n, ld * n, ld * n, ld * n, ld_z, ld, ld, ld_x]
     }
-    pub fn new(largest: &Largest, mut memory: &'a mut [T]) -> Self {
+    pub fn new(largest: &MaxDimensions, mut memory: &'a mut [T]) -> Self {
         let mut parts = Self::lengths(largest).into_iter().map(|length| take_mut(&mut memory, length));
         let mut next = || parts.next().unwrap_or_default();
         Self {
@@ -57,7 +58,7 @@ impl<'a, T: Real> Work<'a, T> {
             g: next(),
             g_next: next(),
             offset: next(),
-            ld_z: pad::<T>(largest.rows),
+            ld_z: padded_len::<T>(largest.rows),
         }
     }
 }
@@ -99,17 +100,17 @@ impl<T: Real> Condense<'_, T> {
         let stages = Places::<T>::new(qp.dims).skip(block.start).take(block.len());
         for (count, place) in stages.rev().enumerate() {
             let stage = Stage { place, data: part(qp.data, place.data, place.data_len()), controls };
-            work.recur::<E>(&stage, origins, count == 0);
+            work.propagate_stage::<E>(&stage, origins, count == 0);
             work.write_controls(&stage, to, origins, target);
-            work.add_rows_of_controls(&stage, origins);
-            work.add_rows_of_constraints(&stage, rows, to, origins, target);
-            work.pass_on(place.n, place.nx);
+            work.add_control_rows(&stage, origins);
+            work.add_constraint_rows(&stage, rows, to, origins, target);
+            work.shift_to_previous_stage(place.n, place.nx);
             controls += place.nu;
             if place.stage == block.start {
                 work.write_first_state(&stage, to, origins, target);
             }
         }
-        work.write_constants(to, origins, target);
+        work.write_bound_offsets(to, origins, target);
     }
 }
 
@@ -125,7 +126,12 @@ impl<T: Real> Work<'_, T> {
     /// `M`, `Z` and their gradients over the variables of a stage, from those over the state behind
     /// it; or, at the end of a block, from nothing.
     #[inline(always)]
-    fn recur<E: Packed<T>>(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>, first: bool) {
+    fn propagate_stage<E: Packed<T>>(
+        &mut self,
+        stage: &Stage<'_, T>,
+        origins: &mut Vec<Origin>,
+        first: bool,
+    ) {
         let Self { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = self;
         let (Stage { data, place, .. }, ld_z) = (stage, *ld_z);
         let &StageOffsets { n, ld, next, ld_next, stage, .. } = place;
@@ -148,7 +154,7 @@ impl<T: Real> Work<'_, T> {
                 }
                 set(constant, i, b.get(i).copied().unwrap_or(T::ZERO));
             }
-            assign(part_mut(m, 0, hessian.len()), hessian);
+            copy_common(part_mut(m, 0, hessian.len()), hessian);
             return;
         }
         // g + V b, and constants + Z b
@@ -177,21 +183,27 @@ impl<T: Real> Work<'_, T> {
             let (here, column) =
                 (to.nx + stage.controls + i, part(self.z_next, (nx + i) * self.ld_z, origins.len()));
             for (origin, &element) in origins.iter().zip(column) {
-                set(target, at(to, origin, here), element);
+                set(target, row_element_index(to, origin, here), element);
             }
             for j in i..nu {
                 let element = get(self.m, (nx + i) * ld + nx + j);
                 set(target, to.matrix() + here * to.ld + here - i + j, element);
             }
-            for (vector, value) in limits(stage.data, &stage.place, nx + i).into_iter().enumerate() {
-                set(target, to.row_data(Row::Lower) + vector * to.rows + here, value);
+            for (vector, value) in
+                row_bounds_and_penalties(stage.data, &stage.place, nx + i).into_iter().enumerate()
+            {
+                set(
+                    target,
+                    to.constraint_vector_begin(ConstraintVector::Lower) + vector * to.rows + here,
+                    value,
+                );
             }
         }
     }
 
     /// Rows of `Z`: mixed derivatives with respect to the controls of a stage.
     #[inline(always)]
-    fn add_rows_of_controls(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
+    fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
         let StageOffsets { nx, nu, ld, stage: number, .. } = stage.place;
         for i in 0..nu {
             let row = origins.len();
@@ -206,7 +218,7 @@ impl<T: Real> Work<'_, T> {
     /// Rows of `Z`: those of the `rows` of a block that are constraints of a stage, with their
     /// bounds.
     #[inline(always)]
-    fn add_rows_of_constraints(
+    fn add_constraint_rows(
         &mut self,
         stage: &Stage<'_, T>,
         rows: &[Origin],
@@ -234,18 +246,24 @@ impl<T: Real> Work<'_, T> {
                 }
             }
             set(self.constant, row, T::ZERO);
-            for (vector, value) in limits(stage.data, &stage.place, origin.index).into_iter().enumerate() {
-                set(target, to.row_data(Row::Lower) + vector * to.rows + to.ld + index, value);
+            for (vector, value) in
+                row_bounds_and_penalties(stage.data, &stage.place, origin.index).into_iter().enumerate()
+            {
+                set(
+                    target,
+                    to.constraint_vector_begin(ConstraintVector::Lower) + vector * to.rows + to.ld + index,
+                    value,
+                );
             }
         }
     }
 
     /// What is left is a function of the state of the stage.
     #[inline(always)]
-    fn pass_on(&mut self, n: usize, nx: usize) {
+    fn shift_to_previous_stage(&mut self, n: usize, nx: usize) {
         let Self { z, z_next, v, m, g, g_next, .. } = self;
         core::mem::swap(z, z_next);
-        let (ld, ld_x) = (pad::<T>(n), pad::<T>(nx));
+        let (ld, ld_x) = (padded_len::<T>(n), padded_len::<T>(nx));
         for j in 0..nx {
             for i in j..nx {
                 let element = get(m, j * ld + i);
@@ -253,7 +271,7 @@ impl<T: Real> Work<'_, T> {
                 set(v, i * ld_x + j, element);
             }
         }
-        assign(part_mut(g, 0, nx), part(g_next, 0, nx));
+        copy_common(part_mut(g, 0, nx), part(g_next, 0, nx));
         part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
     }
 
@@ -272,26 +290,32 @@ impl<T: Real> Work<'_, T> {
                 set(target, to.matrix() + j * to.ld + i, get(self.m, j * ld + i));
             }
             for (row, origin) in origins.iter().enumerate() {
-                set(target, at(to, origin, j), get(self.z, j * self.ld_z + row));
+                set(target, row_element_index(to, origin, j), get(self.z, j * self.ld_z + row));
             }
             set(target, to.gradient() + j, get(self.g, j));
-            for (vector, value) in limits(stage.data, &stage.place, j).into_iter().enumerate() {
-                set(target, to.row_data(Row::Lower) + vector * to.rows + j, value);
+            for (vector, value) in
+                row_bounds_and_penalties(stage.data, &stage.place, j).into_iter().enumerate()
+            {
+                set(
+                    target,
+                    to.constraint_vector_begin(ConstraintVector::Lower) + vector * to.rows + j,
+                    value,
+                );
             }
         }
     }
 
     /// Writes what is constant in the rows of a block.
     #[inline(always)]
-    fn write_constants(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+    fn write_bound_offsets(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
             let constant = get(self.constant, row);
             match origin.kind {
                 Kind::State => set(target, to.offset() + origin.index, constant),
                 Kind::Control => set(target, to.gradient() + to.nx + origin.index, constant),
                 Kind::Constraint => {
-                    for vector in [Row::Lower, Row::Upper] {
-                        let at = to.row_data(vector) + to.ld + origin.index;
+                    for vector in [ConstraintVector::Lower, ConstraintVector::Upper] {
+                        let at = to.constraint_vector_begin(vector) + to.ld + origin.index;
                         let bound = get(target, at);
                         set(target, at, bound - constant);
                     }
@@ -302,7 +326,7 @@ impl<T: Real> Work<'_, T> {
 }
 
 /// Where the element of a row of `Z` with a variable of the condensed stage lies.
-fn at(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
+fn row_element_index(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,

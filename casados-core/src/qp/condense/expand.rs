@@ -3,7 +3,7 @@
 use super::plan::{Origin, blocks};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, add_symmetric, add_transposed, subtract, symmetric};
-use crate::qp::layout::{Places, StageOffsets, assign, pad, part, part_mut};
+use crate::qp::layout::{Places, StageOffsets, copy_common, padded_len, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::scalar::{Packed, Real, Registers};
@@ -26,25 +26,31 @@ pub fn copy<T: Real>(
             let pairs =
                 (0..states).map(|i| (i, i)).chain((0..place.nu).map(|i| (place.nx + i, controls + i)));
             for (a, b) in pairs {
-                exchange(full.v, place.v + a, condensed.v, to.v + b, expand);
-                exchange(full.lower, place.row + a, condensed.lower, to.row + b, expand);
-                exchange(full.upper, place.row + a, condensed.upper, to.row + b, expand);
+                copy_either_way(full.v, place.v + a, condensed.v, to.v + b, expand);
+                copy_either_way(full.lower, place.row + a, condensed.lower, to.row + b, expand);
+                copy_either_way(full.upper, place.row + a, condensed.upper, to.row + b, expand);
             }
             for (index, origin) in here.iter().enumerate().filter(|(_, origin)| origin.stage == place.stage) {
                 let (a, b) = (place.row + origin.index, to.row + to.ld + index);
-                exchange(full.lower, a, condensed.lower, b, expand);
-                exchange(full.upper, a, condensed.upper, b, expand);
+                copy_either_way(full.lower, a, condensed.lower, b, expand);
+                copy_either_way(full.upper, a, condensed.upper, b, expand);
             }
             if place.stage + 1 == block.end {
                 for i in 0..place.next {
-                    exchange(full.dynamics, place.dynamics + i, condensed.dynamics, to.dynamics + i, expand);
+                    copy_either_way(
+                        full.dynamics,
+                        place.dynamics + i,
+                        condensed.dynamics,
+                        to.dynamics + i,
+                        expand,
+                    );
                 }
             }
         }
     }
 }
 
-fn exchange<T: Real>(full: &mut [T], a: usize, condensed: &mut [T], b: usize, expand: bool) {
+fn copy_either_way<T: Real>(full: &mut [T], a: usize, condensed: &mut [T], b: usize, expand: bool) {
     if expand {
         set(full, a, get(condensed, b));
     } else {
@@ -72,7 +78,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
             let data = part(qp.data, place.data, place.data_len());
             let (here, coming) = v.split_at_mut_checked(place.v + ld).unwrap_or_default();
             let coming = part_mut(coming, 0, next);
-            assign(coming, part(data, place.offset(), next));
+            copy_common(coming, part(data, place.offset(), next));
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             add_transposed::<T, E>(coming, matrix, part(here, place.v, ld), n, next);
         }
@@ -97,14 +103,14 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
                 *minus = lower - upper;
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
-            let before = place.dynamics.saturating_sub(pad::<T>(nx));
-            assign(part_mut(dynamics, before, nx), part(g, 0, nx));
+            let before = place.dynamics.saturating_sub(padded_len::<T>(nx));
+            copy_common(part_mut(dynamics, before, nx), part(g, 0, nx));
         }
     }
 }
 
 /// `Σ ½ vᵀ H v + hᵀ v`, with room for a vector over the variables of a stage.
-pub fn quadratic<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut [T]) -> f64 {
+pub fn stage_cost_and_product<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut [T]) -> f64 {
     let mut sum = 0.0;
     for place in Places::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());

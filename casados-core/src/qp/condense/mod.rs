@@ -17,17 +17,17 @@ mod expand;
 mod plan;
 
 use super::error::QpError;
-use super::layout::{Places, StageDims, pad, part};
-use super::memory::{reserve, room};
+use super::layout::{Places, StageDims, padded_len, part};
+use super::memory::{try_reserve, try_resize};
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
 use super::solver::{QpSolver, QpStart};
 use super::statistics::QpStatistics;
 use crate::scalar::Real;
 use alloc::vec::Vec;
-use block::{Condense, Largest, Work};
-use expand::{Expand, copy, quadratic};
-use plan::{Kind, Origin, blocks, is_bounded, limits, translate};
+use block::{Condense, MaxDimensions, Work};
+use expand::{Expand, copy, stage_cost_and_product};
+use plan::{Kind, Origin, blocks, expand_error, is_bounded, row_bounds_and_penalties};
 
 /// A solver that sees problems condensed in blocks of some intervals.
 ///
@@ -90,8 +90,8 @@ impl<T: Real, S> Condensing<T, S> {
         self.dims.clear();
         self.rows.clear();
         // As much as there can be, so that no later call needs more.
-        room(&mut self.dims, qp.dims.len())?;
-        room(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
+        try_reserve(&mut self.dims, qp.dims.len())?;
+        try_reserve(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
         let mut places = Places::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
@@ -104,7 +104,7 @@ impl<T: Real, S> Condensing<T, S> {
                 }
                 let inner = if stage > block.start { 0..place.nx } else { 0..0 };
                 for index in inner.chain(place.ld..place.ld + place.ng) {
-                    if index >= place.ld || is_bounded(limits(data, &place, index)) {
+                    if index >= place.ld || is_bounded(row_bounds_and_penalties(data, &place, index)) {
                         condensed.ng += 1;
                         self.rows.push(Origin { kind: Kind::Constraint, stage, index });
                     }
@@ -138,7 +138,7 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         over: &mut dyn FnMut() -> bool,
     ) -> Result<QpStatistics, QpError> {
         super::check::check_all_bounds(qp)?;
-        solution.fits(qp)?;
+        solution.check_dimensions(qp)?;
         if qp.is_coupled() {
             return Err(QpError::Coupled);
         }
@@ -150,17 +150,17 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
             return Err(QpError::OutOfMemory { bytes: 0 });
         };
         let places = Places::<T>::new(qp.dims);
-        let largest = Largest {
+        let largest = MaxDimensions {
             n: places.clone().map(|p| p.n).max().unwrap_or(0),
             nx: places.clone().map(|p| p.nx).max().unwrap_or(0),
             rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
         };
-        let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
+        let most = places.map(|p| padded_len::<T>(p.next + p.ng)).max().unwrap_or(0);
         let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
-        let others = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
-        reserve(work, Work::<T>::lengths(&largest).iter().sum::<usize>() + others)?;
+        let others = most + padded_len::<T>(largest.n) + padded_len::<T>(condensed_n);
+        try_resize(work, Work::<T>::lengths(&largest).iter().sum::<usize>() + others)?;
         origins.clear();
-        room(origins, largest.rows)?;
+        try_reserve(origins, largest.rows)?;
         let target = condensed.data_mut();
         let matrices = Work::new(&largest, work);
         T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });
@@ -171,12 +171,12 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), true);
         let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
         T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });
-        result.map_err(|error| translate(error, qp, *block, dims, rows)).map(|statistics| {
+        result.map_err(|error| expand_error(error, qp, *block, dims, rows)).map(|statistics| {
             // Penalties are the same; what is constant in eliminated states is in none of the
             // condensed costs.
-            let g = work.get_mut(..pad::<T>(largest.n.max(condensed_n))).unwrap_or_default();
-            let difference = quadratic(qp, solution.v, g)
-                - quadratic(condensed.view(), start_and_solution.view_mut().v, g);
+            let g = work.get_mut(..padded_len::<T>(largest.n.max(condensed_n))).unwrap_or_default();
+            let difference = stage_cost_and_product(qp, solution.v, g)
+                - stage_cost_and_product(condensed.view(), start_and_solution.view_mut().v, g);
             QpStatistics { objective: statistics.objective + difference, ..statistics }
         })
     }

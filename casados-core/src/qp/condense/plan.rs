@@ -3,7 +3,7 @@
 use crate::qp::error::{QpError, QpField};
 use crate::qp::layout::{Places, StageDims, StageOffsets, part};
 use crate::qp::problem::QpView;
-use crate::qp::stage::Row;
+use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
 /// What a row of `Z` is, or where a constraint of the condensed problem comes from.
@@ -28,16 +28,18 @@ pub enum Kind {
 }
 
 /// Bounds and penalties of one row.
-pub fn limits<T: Real>(data: &[T], place: &StageOffsets, row: usize) -> [T; 6] {
+pub fn row_bounds_and_penalties<T: Real>(data: &[T], place: &StageOffsets, row: usize) -> [T; 6] {
     let all = [
-        Row::Lower,
-        Row::Upper,
-        Row::LowerLinear,
-        Row::LowerQuadratic,
-        Row::UpperLinear,
-        Row::UpperQuadratic,
+        ConstraintVector::Lower,
+        ConstraintVector::Upper,
+        ConstraintVector::LowerLinear,
+        ConstraintVector::LowerQuadratic,
+        ConstraintVector::UpperLinear,
+        ConstraintVector::UpperQuadratic,
     ];
-    all.map(|vector| part(data, place.row_data(vector) + row, 1).first().copied().unwrap_or(T::ZERO))
+    all.map(|vector| {
+        part(data, place.constraint_vector_begin(vector) + row, 1).first().copied().unwrap_or(T::ZERO)
+    })
 }
 
 /// Whether a row has a bound.
@@ -52,7 +54,7 @@ pub fn blocks(stages: usize, block: usize) -> impl Iterator<Item = core::ops::Ra
 }
 
 /// An error in terms of the problem that was not condensed.
-pub fn translate<T: Real>(
+pub fn expand_error<T: Real>(
     error: QpError,
     qp: QpView<'_, T>,
     size: usize,
@@ -66,7 +68,7 @@ pub fn translate<T: Real>(
                 let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
                 let origin = rows.get(before + index)?;
                 let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
-                let (field, index) = place.name(origin.index);
+                let (field, index) = place.field_of_row(origin.index);
                 Some((origin.stage, field, index))
             }
             QpField::ControlBounds => {

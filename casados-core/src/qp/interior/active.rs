@@ -18,12 +18,12 @@
 //! ```
 
 use super::iterate::{Iterate, at};
-use super::limits::Limits;
-use super::sides::Sides;
+use super::limits::ResidualTolerances;
+use super::sides::Inequalities;
 use super::terms::Terms;
 use super::units::Units;
 use crate::qp::element::set;
-use crate::qp::layout::{assign, part_mut};
+use crate::qp::layout::{copy_common, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
 use crate::qp::statistics::QpStatistics;
@@ -35,7 +35,7 @@ const ACTIVE: u32 = 1;
 const VIOLATED: u32 = 2;
 
 /// Solves with the same factors, at most.
-const REFINEMENTS: usize = 3;
+const MAX_REFINEMENTS: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
     /// The solution from a point and its multipliers, if not more than some active sets are between
@@ -45,7 +45,7 @@ impl<T: Real> Iterate<'_, T> {
     pub fn by_active_sets<E: Packed<T>>(
         &mut self,
         (start, tries): (QpStart, usize),
-        limits: &Limits<T>,
+        limits: &ResidualTolerances<T>,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpStatistics> {
@@ -53,16 +53,16 @@ impl<T: Real> Iterate<'_, T> {
         if tries == 0 {
             return Err(statistics);
         }
-        self.take_point(solution);
-        self.give_initial_state();
+        self.load_point(solution);
+        self.load_initial_state();
         self.evaluate_values::<E>();
-        self.sides.take_multipliers(solution);
+        self.sides.load_multipliers(solution);
         self.sides.guess();
-        if start == QpStart::Cold && (!self.sides.are_inactive() || over()) {
+        if start == QpStart::Cold && (!self.sides.is_active_set_empty() || over()) {
             return Err(statistics);
         }
         self.first_gradient::<E>(limits, solution.dynamics);
-        self.regularise(false);
+        self.set_regularisation(false);
         let (mut factor, mut changes) = (true, usize::MAX);
         loop {
             if factor {
@@ -79,7 +79,9 @@ impl<T: Real> Iterate<'_, T> {
             // Nothing changes sides because of what is below the tolerance.
             let Terms { forces, values } = limits.of(self.terms);
             let half = T::from_f64(0.5);
-            changes = self.sides.change(Terms { forces: half * forces, values: half * values }, self.measure);
+            changes = self
+                .sides
+                .update_active_set(Terms { forces: half * forces, values: half * values }, self.measure);
             factor = changes > 0;
             if factor {
                 // Sets that come nearer do not change more and more.
@@ -88,18 +90,19 @@ impl<T: Real> Iterate<'_, T> {
                 }
                 continue;
             }
-            self.sides.settle();
+            self.sides.clip_to_feasible_signs();
             let objective = self.evaluate::<E>(solution.dynamics);
             let residuals = self.judged::<E>();
-            if objective.is_finite() && self.are_small(residuals, limits) {
-                (statistics.objective, statistics.residuals) = (objective.to_f64(), self.told(residuals));
+            if objective.is_finite() && self.is_converged(residuals, limits) {
+                (statistics.objective, statistics.residuals) =
+                    (objective.to_f64(), self.unscaled_residuals(residuals));
                 return Ok(statistics);
             }
-            if statistics.refinements >= REFINEMENTS {
+            if statistics.refinements >= MAX_REFINEMENTS {
                 return Err(QpStatistics { refinements: 0, ..statistics });
             }
-            self.sides.unsettle();
-            self.no_dynamics();
+            self.sides.restore_signed_distances();
+            self.clear_dynamics_residuals();
         }
     }
 
@@ -107,7 +110,7 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
         let weight = T::ONE / self.sides.compliance;
-        self.sides.force();
+        self.sides.assemble_active_weights();
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;
         }
@@ -118,7 +121,7 @@ impl<T: Real> Iterate<'_, T> {
         self.stationarity.fill(T::ZERO);
         self.dynamics.fill(T::ZERO);
         if let Some(coupling) = &mut self.coupling {
-            coupling.advance(T::ONE);
+            coupling.take_step(T::ONE);
         }
         let sides = &mut self.sides;
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
@@ -126,16 +129,16 @@ impl<T: Real> Iterate<'_, T> {
             *residual = *residual + at(self.step, row);
             *free = *free - weight * stiffness * *residual;
         }
-        sides.follow();
+        sides.update_after_active_step();
         true
     }
 }
 
 /// Here `slack` is the distance `d`, which may be negative, and `target` the force that the
 /// gradient knows of.
-impl<T: Real> Sides<'_, T> {
+impl<T: Real> Inequalities<'_, T> {
     /// Whether there are neither active sides nor equations.
-    fn are_inactive(&self) -> bool {
+    fn is_active_set_empty(&self) -> bool {
         self.equations.is_empty() && self.activity.iter().all(|&activity| activity == INACTIVE)
     }
 
@@ -148,7 +151,7 @@ impl<T: Real> Sides<'_, T> {
     /// What sides are, from their distances in `scratch` and their multipliers.
     fn guess(&mut self) {
         let count = self.counts.sides();
-        assign(part_mut(self.slack, 0, count), self.scratch);
+        copy_common(part_mut(self.slack, 0, count), self.scratch);
         for (((activity, &distance), &multiplier), &softness) in
             self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.softness)
         {
@@ -169,12 +172,12 @@ impl<T: Real> Sides<'_, T> {
                 *multiplier = T::ZERO;
             }
         }
-        assign(part_mut(self.target, 0, count), self.multiplier);
+        copy_common(part_mut(self.target, 0, count), self.multiplier);
     }
 
     /// Weights, and into `scratch` what the sides add to the gradient beyond what it knows of.
     #[inline(always)]
-    fn force(&mut self) {
+    fn assemble_active_weights(&mut self) {
         let weight = T::ONE / self.compliance;
         for ((&activity, side_weight), &softness) in
             self.activity.iter().zip(&mut *self.weight).zip(&*self.softness)
@@ -194,7 +197,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// Distances and multipliers after a step, whose changes of rows are in `scratch`.
     #[inline(always)]
-    fn follow(&mut self) {
+    fn update_after_active_step(&mut self) {
         for (distance, &change) in self.slack.iter_mut().zip(&*self.scratch).take(self.counts.sides()) {
             *distance = *distance + change;
         }
@@ -207,12 +210,12 @@ impl<T: Real> Sides<'_, T> {
                 set(self.multiplier, side as usize, self.penalty(j, at(self.slack, side)));
             }
         }
-        assign(part_mut(self.target, 0, self.counts.sides()), self.multiplier);
+        copy_common(part_mut(self.target, 0, self.counts.sides()), self.multiplier);
     }
 
     /// Sides become what their distances and multipliers say. Returns how many have changed.
     #[inline(always)]
-    fn change(&mut self, tolerance: Terms<T>, units: Units<'_, T>) -> usize {
+    fn update_active_set(&mut self, tolerance: Terms<T>, units: Units<'_, T>) -> usize {
         let Terms { forces, values } = tolerance;
         let mut changes = 0;
         let sides = self.activity.iter_mut().zip(&*self.slack).zip(&*self.rows);
@@ -254,7 +257,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// Slacks, violations and multipliers as an interior point has them: none is negative.
     #[inline(always)]
-    fn settle(&mut self) {
+    fn clip_to_feasible_signs(&mut self) {
         let count = self.counts.sides();
         for (j, &side) in self.soft.iter().enumerate() {
             let violated = self.activity.get(side as usize) == Some(&VIOLATED);
@@ -273,7 +276,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// Distances again, from the residuals of a settled point.
     #[inline(always)]
-    fn unsettle(&mut self) {
+    fn restore_signed_distances(&mut self) {
         let count = self.counts.sides();
         for (distance, &residual) in self.slack.iter_mut().zip(&*self.residual).take(count) {
             *distance = *distance + residual;
@@ -282,6 +285,6 @@ impl<T: Real> Sides<'_, T> {
             let (violation, distance) = (at(self.slack, (count + j) as u32), at(self.slack, side));
             set(self.slack, side as usize, distance - violation);
         }
-        assign(part_mut(self.target, 0, count), self.multiplier);
+        copy_common(part_mut(self.target, 0, count), self.multiplier);
     }
 }

@@ -20,11 +20,11 @@ use super::riccati::{Equations, Riccati};
 use super::shared::Shared;
 use super::symmetric::Symmetric;
 use super::units::Units;
-use super::vector::{add_scaled, dot, shrink};
+use super::vector::{add_scaled, dot, scale_vector};
 use crate::qp::element::{add, set};
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, assign, pad, part, part_mut};
-use crate::qp::{QpView, marked};
+use crate::qp::layout::{Places, StageOffsets, copy_common, padded_len, part, part_mut};
+use crate::qp::{QpView, marked_indices};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
@@ -67,14 +67,14 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
             return;
         }
         let Equations { qp, dynamics, .. } = equations;
-        assign(coupling.first, riccati.g);
+        copy_common(coupling.first, riccati.g);
         if factor {
             coupling.eliminate::<E>(qp, riccati, dynamics);
         }
         coupling.gather(qp, riccati);
-        *result = coupling.solve_border(riccati, units, factor);
+        *result = coupling.solve_bordered_system(riccati, units, factor);
         if result.is_ok() {
-            coupling.spread::<E>(qp, riccati);
+            coupling.distribute_parameter_step::<E>(qp, riccati);
             riccati.forward::<E>(&equations, step);
         }
     }
@@ -85,18 +85,18 @@ impl<T: Real> Coupling<'_, T> {
     /// leaves of `S`, and what residuals of the dynamics add to `s`.
     #[inline(always)]
     fn eliminate<E: Packed<T>>(&mut self, qp: QpView<'_, T>, riccati: &Riccati<'_, T>, dynamics: &[T]) {
-        let (count, ld) = (self.count, pad::<T>(self.count));
+        let (count, ld) = (self.count, padded_len::<T>(self.count));
         for zero in [&mut *self.schur, self.offset] {
             zero.fill(T::ZERO);
         }
-        for place in Places::<T>::ending(qp.dims, riccati.end).rev() {
+        for place in Places::<T>::with_known_end(qp.dims, riccati.end).rev() {
             let StageOffsets { nx, nu, n, next, .. } = place;
             let minus = Columns { data: &*self.minus, ld };
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld: place.ld };
             product::<T, E>(self.gamma, ld, Source::Zero, minus, matrix, (count, 0..n, next), Part::Full);
             // `Γ₊ᵀ r`
             subtract::<T, E>(self.offset, minus, part(dynamics, place.dynamics, next), count, next);
-            self.add_own(&place, qp.dims.len(), riccati.end.v);
+            self.add_stage_columns(&place, qp.dims.len(), riccati.end.v);
             self.eliminate_controls(&place, riccati);
             let (states, controls) = self.gamma.split_at_mut_checked(nx * ld).unwrap_or_default();
             let signed = Columns { data: &*controls, ld };
@@ -114,10 +114,10 @@ impl<T: Real> Coupling<'_, T> {
     /// Adds what a stage itself has of the parameters: `−E` at the last one, and columns of `M`, of
     /// so many variables of all stages.
     #[inline(always)]
-    fn add_own(&mut self, place: &StageOffsets, stages: usize, length: usize) {
-        let ld = pad::<T>(self.count);
+    fn add_stage_columns(&mut self, place: &StageOffsets, stages: usize, length: usize) {
+        let ld = padded_len::<T>(self.count);
         if place.stage + 1 == stages {
-            for (c, state) in marked(self.periodic).enumerate() {
+            for (c, state) in marked_indices(self.periodic).enumerate() {
                 set(self.gamma, state * ld + c, -T::ONE);
             }
         }
@@ -132,18 +132,18 @@ impl<T: Real> Coupling<'_, T> {
     /// what belongs to shared controls to `S`.
     #[inline(always)]
     fn eliminate_controls(&mut self, place: &StageOffsets, riccati: &Riccati<'_, T>) {
-        let (StageOffsets { nx, nu, .. }, ld) = (*place, pad::<T>(self.count));
+        let (StageOffsets { nx, nu, .. }, ld) = (*place, padded_len::<T>(self.count));
         let begin = place.v + nx;
         let panel = part(riccati.panels, place.factor, place.ld * nu);
         let controls = part_mut(self.gamma, nx * ld, nu * ld);
         for (i, &inverse) in part(riccati.inverse, begin, nu).iter().enumerate() {
             let (own, below) = controls.split_at_mut_checked((i + 1) * ld).unwrap_or_default();
             let signed = part_mut(own, i * ld, ld);
-            shrink(signed, inverse);
+            scale_vector(signed, inverse);
             let y = part_mut(self.eliminated, (begin + i) * ld, ld);
-            assign(y, signed);
+            copy_common(y, signed);
             if inverse < T::ZERO {
-                shrink(y, -T::ONE);
+                scale_vector(y, -T::ONE);
             }
             let factors = part(panel, i * place.ld + nx + i + 1, nu - i - 1);
             for (below, &factor) in below.chunks_exact_mut(ld.max(1)).zip(factors) {
@@ -152,7 +152,7 @@ impl<T: Real> Coupling<'_, T> {
         }
         // Rows of shared controls were passed by: they belong to `S`, whose other half comes with
         // the other column. What `M` has of both counts once.
-        for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
+        for (w, j) in marked_indices(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
             let (other, y) = (self.conditions + w, part_mut(self.eliminated, (begin + j) * ld, ld));
             for (c, &value) in y.iter().enumerate().take(self.count) {
                 let control = c.checked_sub(self.conditions).map(|control| control * riccati.end.v);
@@ -169,12 +169,12 @@ impl<T: Real> Coupling<'_, T> {
 
     /// `s`, from what the way back has left.
     fn gather(&mut self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
-        assign(self.linear, self.offset);
-        let ld = pad::<T>(self.count);
+        copy_common(self.linear, self.offset);
+        let ld = padded_len::<T>(self.count);
         for place in Places::<T>::new(qp.dims) {
             let (begin, nu) = (place.v + place.nx, place.nu);
             let y = part_mut(riccati.y, begin, nu);
-            for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
+            for (w, j) in marked_indices(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
                 add(self.linear, self.conditions + w, y.get(j).copied().unwrap_or(T::ZERO));
                 set(y, j, T::ZERO);
             }
@@ -186,7 +186,7 @@ impl<T: Real> Coupling<'_, T> {
     }
 
     /// The first state and the changes of the parameters.
-    fn solve_border(
+    fn solve_bordered_system(
         &mut self,
         riccati: &Riccati<'_, T>,
         units: Units<'_, T>,
@@ -194,7 +194,7 @@ impl<T: Real> Coupling<'_, T> {
     ) -> Result<(), QpError> {
         let (nx, n) = (self.free, self.free + self.count);
         if factor {
-            self.write_border(riccati);
+            self.write_bordered_matrix(riccati);
         }
         for (right, &p) in self.right.iter_mut().zip(&*self.first).take(nx) {
             *right = -p;
@@ -206,7 +206,7 @@ impl<T: Real> Coupling<'_, T> {
         let noise = T::from_f64(T::EPSILON);
         let is_scaled = !units.rows.is_empty();
         if is_scaled {
-            self.scale_border(units, factor);
+            self.scale_bordered_system(units, factor);
         }
         if factor {
             let inertia = Symmetric::factor(self.matrix, n, self.exchanged, noise);
@@ -217,28 +217,34 @@ impl<T: Real> Coupling<'_, T> {
         }
         Symmetric::new(self.matrix, n, self.exchanged).solve(part_mut(self.right, 0, n));
         if is_scaled {
-            self.scale_border(units, false);
+            self.scale_bordered_system(units, false);
         }
-        assign(self.step, self.right.get(nx..).unwrap_or_default());
+        copy_common(self.step, self.right.get(nx..).unwrap_or_default());
         Ok(())
     }
 
     /// Scales right-hand side and matrix of the border: variables by their units, multipliers of
     /// periodic states by those of forces. Which pivots vanish is a matter of their sizes.
-    fn scale_border(&mut self, units: Units<'_, T>, matrix: bool) {
+    fn scale_bordered_system(&mut self, units: Units<'_, T>, matrix: bool) {
         let (nx, n) = (self.free, self.free + self.count);
         let first = self.first.len();
         for (right, unit) in
-            self.right.iter_mut().zip(border_units(units, nx, first, self.periodic, self.shared))
+            self.right.iter_mut().zip(bordered_unknown_units(units, nx, first, self.periodic, self.shared))
         {
             *right = *right * unit;
         }
         if matrix {
             let columns = self.matrix.chunks_exact_mut(n.max(1));
-            for (column, unit) in columns.zip(border_units(units, nx, first, self.periodic, self.shared)) {
-                for (element, other) in
-                    column.iter_mut().zip(border_units(units, nx, first, self.periodic, self.shared))
-                {
+            for (column, unit) in
+                columns.zip(bordered_unknown_units(units, nx, first, self.periodic, self.shared))
+            {
+                for (element, other) in column.iter_mut().zip(bordered_unknown_units(
+                    units,
+                    nx,
+                    first,
+                    self.periodic,
+                    self.shared,
+                )) {
                     *element = *element * unit * other;
                 }
             }
@@ -246,9 +252,9 @@ impl<T: Real> Coupling<'_, T> {
     }
 
     /// `[P₀  Γ₀ + E; · S]`, the lower triangle.
-    fn write_border(&mut self, riccati: &Riccati<'_, T>) {
+    fn write_bordered_matrix(&mut self, riccati: &Riccati<'_, T>) {
         let (nx, count) = (self.free, self.count);
-        let (n, ld, ld_q) = (nx + count, pad::<T>(self.first.len()), pad::<T>(count));
+        let (n, ld, ld_q) = (nx + count, padded_len::<T>(self.first.len()), padded_len::<T>(count));
         self.matrix.fill(T::ZERO);
         for j in 0..nx {
             let p = riccati.p.get(j * ld..).unwrap_or_default();
@@ -260,7 +266,7 @@ impl<T: Real> Coupling<'_, T> {
                 set(self.matrix, j * n + nx + c, gamma);
             }
         }
-        for (c, i) in marked(self.periodic).enumerate().filter(|_| nx > 0) {
+        for (c, i) in marked_indices(self.periodic).enumerate().filter(|_| nx > 0) {
             add(self.matrix, i * n + nx + c, T::ONE);
         }
         for b in 0..count {
@@ -273,8 +279,8 @@ impl<T: Real> Coupling<'_, T> {
 
     /// What the way forth needs of the first state and the parameters.
     #[inline(always)]
-    fn spread<E: Packed<T>>(&self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
-        let ld = pad::<T>(self.count);
+    fn distribute_parameter_step<E: Packed<T>>(&self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
+        let ld = padded_len::<T>(self.count);
         let controls = self.step.get(self.conditions..).unwrap_or_default();
         for place in Places::<T>::new(qp.dims) {
             let begin = place.v + place.nx;
@@ -285,17 +291,17 @@ impl<T: Real> Coupling<'_, T> {
             }
             // The last stage has no controls.
             if place.nu > 0 {
-                for (j, &step) in marked(self.shared).zip(controls) {
+                for (j, &step) in marked_indices(self.shared).zip(controls) {
                     set(y, j, -step);
                 }
             }
         }
-        assign(part_mut(riccati.y, 0, self.free), self.right);
+        copy_common(part_mut(riccati.y, 0, self.free), self.right);
     }
 }
 
 /// The units of the first state, of multipliers of periodic states, and of shared controls.
-fn border_units<'a, T: Real>(
+fn bordered_unknown_units<'a, T: Real>(
     units: Units<'a, T>,
     free: usize,
     first: usize,
@@ -303,6 +309,6 @@ fn border_units<'a, T: Real>(
     shared: &'a [T],
 ) -> impl Iterator<Item = T> + use<'a, T> {
     let states = (0..free).map(move |i| units.of(i));
-    let conditions = marked(periodic).map(move |i| units.objective / units.of(i));
-    states.chain(conditions).chain(marked(shared).map(move |j| units.of(first + j)))
+    let conditions = marked_indices(periodic).map(move |i| units.objective / units.of(i));
+    states.chain(conditions).chain(marked_indices(shared).map(move |j| units.of(first + j)))
 }

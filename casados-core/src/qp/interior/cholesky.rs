@@ -88,18 +88,24 @@ fn eliminate_group<T: Real, E: Packed<T>, const W: usize>(
 #[cfg_attr(not(feature = "std"), inline(never))]
 pub fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     match u.len() {
-        _ if cfg!(not(feature = "std")) => substitute_many(u, panel, ld, row, inverse),
-        1 => substitute_all::<T, 1>(u, panel, ld, row, inverse),
-        2 => substitute_all::<T, 2>(u, panel, ld, row, inverse),
-        3 => substitute_all::<T, 3>(u, panel, ld, row, inverse),
-        GROUP => substitute_all::<T, GROUP>(u, panel, ld, row, inverse),
-        _ => substitute_many(u, panel, ld, row, inverse),
+        _ if cfg!(not(feature = "std")) => back_substitute_any(u, panel, ld, row, inverse),
+        1 => back_substitute_fixed::<T, 1>(u, panel, ld, row, inverse),
+        2 => back_substitute_fixed::<T, 2>(u, panel, ld, row, inverse),
+        3 => back_substitute_fixed::<T, 3>(u, panel, ld, row, inverse),
+        GROUP => back_substitute_fixed::<T, GROUP>(u, panel, ld, row, inverse),
+        _ => back_substitute_any(u, panel, ld, row, inverse),
     }
 }
 
 /// The same of `W` elements.
 #[inline(always)]
-fn substitute_all<T: Real, const W: usize>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
+fn back_substitute_fixed<T: Real, const W: usize>(
+    u: &mut [T],
+    panel: &[T],
+    ld: usize,
+    row: usize,
+    inverse: &[T],
+) {
     let (Some(block), Some(u)) = (triangle::<T, W>(panel, ld, row), u.first_chunk_mut::<W>()) else { return };
     let Some(inverse) = inverse.first_chunk::<W>() else { return };
     for i in (0..W).rev() {
@@ -113,7 +119,7 @@ fn substitute_all<T: Real, const W: usize>(u: &mut [T], panel: &[T], ld: usize, 
 
 /// The same of any number of elements.
 #[inline(always)]
-fn substitute_many<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
+fn back_substitute_any<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
     for i in (0..u.len()).rev() {
         let column = part(panel, i * ld + row, u.len());
         let (before, after) = u.split_at_mut_checked(i + 1).unwrap_or_default();
@@ -215,7 +221,7 @@ pub fn cholesky<T: Real, E: Packed<T>>(
 }
 
 /// What is said of the pivots of a group.
-struct Found<T> {
+struct PivotReport<T> {
     regularised: usize,
     negative: Option<(usize, T)>,
     signed: bool,
@@ -229,8 +235,8 @@ fn factor_columns<T: Real, E: Packed<T>>(
     rows: usize,
     noise: T,
     Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
-) -> Found<T> {
-    let mut all = Found { regularised: 0, negative: None, signed: false };
+) -> PivotReport<T> {
+    let mut all = PivotReport { regularised: 0, negative: None, signed: false };
     let mut rest = group;
     for (i, (inverse, added)) in inverse.chunks_mut(1).zip(added.chunks_mut(1)).enumerate() {
         let (column, others) = rest.split_at_mut_checked(ld).unwrap_or_default();
@@ -258,8 +264,8 @@ fn factor_group<T: Real, E: Packed<T>, const W: usize>(
     rows: usize,
     noise: T,
     Pivots { inverse, added, largest, indefinite }: Pivots<'_, T>,
-) -> Found<T> {
-    let mut found = Found { regularised: 0, negative: None, signed: false };
+) -> PivotReport<T> {
+    let mut found = PivotReport { regularised: 0, negative: None, signed: false };
     let (Some(inverse), Some(added)) = (inverse.first_chunk_mut::<W>(), added.first_chunk_mut::<W>()) else {
         return found;
     };

@@ -4,26 +4,26 @@
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
 use super::kernels::PADDING_COLUMNS;
-use super::riccati::{Extent, First};
-use super::vector::{add_scaled, shrink};
+use super::riccati::{Extent, InitialStateKind};
+use super::vector::{add_scaled, scale_vector};
 use crate::qp::element::set;
-use crate::qp::layout::{Places, StageOffsets, first_nx, pad, take_mut};
-use crate::qp::{QpView, StageDims, marked};
+use crate::qp::layout::{Places, StageOffsets, first_nx, padded_len, take_mut};
+use crate::qp::{QpView, StageDims, marked_indices};
 use crate::scalar::Real;
 
 /// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
 /// that programs that cannot ask for couplings do not contain them.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Copy)]
-pub struct Exists;
+pub struct CouplingSupport;
 #[cfg(not(feature = "alloc"))]
 #[derive(Clone, Copy)]
 pub enum Exists {}
 
 #[cfg(feature = "alloc")]
-const EXISTS: Option<Exists> = Some(Exists);
+const EXISTS: Option<CouplingSupport> = Some(CouplingSupport);
 #[cfg(not(feature = "alloc"))]
-const EXISTS: Option<Exists> = None;
+const EXISTS: Option<CouplingSupport> = None;
 
 /// What couples stages, in memory of its owner.
 pub struct Coupling<'a, T> {
@@ -63,7 +63,7 @@ pub struct Coupling<'a, T> {
     pub matrix: &'a mut [T],
     pub right: &'a mut [T],
     pub exchanged: &'a mut [T],
-    _exists: Exists,
+    _exists: CouplingSupport,
 }
 
 impl<'a, T: Real> Coupling<'a, T> {
@@ -73,7 +73,7 @@ impl<'a, T: Real> Coupling<'a, T> {
         let count = conditions + shared;
         let columns = n + PADDING_COLUMNS + nx + 1 + count + PADDING_COLUMNS + end.v;
         let (first, border) = (first_nx(dims), first_nx(dims) + count);
-        pad::<T>(count) * columns
+        padded_len::<T>(count) * columns
             + 2 * conditions
             + 2 * count
             + shared * end.v
@@ -86,20 +86,26 @@ impl<'a, T: Real> Coupling<'a, T> {
         if EXISTS.is_none() {
             return 0;
         }
-        let (conditions, shared) = (marked(qp.periodic()).count(), marked(qp.shared()).count());
+        let (conditions, shared) =
+            (marked_indices(qp.periodic()).count(), marked_indices(qp.shared()).count());
         if conditions + shared == 0 { 0 } else { Self::memory(qp.dims, conditions, shared) }
     }
 
     /// Of a QP that is coupled, in memory of that length.
-    pub fn new(qp: QpView<'a, T>, extent: &Extent, first: First, memory: &mut &'a mut [T]) -> Option<Self> {
+    pub fn new(
+        qp: QpView<'a, T>,
+        extent: &Extent,
+        first: InitialStateKind,
+        memory: &mut &'a mut [T],
+    ) -> Option<Self> {
         let (periodic, shared) = (qp.periodic(), qp.shared());
-        let (conditions, parameters) = (marked(periodic).count(), marked(shared).count());
+        let (conditions, parameters) = (marked_indices(periodic).count(), marked_indices(shared).count());
         let count = conditions + parameters;
         if count == 0 {
             return None;
         }
         let _exists = EXISTS?;
-        let (v, nx, ld) = (extent.end.v, first_nx(qp.dims), pad::<T>(count));
+        let (v, nx, ld) = (extent.end.v, first_nx(qp.dims), padded_len::<T>(count));
         let n = nx + count;
         Some(Self {
             _exists,
@@ -107,7 +113,7 @@ impl<'a, T: Real> Coupling<'a, T> {
             shared,
             conditions,
             count,
-            free: if first == First::Fixed { 0 } else { nx },
+            free: if first == InitialStateKind::Fixed { 0 } else { nx },
             residual: take_mut(memory, conditions),
             theta: take_mut(memory, conditions),
             step: take_mut(memory, count),
@@ -129,26 +135,26 @@ impl<'a, T: Real> Coupling<'a, T> {
     pub fn evaluate(&mut self, qp: QpView<'_, T>, rows: &[T]) {
         let last = last_state(qp);
         let at = |row: usize| rows.get(row).copied().unwrap_or(T::ZERO);
-        for (residual, i) in self.residual.iter_mut().zip(marked(self.periodic)) {
+        for (residual, i) in self.residual.iter_mut().zip(marked_indices(self.periodic)) {
             *residual = at(i) - at(last + i);
         }
     }
 
     /// Goes a part of the step of the multipliers; that of the residuals remains which it leaves.
-    pub fn advance(&mut self, alpha: T) {
+    pub fn take_step(&mut self, alpha: T) {
         add_scaled(self.theta, alpha, self.step);
-        shrink(self.residual, T::ONE - alpha);
+        scale_vector(self.residual, T::ONE - alpha);
     }
 
     /// The sum of all `|x₀ − x_N|`.
-    pub fn violation(&self) -> f64 {
+    pub fn residual_sum(&self) -> f64 {
         self.residual.iter().fold(0.0, |sum, gap| sum + gap.abs().to_f64())
     }
 
     /// Adds the forces of `θ`, and of `Δθ` if this is asked for, to the rows.
-    pub fn push(&self, qp: QpView<'_, T>, with_step: bool, rows: &mut [T]) {
+    pub fn add_multiplier_forces(&self, qp: QpView<'_, T>, with_step: bool, rows: &mut [T]) {
         let last = last_state(qp);
-        let multipliers = self.theta.iter().zip(&*self.step).zip(marked(self.periodic));
+        let multipliers = self.theta.iter().zip(&*self.step).zip(marked_indices(self.periodic));
         for ((&theta, &step), i) in multipliers {
             let force = if with_step { theta + step } else { theta };
             for (row, force) in [(i, force), (last + i, -force)] {
@@ -171,11 +177,11 @@ impl<'a, T: Real> Coupling<'a, T> {
             value
         };
         let last = last_state(qp);
-        for (theta, i) in self.theta.iter_mut().zip(marked(self.periodic)) {
+        for (theta, i) in self.theta.iter_mut().zip(marked_indices(self.periodic)) {
             *theta = *theta + join(i, last + i);
         }
         let Some(first) = Places::<T>::new(qp.dims).next() else { return };
-        for j in marked(self.shared) {
+        for j in marked_indices(self.shared) {
             for StageOffsets { row, nx, .. } in Places::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
             {
                 join(first.nx + j, row + nx + j);

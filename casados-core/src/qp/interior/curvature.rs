@@ -3,9 +3,9 @@
 use super::cholesky::{substitute, unit};
 use super::kernels::{Columns, add_transposed, symmetric};
 use super::riccati::Riccati;
-use super::vector::larger;
+use super::vector::largest_magnitude_ignoring_nan;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, assign, part, part_mut, take_mut};
+use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::Real;
 
@@ -51,7 +51,7 @@ impl<T: Real> Riccati<'_, T> {
                 u.fill(T::ZERO);
                 add_transposed::<T, T>(u, Columns { data: panel, ld }, v, nx, nu);
                 substitute(u, panel, ld, nx, part(inverse, nx, nu));
-                assign(part_mut(v, nx, nu), u);
+                copy_common(part_mut(v, nx, nu), u);
             }
             let coming = part_mut(rest, 0, next);
             coming.fill(T::ZERO);
@@ -60,7 +60,7 @@ impl<T: Real> Riccati<'_, T> {
             product.fill(T::ZERO);
             let hessian = part(data, place.matrix(), place.hessian());
             symmetric::<T, T>(product, hessian, ld, v, n);
-            let largest = larger::<T, T>(T::ZERO, hessian);
+            let largest = largest_magnitude_ignoring_nan::<T, T>(T::ZERO, hessian);
             for (&v, &product) in v.iter().zip(&*product) {
                 curvature = curvature + v * product;
                 size = size + largest * v * v;

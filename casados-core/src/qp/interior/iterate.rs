@@ -3,13 +3,13 @@
 use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
-use super::riccati::{Extent, First, Riccati};
-use super::sides::{Counts, Sides};
-use super::terms::{Most, Terms};
+use super::riccati::{Extent, InitialStateKind, Riccati};
+use super::sides::{Counts, Inequalities};
+use super::terms::{LargestTerms, Terms};
 use super::units::Units;
 use crate::qp::element::get;
 use crate::qp::layout::{
-    Places, StageDims, StageOffsets, assign, end, first_nx, pad, part, part_mut, take_mut,
+    Places, StageDims, StageOffsets, copy_common, end, first_nx, padded_len, part, part_mut, take_mut,
 };
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
@@ -23,7 +23,7 @@ use core::marker::PhantomData;
 /// from a recursion at the end.
 pub struct Iterate<'a, T> {
     pub qp: QpView<'a, T>,
-    pub first: First,
+    pub first: InitialStateKind,
     /// Whether there is one: without it a point is sought that violates least.
     pub objective: bool,
     /// What keeps variables near where they are: `½ ρ |Δ|²` of every step.
@@ -33,7 +33,7 @@ pub struct Iterate<'a, T> {
     /// What everything else is compared with.
     pub measure: Units<'a, T>,
     pub riccati: Riccati<'a, T>,
-    pub sides: Sides<'a, T>,
+    pub sides: Inequalities<'a, T>,
     /// What couples stages.
     pub coupling: Option<Coupling<'a, T>>,
     /// `v` and `C x + D u`
@@ -74,7 +74,7 @@ pub enum Costates {
 
 /// The residuals as a function of its own; the gradient only where there is room for multipliers
 /// and the objective.
-struct Evaluate<'s, 'a, T, E> {
+struct EvaluateResiduals<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
     values: bool,
     multipliers: Option<(&'s mut [T], &'s mut T)>,
@@ -82,7 +82,7 @@ struct Evaluate<'s, 'a, T, E> {
     register: PhantomData<E>,
 }
 
-impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
+impl<T: Real, E: Packed<T>> Piece for EvaluateResiduals<'_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         if self.values {
@@ -110,15 +110,15 @@ impl<'a, T: Real> Iterate<'a, T> {
     pub fn new(
         qp: QpView<'a, T>,
         extent: &Extent,
-        first: First,
-        sides: Sides<'a, T>,
+        first: InitialStateKind,
+        sides: Inequalities<'a, T>,
         numbers: &mut &'a mut [T],
     ) -> Self {
         let (riccati, initial) = (Riccati::new(extent, numbers), first_nx(qp.dims));
         let end = extent.end;
         let coupling = Coupling::new(qp, extent, first, numbers);
-        let found = if coupling.is_some() { First::Coupled } else { First::Free };
-        let first = if first == First::Fixed { first } else { found };
+        let found = if coupling.is_some() { InitialStateKind::Coupled } else { InitialStateKind::Free };
+        let first = if first == InitialStateKind::Fixed { first } else { found };
         Self {
             qp,
             first,
@@ -135,7 +135,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             gradient: take_mut(numbers, end.row),
             weights: take_mut(numbers, end.row),
             dynamics: take_mut(numbers, end.dynamics),
-            initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
+            initial: take_mut(numbers, if first == InitialStateKind::Fixed { initial } else { 0 }),
             mu: T::ZERO,
             terms: Terms { forces: T::ZERO, values: T::ZERO },
             own_terms: Terms { forces: T::ZERO, values: T::ZERO },
@@ -144,7 +144,7 @@ impl<'a, T: Real> Iterate<'a, T> {
 
     /// What sides and equations give way to forces, and variables if they are to, in the units of
     /// the problem.
-    pub fn regularise(&mut self, proximal: bool) {
+    pub fn set_regularisation(&mut self, proximal: bool) {
         let Terms { forces, values } = self.terms;
         let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
         self.sides.compliance = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
@@ -156,39 +156,39 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// the recursion of the controlled system, and the gradient of the Lagrangian. Returns the
     /// objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
-        self.evaluate_parts::<E>(true, Some(multipliers), Costates::Controlled)
+        self.evaluate_selected::<E>(true, Some(multipliers), Costates::Controlled)
     }
 
     /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is
     /// what they leave.
-    pub fn evaluate_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(true, Some(multipliers), Costates::Given);
+    pub fn evaluate_with_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_selected::<E>(true, Some(multipliers), Costates::Given);
     }
 
     /// The multipliers `π` after a step, by the recursion of the controlled system.
-    pub fn controlled_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::AfterStep);
+    pub fn closed_loop_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::AfterStep);
     }
 
     /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are
     /// in `scratch` afterwards.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
-        let _ = self.evaluate_parts::<E>(true, None, Costates::Given);
+        let _ = self.evaluate_selected::<E>(true, None, Costates::Given);
     }
 
     /// What is left of [`evaluate`](Self::evaluate) after
     /// [`evaluate_values`](Self::evaluate_values).
     pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled);
+        let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::Controlled);
     }
 
     /// The same with given multipliers.
-    pub fn evaluate_gradient_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Given);
+    pub fn gradient_with_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_selected::<E>(false, Some(multipliers), Costates::Given);
     }
 
     #[inline(always)]
-    fn evaluate_parts<E: Packed<T>>(
+    fn evaluate_selected<E: Packed<T>>(
         &mut self,
         values: bool,
         multipliers: Option<&mut [T]>,
@@ -196,7 +196,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     ) -> T {
         let (mut objective, register) = (T::ZERO, PhantomData);
         let multipliers = multipliers.map(|multipliers| (multipliers, &mut objective));
-        E::vectorize(Evaluate::<T, E> { iterate: self, values, multipliers, costates, register });
+        E::vectorize(EvaluateResiduals::<T, E> { iterate: self, values, multipliers, costates, register });
         objective
     }
 
@@ -217,12 +217,12 @@ impl<'a, T: Real> Iterate<'a, T> {
                 let step = part(self.step, place.row, place.n);
                 let forces = part_mut(forces, place.row, place.n);
                 for (i, (force, &step)) in forces.iter_mut().zip(step).enumerate() {
-                    *force = *force + in_units(self.proximal, self.units, place.row + i) * step;
+                    *force = *force + scaled_proximal_weight(self.proximal, self.units, place.row + i) * step;
                 }
             }
         }
         if let Some(coupling) = &self.coupling {
-            coupling.push(self.qp, after_step, forces);
+            coupling.add_multiplier_forces(self.qp, after_step, forces);
         }
     }
 
@@ -233,9 +233,9 @@ impl<'a, T: Real> Iterate<'a, T> {
         self.write_forces(after_step);
         let units = self.measure;
         let mut objective = T::ZERO;
-        let mut largest = Most::NONE;
+        let mut largest = LargestTerms::NONE;
         largest.add_forces::<E>(self.gradient, units.rows);
-        for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
+        for place in Places::<T>::with_known_end(self.qp.dims, self.riccati.end).rev() {
             let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -267,7 +267,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
             if place.stage > 0 && matches!(costates, Costates::Given) {
-                let before = place.dynamics.saturating_sub(pad::<T>(nx));
+                let before = place.dynamics.saturating_sub(padded_len::<T>(nx));
                 let pi = part(multipliers, before, nx);
                 for (g, &pi) in g.iter_mut().zip(pi) {
                     *g = *g - pi;
@@ -279,26 +279,26 @@ impl<'a, T: Real> Iterate<'a, T> {
                 let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
                 let y = part_mut(self.riccati.y, place.v + nx, place.nu);
                 let left = part_mut(self.riccati.g, 0, ld);
-                assign(left, g);
+                copy_common(left, g);
                 eliminate::<T, E>(left, panel, ld, inverse, y, nx);
-                let before = place.dynamics.saturating_sub(pad::<T>(nx));
+                let before = place.dynamics.saturating_sub(padded_len::<T>(nx));
                 let pi = part_mut(multipliers, before, nx);
-                assign(pi, left);
+                copy_common(pi, left);
                 for (g, &pi) in g.iter_mut().zip(&*pi) {
                     *g = *g - pi;
                 }
                 largest.add_forces::<E>(pi, here);
-            } else if self.first == First::Fixed {
+            } else if self.first == InitialStateKind::Fixed {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
-                assign(part_mut(self.initial, 0, nx), given);
+                copy_common(part_mut(self.initial, 0, nx), given);
                 // Zero, or NaN where it is not finite: that is seen among the residuals.
                 given.iter_mut().for_each(|g| *g = T::ZERO * *g);
             }
         }
         if let Some(coupling) = self.coupling.as_mut().filter(|_| !after_step) {
             coupling.fold(self.qp, self.stationarity);
-            if self.first == First::Fixed {
+            if self.first == InitialStateKind::Fixed {
                 // What the last state pushes a given first one with belongs to its multiplier, too.
                 for (force, g) in self.initial.iter_mut().zip(&mut *self.stationarity) {
                     *force = *force + *g;
@@ -308,13 +308,13 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
         self.own_terms.forces = largest.own;
         self.terms.forces = units.choose(largest.own, largest.in_units / units.objective);
-        objective + self.penalties()
+        objective + self.penalty_cost()
     }
 
     #[inline(always)]
     fn values<E: Packed<T>>(&mut self) {
         let units = self.measure;
-        let mut largest = Most::NONE;
+        let mut largest = LargestTerms::NONE;
         let mut rest = &mut *self.v;
         for place in Places::<T>::new(self.qp.dims) {
             let StageOffsets { n, ng, ld, next, .. } = place;
@@ -339,14 +339,14 @@ impl<'a, T: Real> Iterate<'a, T> {
         if let Some(coupling) = &mut self.coupling {
             coupling.evaluate(self.qp, self.v);
         }
-        self.side_values::<E>();
+        self.evaluate_side_residuals::<E>();
     }
 
     /// What belongs to sides, of values that are known.
     #[inline(always)]
-    pub fn side_values<E: Packed<T>>(&mut self) {
+    pub fn evaluate_side_residuals<E: Packed<T>>(&mut self) {
         let sides = &mut self.sides;
-        sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
+        sides.evaluate_sides(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
         {
             *residual = value - slack;
@@ -365,7 +365,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         self.mu = sides.mu::<E>();
     }
 
-    fn penalties(&self) -> T {
+    fn penalty_cost(&self) -> T {
         let sides = &self.sides;
         let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
         let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
@@ -375,7 +375,7 @@ impl<'a, T: Real> Iterate<'a, T> {
 
 /// What a proximal weight is of a row, whose variable is measured in its unit.
 #[inline(always)]
-pub fn in_units<T: Real>(proximal: T, units: &[T], row: usize) -> T {
+pub fn scaled_proximal_weight<T: Real>(proximal: T, units: &[T], row: usize) -> T {
     units.get(row).map_or(proximal, |&unit| proximal / (unit * unit))
 }
 

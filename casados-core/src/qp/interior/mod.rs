@@ -33,8 +33,8 @@ pub(crate) use kernels::{
 #[cfg(feature = "alloc")]
 pub(super) use kernels::{PADDING_COLUMNS, Part, Source, product};
 pub use options::InteriorPointOptions;
-pub(crate) use riccati::{Extent, First};
-pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed};
+pub(crate) use riccati::{Extent, InitialStateKind};
+pub(crate) use sides::{Counts, Inequalities, PenaltyMode, Reading, count, is_initial_state_fixed};
 pub use store::Store;
 #[cfg(feature = "alloc")]
 pub(crate) use symmetric::Symmetric;
@@ -42,7 +42,7 @@ pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
 use super::error::{QpError, QpField};
-use super::layout::{StageDims, end, is_absurd, take_mut};
+use super::layout::{StageDims, end, exceeds_memory, take_mut};
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, QpStart};
@@ -52,7 +52,7 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::marker::PhantomData;
-use limits::Limits;
+use limits::ResidualTolerances;
 use run::{Attempt, Run, Runs};
 use units::Units;
 
@@ -159,7 +159,7 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
     /// [`InteriorPoint::memory_of_coupling`] more.
     #[must_use]
     pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
-        if is_absurd(dims) {
+        if exceeds_memory(dims) {
             return (usize::MAX, usize::MAX);
         }
         let counts = Counts { lower: bounds, upper: 0, soft, equations };
@@ -171,7 +171,7 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
     /// How many numbers more it takes for so many periodic states and shared controls.
     #[must_use]
     pub const fn memory_of_coupling(dims: &[StageDims], periodic: usize, shared: usize) -> usize {
-        if is_absurd(dims) {
+        if exceeds_memory(dims) {
             return usize::MAX;
         }
         if periodic + shared == 0 { 0 } else { coupling::Coupling::<T>::memory(dims, periodic, shared) }
@@ -200,11 +200,11 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         solution: &mut SolutionView<'_, T>,
     ) -> (Result<QpStatistics, QpError>, bool) {
         let (mut result, mut infeasible) = (Ok(QpStatistics::default()), false);
-        let ran = self.prepared(qp, attempt, over, solution, (&mut result, &mut infeasible));
+        let ran = self.prepare_and_run(qp, attempt, over, solution, (&mut result, &mut infeasible));
         (ran.and(result), infeasible)
     }
 
-    fn prepared(
+    fn prepare_and_run(
         &mut self,
         qp: QpView<'_, T>,
         attempt: Attempt,
@@ -213,27 +213,27 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         (result, infeasible): (&mut Result<QpStatistics, QpError>, &mut bool),
     ) -> Result<(), QpError> {
         let no_bound = T::from_f64(self.options.no_bound);
-        let reading = Reading { fixed: is_first_fixed(qp), penalties: attempt.penalties, no_bound };
+        let reading = Reading { fixed: is_initial_state_fixed(qp), penalties: attempt.penalties, no_bound };
         let counts = count(qp, &reading);
         let extent = Extent::of::<T>(qp.dims);
         let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
         let mut numbers = self.numbers.at_least(length, QpField::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
-        let mut sides = Sides::new(counts, &mut numbers, &mut indices);
+        let mut sides = Inequalities::new(counts, &mut numbers, &mut indices);
         sides.list(qp, &reading);
-        let given = attempt.penalties == Penalties::Given;
+        let given = attempt.penalties == PenaltyMode::Given;
         let rows = take_mut(&mut numbers, extent.end.row);
         let found = if self.options.scaling { scaling::find(qp, &reading, rows) } else { None };
         let units = match found {
             Some(objective) => Units { rows, objective: if given { objective } else { T::ONE } },
             None => Units::NONE,
         };
-        sides.measure_in(units, !given);
-        let first = if reading.fixed { First::Fixed } else { First::Free };
+        sides.set_units(units, !given);
+        let first = if reading.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
-        let limits = Limits::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
+        let limits = ResidualTolerances::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
         T::compiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -249,7 +249,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
 
     /// Other attempts at a problem that the first did not solve, and the reason if there is no
     /// solution.
-    fn again(
+    fn retry(
         &mut self,
         qp: QpView<'_, T>,
         start: QpStart,
@@ -259,7 +259,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     ) -> Result<QpStatistics, QpError> {
         let (locate, most) = (self.options.locate, self.options.max_iterations);
         let mut attempt = Attempt {
-            penalties: Penalties::Given,
+            penalties: PenaltyMode::Given,
             start: QpStart::Cold,
             proximal: start == QpStart::Cold,
             statistics: QpStatistics::default(),
@@ -279,10 +279,12 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
                 residuals.inequalities.is_nan() || residuals.inequalities > 1e2 * self.options.tolerance;
             if locate && !located && violates {
                 located = true;
-                let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
+                let soft = Attempt { penalties: PenaltyMode::Hard, proximal: true, ..attempt };
                 if let (_, true) = self.run(qp, soft, over, solution)
                     && let (Some(worst), _) =
-                        violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row))
+                        violation::largest_violation(qp, solution.v, &[], |place, row| {
+                            linear_penalties(qp, place, row)
+                        })
                     && worst.violation > self.options.tolerance
                 {
                     return Err(worst.into());
@@ -316,9 +318,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
             return Err(QpError::Coupled);
         }
         check_all_bounds(qp)?;
-        solution.fits(qp)?;
+        solution.check_dimensions(qp)?;
         let attempt = Attempt {
-            penalties: Penalties::Given,
+            penalties: PenaltyMode::Given,
             start,
             proximal: false,
             statistics: QpStatistics::default(),
@@ -334,9 +336,10 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         // A number that is not finite is found here, not in every call.
         super::check::check(qp)?;
         if self.limit.is_none() {
-            return self.again(qp, start, error, over, &mut solution);
+            return self.retry(qp, start, error, over, &mut solution);
         }
-        let (worst, _) = violation::worst(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row));
+        let (worst, _) =
+            violation::largest_violation(qp, solution.v, &[], |place, row| linear_penalties(qp, place, row));
         Err(worst.filter(|_| suspected).map_or(error, QpError::from))
     }
 

@@ -1,10 +1,10 @@
 //! Newton's step from an iterate, and the way along it.
 
-use super::iterate::{Iterate, at, in_units, scatter};
+use super::iterate::{Iterate, at, scaled_proximal_weight, scatter};
 use super::riccati::Equations;
-use super::vector::{add_scaled, shrink};
+use super::vector::{add_scaled, scale_vector};
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, assign, part, part_mut};
+use crate::qp::layout::{Places, copy_common, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Iterate<'_, T> {
@@ -12,7 +12,7 @@ impl<T: Real> Iterate<'_, T> {
     /// of pairs afterwards.
     #[inline(always)]
     pub fn newton<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
-        self.sides.push(factor);
+        self.sides.assemble_weights(factor);
         self.solve::<E>(factor)?;
         self.sides.steps();
         let weight = T::ONE / self.sides.compliance;
@@ -45,7 +45,7 @@ impl<T: Real> Iterate<'_, T> {
                 super::border::solve::<T, E>(coupling, &mut self.riccati, system, factor, self.step)?;
             }
         }
-        self.gather_step();
+        self.side_steps();
         Ok(())
     }
 
@@ -54,7 +54,7 @@ impl<T: Real> Iterate<'_, T> {
     pub fn assemble(&mut self, factor: bool) {
         let weight = T::ONE / self.sides.compliance;
         let sides = &mut self.sides;
-        assign(self.gradient, self.stationarity);
+        copy_common(self.gradient, self.stationarity);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
         let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
         scatter(self.gradient, lower, of_lower, |g, &push| g + push);
@@ -71,7 +71,7 @@ impl<T: Real> Iterate<'_, T> {
             if self.proximal > T::ZERO {
                 for place in Places::<T>::new(self.qp.dims) {
                     for (i, weight) in part_mut(self.weights, place.row, place.n).iter_mut().enumerate() {
-                        *weight = in_units(self.proximal, self.units, place.row + i);
+                        *weight = scaled_proximal_weight(self.proximal, self.units, place.row + i);
                     }
                 }
             }
@@ -84,8 +84,8 @@ impl<T: Real> Iterate<'_, T> {
 
     /// The changes of the distances of sides, from the step.
     #[inline(always)]
-    pub fn gather_step(&mut self) {
-        self.sides.gather(self.step, |value, _| value, |value, _| -value);
+    pub fn side_steps(&mut self) {
+        self.sides.evaluate_sides(self.step, |value, _| value, |value, _| -value);
     }
 
     /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals
@@ -93,16 +93,16 @@ impl<T: Real> Iterate<'_, T> {
     pub fn go(&mut self, primal: T, dual: T) {
         add_scaled(self.v, primal, self.step);
         add_scaled(self.sides.slack, primal, self.sides.slack_step);
-        self.go_with_multipliers(dual, primal);
+        self.step_multipliers(dual, primal);
     }
 
     /// The point and the multipliers after the full step; slacks stay as they are.
-    pub fn go_without_slacks(&mut self) {
+    pub fn step_without_slacks(&mut self) {
         add_scaled(self.v, T::ONE, self.step);
-        self.go_with_multipliers(T::ONE, T::ONE);
+        self.step_multipliers(T::ONE, T::ONE);
     }
 
-    fn go_with_multipliers(&mut self, of_sides: T, of_equations: T) {
+    fn step_multipliers(&mut self, of_sides: T, of_equations: T) {
         let sides = &mut self.sides;
         add_scaled(sides.multiplier, of_sides, sides.multiplier_step);
         add_scaled(sides.free, of_equations, sides.free_step);
@@ -114,13 +114,13 @@ impl<T: Real> Iterate<'_, T> {
         let weight = T::ONE / self.sides.compliance;
         let left = T::ONE - alpha;
         add_scaled(self.v, alpha, self.step);
-        shrink(self.stationarity, left);
-        shrink(self.dynamics, left);
+        scale_vector(self.stationarity, left);
+        scale_vector(self.dynamics, left);
         if let Some(coupling) = &mut self.coupling {
-            coupling.advance(alpha);
+            coupling.take_step(alpha);
         }
         let sides = &mut self.sides;
-        shrink(sides.residual, left);
+        scale_vector(sides.residual, left);
         let count = sides.counts.sides();
         let factor = alpha * sides.compliance;
         let steps = sides.multiplier_step.iter().zip(&*sides.softness);
@@ -143,7 +143,7 @@ impl<T: Real> Iterate<'_, T> {
                 let step = part(self.step, place.row, place.n);
                 let residual = part_mut(self.stationarity, place.row, place.n);
                 for (i, ((residual, &added), &step)) in residual.iter_mut().zip(added).zip(step).enumerate() {
-                    let proximal = in_units(proximal, units, place.row + i);
+                    let proximal = scaled_proximal_weight(proximal, units, place.row + i);
                     *residual = *residual - alpha * (proximal + added) * step;
                 }
             }
@@ -156,8 +156,8 @@ impl<T: Real> Iterate<'_, T> {
 
     /// The next solve with the same matrix has other residuals of the dynamics: none, but for
     /// rounding.
-    pub fn no_dynamics(&mut self) {
-        self.riccati.no_dynamics();
+    pub fn clear_dynamics_residuals(&mut self) {
+        self.riccati.clear_dynamics_residuals();
         if let Some(coupling) = &mut self.coupling {
             coupling.offset.fill(T::ZERO);
         }

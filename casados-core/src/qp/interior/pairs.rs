@@ -8,26 +8,26 @@
 //! leaves the digits of the Hessian beside it.
 
 use super::iterate::at;
-use super::sides::Sides;
+use super::sides::Inequalities;
 use super::units::Units;
 use super::vector::{dot, largest_negative_ratio, largest_size};
 use crate::qp::element::set;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
-use crate::qp::statistics::{larger, positive};
+use crate::qp::statistics::{nan_max, positive};
 use crate::scalar::{Packed, Real};
 
-impl<T: Real> Sides<'_, T> {
+impl<T: Real> Inequalities<'_, T> {
     /// `Σ s λ` over the number of pairs.
     #[inline(always)]
     pub fn mu<E: Packed<T>>(&self) -> T {
-        let pairs = self.counts.pairs().max(1);
+        let pairs = self.counts.pair_count().max(1);
         dot::<T, E>(self.slack, self.multiplier) / T::from_whole(pairs)
     }
 
     /// A function of the value of the row and the bound, for every side, into `scratch`.
     #[inline(always)]
-    pub fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
+    pub fn evaluate_sides(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
         let count = self.counts.lower;
         let (lower_rows, upper_rows) = self.rows.split_at_checked(count).unwrap_or_default();
         let (lower_bounds, upper_bounds) = self.bound.split_at_checked(count).unwrap_or_default();
@@ -41,7 +41,7 @@ impl<T: Real> Sides<'_, T> {
     }
 
     /// Multipliers of a solution.
-    pub fn take_multipliers(&mut self, solution: &SolutionView<'_, T>) {
+    pub fn load_multipliers(&mut self, solution: &SolutionView<'_, T>) {
         let (lower, upper) = self.rows.split_at_checked(self.counts.lower).unwrap_or_default();
         let sides = lower.iter().map(|&row| at(solution.lower, row));
         let sides = sides.chain(upper.iter().map(|&row| at(solution.upper, row)));
@@ -67,7 +67,7 @@ impl<T: Real> Sides<'_, T> {
             *slack = value.max(distance * units.of(row as usize));
         }
         if start == QpStart::Warm {
-            self.take_multipliers(solution);
+            self.load_multipliers(solution);
         }
         for (multiplier, &slack) in self.multiplier.iter_mut().zip(&*self.slack).take(sides) {
             *multiplier = multiplier.max(product / slack);
@@ -102,7 +102,7 @@ impl<T: Real> Sides<'_, T> {
     /// `Σ s λ` over the number of pairs after a part of the predictor.
     #[inline(always)]
     pub fn mu_after<E: Packed<T>>(&self, alpha: T, mu: T) -> T {
-        let pairs = self.counts.pairs().max(1);
+        let pairs = self.counts.pair_count().max(1);
         let products = dot::<T, E>(self.slack_step, self.multiplier_step) / T::from_whole(pairs);
         (T::ONE - alpha) * mu + alpha * alpha * products
     }
@@ -116,21 +116,21 @@ impl<T: Real> Sides<'_, T> {
 
     /// The largest residual of a side or an equation in units.
     #[inline(always)]
-    pub fn residual_size<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
+    pub fn max_residual<E: Packed<T>>(&self, units: Units<'_, T>) -> T {
         if units.rows.is_empty() {
             let of_sides = largest_size::<T, E>(self.residual);
-            return larger(of_sides, largest_size::<T, E>(self.equation_residual));
+            return nan_max(of_sides, largest_size::<T, E>(self.equation_residual));
         }
         let sides = self.residual.iter().zip(&*self.rows);
         let equations = self.equation_residual.iter().zip(&*self.equations);
         sides
             .chain(equations)
-            .fold(T::ZERO, |most, (residual, &row)| larger(most, residual.abs() / units.of(row as usize)))
+            .fold(T::ZERO, |most, (residual, &row)| nan_max(most, residual.abs() / units.of(row as usize)))
     }
 
     /// `s Δλ + λ Δs = μ − s λ`
     #[inline(always)]
-    pub fn aim(&mut self, mu: T) {
+    pub fn centring_targets(&mut self, mu: T) {
         let own = self.compliance;
         let mut pairs = self.slack.iter().zip(&*self.multiplier);
         let mut targets = self.inverse.iter_mut().zip(&mut *self.target);
@@ -149,7 +149,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// The corrector: `s Δλ + λ Δs = σμ − s λ − Δs Δλ` of the predictor.
     #[inline(always)]
-    pub fn correct(&mut self, sigma_mu: T) {
+    pub fn corrector_targets(&mut self, sigma_mu: T) {
         let steps = self.slack_step.iter().zip(&*self.multiplier_step);
         let pairs = self.multiplier.iter().zip(&*self.slack).zip(&*self.inverse);
         for ((target, (&ds, &dl)), ((&multiplier, &slack), &inverse)) in
@@ -161,7 +161,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// What the sides add to the gradient of Newton's equations, into `scratch`, and their weights.
     #[inline(always)]
-    pub fn push(&mut self, weights: bool) {
+    pub fn assemble_weights(&mut self, weights: bool) {
         if weights {
             for ((weight, &multiplier), &inverse) in
                 self.weight.iter_mut().zip(&*self.multiplier).zip(&*self.inverse)
@@ -216,7 +216,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// A soft side with its violation eliminated.
     #[inline(always)]
-    fn soft_side(&self, j: usize, side: usize) -> Option<Soft<T>> {
+    fn soft_side(&self, j: usize, side: usize) -> Option<CondensedSoftSide<T>> {
         let violation = self.counts.sides() + j;
         let (slack, multiplier) = (*self.slack.get(side)?, *self.multiplier.get(side)?);
         let stiffness = multiplier / slack;
@@ -229,7 +229,7 @@ impl<T: Real> Sides<'_, T> {
         let sum = own + others;
         let weight = stiffness * (quadratic + other) * inverse;
         let share = T::ONE / (T::ONE + own_compliance * weight);
-        Some(Soft {
+        Some(CondensedSoftSide {
             weight: weight * share,
             target: (own - stiffness * sum * inverse) * share,
             compliance: quadratic + other,
@@ -247,14 +247,14 @@ impl<T: Real> Sides<'_, T> {
     /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what
     /// they have.
     #[inline(always)]
-    pub fn longest<E: Packed<T>>(&self, keep: T) -> T {
+    pub fn step_to_boundary<E: Packed<T>>(&self, keep: T) -> T {
         let most = T::ONE - keep;
         let ratio = largest_negative_ratio::<T, E>(most, self.slack_step, self.slack);
         most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
     }
 
     /// What violations cost, of distances in `scratch`.
-    pub fn costs_of_violations(&self) -> T {
+    pub fn violation_cost(&self) -> T {
         let costs = self.soft.iter().zip(self.linear.iter().zip(&*self.quadratic));
         costs.fold(T::ZERO, |sum, (&side, (&linear, &quadratic))| {
             let violation = positive(-at(self.scratch, side));
@@ -263,7 +263,7 @@ impl<T: Real> Sides<'_, T> {
     }
 
     /// Splits distances of soft sides in `scratch` into what is above zero and violations.
-    pub fn split_violations(&mut self) {
+    pub fn split_soft_distances(&mut self) {
         let sides = self.counts.sides();
         for (j, &side) in self.soft.iter().enumerate() {
             let distance = at(self.scratch, side);
@@ -282,23 +282,23 @@ impl<T: Real> Sides<'_, T> {
         for ((&side, &violation), (&linear, &quadratic)) in soft {
             let lacks = linear + quadratic * violation - at(self.multiplier, side);
             let unit = self.rows.get(side as usize).map_or(T::ONE, |&row| units.of(row as usize));
-            inequalities = larger(inequalities, -lacks * unit / force);
-            products = larger(products, violation * positive(lacks) / force);
+            inequalities = nan_max(inequalities, -lacks * unit / force);
+            products = nan_max(products, violation * positive(lacks) / force);
         }
         let sides = distances.iter().zip(&*self.multiplier).zip(&*self.rows);
         for ((&distance, &multiplier), &row) in sides {
-            inequalities = larger(inequalities, -distance / units.of(row as usize));
-            products = larger(products, positive(distance) * multiplier / force);
+            inequalities = nan_max(inequalities, -distance / units.of(row as usize));
+            products = nan_max(products, positive(distance) * multiplier / force);
         }
         for (residual, &row) in self.equation_residual.iter().zip(&*self.equations) {
-            inequalities = larger(inequalities, residual.abs() / units.of(row as usize));
+            inequalities = nan_max(inequalities, residual.abs() / units.of(row as usize));
         }
         (inequalities, products)
     }
 }
 
 /// What a soft side is to the others.
-struct Soft<T> {
+struct CondensedSoftSide<T> {
     weight: T,
     target: T,
     share: T,

@@ -13,14 +13,16 @@ use super::cholesky::{eliminate, substitute};
 use super::kernels::{Columns, PADDING_COLUMNS, add, add_transposed, copy, copy_negative, subtract};
 use super::shared::Shared;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageDims, StageOffsets, assign, end, pad, part, part_mut, take_mut};
+use crate::qp::layout::{
+    Places, StageDims, StageOffsets, copy_common, end, padded_len, part, part_mut, take_mut,
+};
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
 /// How the first state is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum First {
+pub enum InitialStateKind {
     /// It is given.
     Fixed,
     /// It is eliminated like controls.
@@ -85,17 +87,17 @@ impl Extent {
                 Some(next) => next.nx,
                 None => 0,
             };
-            largest.n = max(largest.n, first.nx + first.nu);
-            largest.nx = max(largest.nx, first.nx);
-            largest.next_and_ng = max(largest.next_and_ng, next + first.ng);
+            largest.n = larger_index(largest.n, first.nx + first.nu);
+            largest.nx = larger_index(largest.nx, first.nx);
+            largest.next_and_ng = larger_index(largest.next_and_ng, next + first.ng);
             rest = after;
         }
-        largest.ld = pad::<T>(largest.n);
+        largest.ld = padded_len::<T>(largest.n);
         largest
     }
 }
 
-const fn max(a: usize, b: usize) -> usize {
+const fn larger_index(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }
 
@@ -105,8 +107,8 @@ impl<'a, T: Real> Riccati<'a, T> {
         let Extent { n, ld, nx, next_and_ng, end } = Extent::of::<T>(dims);
         let matrices = ld * (n + PADDING_COLUMNS)
             + ld * (next_and_ng + PADDING_COLUMNS)
-            + pad::<T>(nx) * (nx + PADDING_COLUMNS);
-        matrices + end.factor + 3 * end.v + end.dynamics + ld + pad::<T>(next_and_ng)
+            + padded_len::<T>(nx) * (nx + PADDING_COLUMNS);
+        matrices + end.factor + 3 * end.v + end.dynamics + ld + padded_len::<T>(next_and_ng)
     }
     /// In memory that is zero.
     pub fn new(extent: &Extent, memory: &mut &'a mut [T]) -> Self {
@@ -114,14 +116,14 @@ impl<'a, T: Real> Riccati<'a, T> {
         Self {
             m: take_mut(memory, ld * (n + PADDING_COLUMNS)),
             w: take_mut(memory, ld * (next_and_ng + PADDING_COLUMNS)),
-            p: take_mut(memory, pad::<T>(nx) * (nx + PADDING_COLUMNS)),
+            p: take_mut(memory, padded_len::<T>(nx) * (nx + PADDING_COLUMNS)),
             panels: take_mut(memory, end.factor),
             inverse: take_mut(memory, end.v),
             added: take_mut(memory, end.v),
             y: take_mut(memory, end.v),
             offset: take_mut(memory, end.dynamics),
             g: take_mut(memory, ld),
-            minus: take_mut(memory, pad::<T>(next_and_ng)),
+            minus: take_mut(memory, padded_len::<T>(next_and_ng)),
             regularised: 0,
             negative: 0,
             largest: T::ZERO,
@@ -134,7 +136,7 @@ impl<'a, T: Real> Riccati<'a, T> {
 #[derive(Clone, Copy)]
 pub struct Equations<'a, T> {
     pub qp: QpView<'a, T>,
-    pub first: First,
+    pub first: InitialStateKind,
     /// Whether the Hessian counts.
     pub objective: bool,
     /// Whether controls may have pivots of either sign: what counts is the inertia of the whole.
@@ -161,7 +163,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { riccati, equations, factor, step, result, .. } = self;
-        *result = riccati.backward::<E>(&equations, factor, step, &mut Shared::none());
+        *result = riccati.backward::<E>(&equations, factor, step, &mut Shared::without_shared_controls());
         if result.is_ok() {
             riccati.forward::<E>(&equations, step);
         }
@@ -188,7 +190,7 @@ impl<T: Real> Riccati<'_, T> {
 
     /// The next solve with the same matrix has other residuals of the dynamics: none, but for
     /// rounding.
-    pub fn no_dynamics(&mut self) {
+    pub fn clear_dynamics_residuals(&mut self) {
         self.offset.fill(T::ZERO);
     }
 
@@ -206,7 +208,7 @@ impl<T: Real> Riccati<'_, T> {
             self.negative = 0;
             self.largest = T::ZERO;
         }
-        for place in Places::<T>::ending(qp.dims, self.end).rev() {
+        for place in Places::<T>::with_known_end(qp.dims, self.end).rev() {
             let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -233,13 +235,13 @@ impl<T: Real> Riccati<'_, T> {
             let y = part_mut(self.y, place.v, ld);
             eliminate::<T, E>(g, panel, ld, part(inverse, nx, nu), part_mut(y, nx, nu), nx);
             if place.stage == 0 {
-                if first == First::Free {
+                if first == InitialStateKind::Free {
                     let panel = panel.get(nu * ld..).unwrap_or_default();
                     eliminate::<T, E>(g, panel, ld, part(inverse, 0, nx), part_mut(y, 0, nx), 0);
                 }
                 break;
             }
-            copy_negative::<T, E>(part_mut(self.minus, 0, pad::<T>(nx)), g);
+            copy_negative::<T, E>(part_mut(self.minus, 0, padded_len::<T>(nx)), g);
         }
         Ok(())
     }
@@ -258,22 +260,22 @@ impl<T: Real> Riccati<'_, T> {
             let (v, general) = here.split_at_mut_checked(ld).unwrap_or_default();
             if place.stage == 0 {
                 v.fill(T::ZERO);
-                if first != First::Fixed {
-                    assign(part_mut(v, 0, nx), part(y, 0, nx));
+                if first != InitialStateKind::Fixed {
+                    copy_common(part_mut(v, 0, nx), part(y, 0, nx));
                 }
-                if first == First::Free {
+                if first == InitialStateKind::Free {
                     let panel = panel.get(nu * ld..).unwrap_or_default();
                     substitute(part_mut(v, 0, nx), panel, ld, 0, part(inverse, 0, nx));
                 }
             }
             part_mut(v, nx, nu).fill(T::ZERO);
             let u = part_mut(self.g, 0, nu);
-            assign(u, part(y, nx, nu));
+            copy_common(u, part(y, nx, nu));
             add_transposed::<T, E>(u, Columns { data: panel, ld }, v, nx, nu);
             substitute(u, panel, ld, nx, part(inverse, nx, nu));
-            assign(part_mut(v, nx, nu), u);
+            copy_common(part_mut(v, nx, nu), u);
             let coming = part_mut(rest, 0, next);
-            assign(coming, part(dynamics, place.dynamics, next));
+            copy_common(coming, part(dynamics, place.dynamics, next));
             add_transposed::<T, E>(coming, matrix, v, n, next);
             let general = part_mut(general, 0, ng);
             general.fill(T::ZERO);

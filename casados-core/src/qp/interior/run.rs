@@ -1,24 +1,24 @@
 //! The iterations.
 
 use super::iterate::Iterate;
-use super::limits::Limits;
+use super::limits::ResidualTolerances;
 use super::options::InteriorPointOptions;
-use super::riccati::First;
-use super::sides::Penalties;
+use super::riccati::InitialStateKind;
+use super::sides::PenaltyMode;
 use super::terms::Terms;
 use super::vector::{dot, largest_size};
 use crate::qp::element::set;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, assign, part, part_mut};
+use crate::qp::layout::{Places, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
-use crate::qp::statistics::{QpStatistics, larger};
+use crate::qp::statistics::{QpStatistics, nan_max};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// How a problem is to be solved.
 #[derive(Clone, Copy)]
 pub struct Attempt {
-    pub penalties: Penalties,
+    pub penalties: PenaltyMode,
     pub start: QpStart,
     /// Whether steps are kept short by proximal terms, for Hessians that are singular.
     pub proximal: bool,
@@ -33,7 +33,7 @@ pub struct Attempt {
 impl Attempt {
     /// Whether nothing was tried before.
     fn is_first(&self) -> bool {
-        self.penalties == Penalties::Given && !self.proximal && self.statistics.iterations == 0
+        self.penalties == PenaltyMode::Given && !self.proximal && self.statistics.iterations == 0
     }
 }
 
@@ -41,7 +41,7 @@ impl Attempt {
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
-    pub limits: Limits<T>,
+    pub limits: ResidualTolerances<T>,
     /// Whether the time is over.
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
@@ -87,37 +87,37 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                 if attempt.start == QpStart::Cold {
                     iterate.forget();
                 }
-                iterate.begin::<E>(options, &attempt, &limits, solution);
-                iterate.iterations::<E>(&attempt, &limits, over, solution, infeasible)
+                iterate.initialise::<E>(options, &attempt, &limits, solution);
+                iterate.iterate_to_convergence::<E>(&attempt, &limits, over, solution, infeasible)
             }
         };
-        if attempt.penalties == Penalties::Hard {
-            *infeasible = iterate.is_infeasible::<E>(solution.dynamics);
+        if attempt.penalties == PenaltyMode::Hard {
+            *infeasible = iterate.proves_infeasibility::<E>(solution.dynamics);
         }
         iterate.store(solution);
     }
 }
 
 /// A step of the corrector below this is not taken.
-const SHORT: f64 = 0.3;
+const MIN_CORRECTOR_STEP: f64 = 0.3;
 
 /// The terms of the residuals are computed again where `μ` is this part of what it was.
-const OLD: f64 = 0.01;
+const TERMS_UPDATE_RATIO: f64 = 0.01;
 
 /// An iteration that leaves less than this part makes progress; so many may make none.
 const PROGRESS: f64 = 0.9;
-const IDLE: usize = 50;
+const MAX_IDLE_ITERATIONS: usize = 50;
 /// After so many correctors may go in a circle.
 const CYCLE: usize = 8;
 
 /// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
-const BOUNDARY: f64 = 0.005;
+const MIN_BOUNDARY_FRACTION: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
     /// States and controls of a solution.
-    pub fn take_point(&mut self, solution: &SolutionView<'_, T>) {
+    pub fn load_point(&mut self, solution: &SolutionView<'_, T>) {
         for place in Places::<T>::new(self.qp.dims) {
-            assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
+            copy_common(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
     }
 
@@ -129,26 +129,26 @@ impl<T: Real> Iterate<'_, T> {
     }
 
     /// The state at the start, if it is given.
-    pub fn give_initial_state(&mut self) {
-        if let (First::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
+    pub fn load_initial_state(&mut self) {
+        if let (InitialStateKind::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
             let x0 = stage.x_bounds().lower;
-            assign(part_mut(self.v, 0, x0.len()), x0);
+            copy_common(part_mut(self.v, 0, x0.len()), x0);
         }
     }
 
     #[inline(always)]
-    fn begin<E: Packed<T>>(
+    fn initialise<E: Packed<T>>(
         &mut self,
         options: &InteriorPointOptions,
         attempt: &Attempt,
-        limits: &Limits<T>,
+        limits: &ResidualTolerances<T>,
         solution: &mut SolutionView<'_, T>,
     ) {
         let start = attempt.start;
         if start == QpStart::Warm {
-            self.take_point(solution);
+            self.load_point(solution);
         }
-        self.give_initial_state();
+        self.load_initial_state();
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu).sqrt();
         let gap = self.gaps::<E>(self.measure).max(self.sides.violation(self.measure));
@@ -162,31 +162,31 @@ impl<T: Real> Iterate<'_, T> {
         };
         self.sides.begin(start, distance, self.measure, solution);
         // Only now are slacks what they are.
-        self.side_values::<E>();
+        self.evaluate_side_residuals::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
-        self.regularise(attempt.proximal);
+        self.set_regularisation(attempt.proximal);
     }
 
     /// The gradient before the first step. No step depends on the multipliers of the dynamics:
     /// where the recursion, still without feedback, lets them grow so large that a gradient that
     /// should vanish is not seen among their rounding errors, they are zero.
     #[inline(always)]
-    pub fn first_gradient<E: Packed<T>>(&mut self, limits: &Limits<T>, multipliers: &mut [T]) {
+    pub fn first_gradient<E: Packed<T>>(&mut self, limits: &ResidualTolerances<T>, multipliers: &mut [T]) {
         self.evaluate_gradient::<E>(multipliers);
         let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
         // NaN is not small either.
         let is_seen = rounding <= limits.of(self.terms).forces;
         if !is_seen {
             multipliers.fill(T::ZERO);
-            self.evaluate_gradient_at::<E>(multipliers);
+            self.gradient_with_costates::<E>(multipliers);
         }
     }
 
     #[inline(always)]
-    fn iterations<E: Packed<T>>(
+    fn iterate_to_convergence<E: Packed<T>>(
         &mut self,
         attempt: &Attempt,
-        limits: &Limits<T>,
+        limits: &ResidualTolerances<T>,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
         suspected: &mut bool,
@@ -200,21 +200,22 @@ impl<T: Real> Iterate<'_, T> {
         let first = (statistics.iterations, self.terms.forces.max(T::ONE));
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
-            let small = limits.hold(residuals, self.terms);
+            let small = limits.satisfied_by(residuals, self.terms);
             // Terms change on the way.
-            let old = limits.relative > T::ZERO && self.mu < T::from_f64(OLD) * known;
+            let old = limits.relative > T::ZERO && self.mu < T::from_f64(TERMS_UPDATE_RATIO) * known;
             if small || old {
                 // What is known of the residuals is what steps should have left of them: now they
                 // are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.judged::<E>(), self.mu);
-                if objective.is_finite() && self.are_small(residuals, limits) {
-                    (statistics.objective, statistics.residuals) = (objective.to_f64(), self.told(residuals));
+                if objective.is_finite() && self.is_converged(residuals, limits) {
+                    (statistics.objective, statistics.residuals) =
+                        (objective.to_f64(), self.unscaled_residuals(residuals));
                     return Ok(statistics);
                 }
                 let Terms { forces, values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
-                if limits.hold(residuals, self.terms) {
+                if limits.satisfied_by(residuals, self.terms) {
                     // In units they are, but not beside their terms.
                     share = share * T::from_f64(0.01);
                 } else if small && apart {
@@ -238,25 +239,25 @@ impl<T: Real> Iterate<'_, T> {
             }
             if attempt.suspects {
                 let (done, judged) = (statistics.iterations - first.0, (residuals, limits));
-                if self.is_suspicious::<E>(done, first.1, judged, solution.dynamics) {
+                if self.suspects_infeasibility::<E>(done, first.1, judged, solution.dynamics) {
                     *suspected = true;
                     break true;
                 }
             }
             // NaN makes no progress.
-            let left = larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities));
+            let left = nan_max(residuals.stationarity, nan_max(residuals.dynamics, residuals.inequalities));
             let left = left + self.mu / self.measure.objective;
             if left < T::from_f64(PROGRESS) * best {
                 (best, idle) = (left, 0);
-            } else if idle > IDLE {
+            } else if idle > MAX_IDLE_ITERATIONS {
                 break true;
             }
             idle += 1;
-            self.sides.aim(if refine { self.mu.max(floor) } else { T::ZERO });
+            self.sides.centring_targets(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
-            let alpha = self.correct::<E>(refine, floor, idle > CYCLE)?;
+            let alpha = self.corrector_step::<E>(refine, floor, idle > CYCLE)?;
             statistics.iterations += 1;
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
@@ -265,7 +266,7 @@ impl<T: Real> Iterate<'_, T> {
             self.advance::<E>(alpha);
             refine = false;
         };
-        self.judge_end::<E>(statistics, limits, [out_of_time, stalled], solution)
+        self.final_status::<E>(statistics, limits, [out_of_time, stalled], solution)
     }
 
     /// Corrects the step for what products change by, and by how much of it slacks and multipliers
@@ -274,25 +275,30 @@ impl<T: Real> Iterate<'_, T> {
     /// # Errors
     /// [`QpError::NotConvex`]
     #[inline(always)]
-    fn correct<E: Packed<T>>(&mut self, refine: bool, floor: T, is_cycling: bool) -> Result<T, QpError> {
-        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
+    fn corrector_step<E: Packed<T>>(
+        &mut self,
+        refine: bool,
+        floor: T,
+        is_cycling: bool,
+    ) -> Result<T, QpError> {
+        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(MIN_BOUNDARY_FRACTION));
         let distance = (self.mu / self.measure.objective).max(least);
         let keep = if distance < boundary { distance } else { boundary };
-        let mut alpha = self.sides.longest::<E>(keep);
+        let mut alpha = self.sides.step_to_boundary::<E>(keep);
         let has_products = self.mu > T::ZERO;
         if refine || !has_products {
             return Ok(alpha);
         }
         let after = self.sides.mu_after::<E>(alpha, self.mu);
         let ratio = after / self.mu;
-        self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
+        self.sides.corrector_targets((self.mu * ratio * ratio * ratio).max(floor));
         self.newton::<E>(false)?;
-        alpha = self.sides.longest::<E>(keep);
-        if alpha < T::from_f64(SHORT) || is_cycling {
+        alpha = self.sides.step_to_boundary::<E>(keep);
+        if alpha < T::from_f64(MIN_CORRECTOR_STEP) || is_cycling {
             // Products are too different for the corrector to be right: first they are made equal.
-            self.sides.aim(self.mu * T::from_f64(SHORT));
+            self.sides.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
             self.newton::<E>(false)?;
-            alpha = self.sides.longest::<E>(keep);
+            alpha = self.sides.step_to_boundary::<E>(keep);
         }
         Ok(alpha)
     }
@@ -300,17 +306,17 @@ impl<T: Real> Iterate<'_, T> {
     /// What is said of the point that is left, which may be better than what was known of it: so
     /// are the multipliers of the dynamics.
     #[inline(always)]
-    fn judge_end<E: Packed<T>>(
+    fn final_status<E: Packed<T>>(
         &mut self,
         mut statistics: QpStatistics,
-        limits: &Limits<T>,
+        limits: &ResidualTolerances<T>,
         [out_of_time, stalled]: [bool; 2],
         solution: &mut SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
-        let residuals = self.told(judged);
-        let is_solved = self.are_small(judged, limits) || self.are_small_as_given(limits);
+        let residuals = self.unscaled_residuals(judged);
+        let is_solved = self.is_converged(judged, limits) || self.is_converged_unscaled(limits);
         if objective.is_finite() && is_solved {
             (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
             return Ok(statistics);
@@ -327,7 +333,7 @@ impl<T: Real> Iterate<'_, T> {
     /// The point and its multipliers.
     pub fn store(&mut self, solution: &mut SolutionView<'_, T>) {
         for place in Places::<T>::new(self.qp.dims) {
-            assign(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
+            copy_common(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
         }
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
@@ -343,7 +349,7 @@ impl<T: Real> Iterate<'_, T> {
         for (&row, &free) in sides.equations.iter().zip(&*sides.free) {
             equation(row as usize, free);
         }
-        if self.first == First::Fixed {
+        if self.first == InitialStateKind::Fixed {
             for (row, &force) in self.initial.iter().enumerate() {
                 equation(row, force);
             }

@@ -20,23 +20,23 @@ use super::sides::Reading;
 use crate::qp::element::set;
 use crate::qp::layout::{Places, StageOffsets, part, part_mut};
 use crate::qp::problem::QpView;
-use crate::qp::stage::Row;
+use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
 /// Where all sizes are between the inverse of this and this, or on both sides, units are one.
-const NEAR: f64 = 32.0;
+const WELL_SCALED_RANGE: f64 = 32.0;
 /// No unit is larger, or smaller than its inverse.
-const FARTHEST: f64 = 1e12;
+const MAX_UNIT: f64 = 1e12;
 /// A unit is no more than so many times the room between bounds.
-const ROOMS: f64 = 4.0;
+const MAX_UNIT_PER_RANGE: f64 = 4.0;
 
 /// The least and the largest of the sizes that something may have.
-struct Sizes<T> {
+struct SizeRange<T> {
     least: T,
     most: T,
 }
 
-impl<T: Real> Sizes<T> {
+impl<T: Real> SizeRange<T> {
     fn new() -> Self {
         Self { least: T::from_f64(f64::INFINITY), most: T::ZERO }
     }
@@ -50,15 +50,15 @@ impl<T: Real> Sizes<T> {
     }
 
     /// Whether one is none of them.
-    fn are_far_from_one(&self) -> bool {
-        let near = T::from_f64(NEAR);
+    fn needs_scaling(&self) -> bool {
+        let near = T::from_f64(WELL_SCALED_RANGE);
         self.most > T::ZERO && (self.least > near || self.most * near < T::ONE)
     }
 }
 
 /// A unit that is not too far from one; one where nothing is known.
 fn unit<T: Real>(size: T) -> T {
-    let farthest = T::from_f64(FARTHEST);
+    let farthest = T::from_f64(MAX_UNIT);
     if size > T::ZERO && size.is_finite() { size.min(farthest).max(T::ONE / farthest) } else { T::ONE }
 }
 
@@ -69,7 +69,7 @@ struct Mean<T> {
 }
 
 impl<T: Real> Mean<T> {
-    const EMPTY: Self = Self { sum: T::ZERO, count: 0 };
+    const NO_SIZES: Self = Self { sum: T::ZERO, count: 0 };
 
     fn add(&mut self, size: T) {
         if size > T::ZERO && size.is_finite() {
@@ -78,14 +78,14 @@ impl<T: Real> Mean<T> {
         }
     }
 
-    fn square(&self) -> T {
+    fn squared_mean(&self) -> T {
         let mean = self.sum / T::from_whole(self.count.max(1));
         mean * mean
     }
 }
 
 /// The bounds of a row.
-struct Limits<T> {
+struct ScalingBounds<T> {
     lower: T,
     upper: T,
     /// Soft bounds may mean none.
@@ -93,8 +93,8 @@ struct Limits<T> {
     no_bound: T,
 }
 
-impl<T: Real> Limits<T> {
-    fn room(&self) -> T {
+impl<T: Real> ScalingBounds<T> {
+    fn bound_range(&self) -> T {
         if self.hard && self.lower > -self.no_bound && self.upper < self.no_bound {
             self.upper - self.lower
         } else {
@@ -107,29 +107,29 @@ impl<T: Real> Limits<T> {
     }
     fn sizes(&self) -> [T; 3] {
         let size = |bound: T| if self.hard && bound.abs() < self.no_bound { bound.abs() } else { T::ZERO };
-        [self.room(), size(self.lower), size(self.upper)]
+        [self.bound_range(), size(self.lower), size(self.upper)]
     }
 }
 
 /// Finds the units of all rows, and that of the objective; nothing if all are near one.
 #[inline(never)]
 pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
-    let objective = unit_of_objective(qp, reading, rows)?;
-    let mut far = Sizes { least: objective, most: objective }.are_far_from_one();
+    let objective = objective_unit(qp, reading, rows)?;
+    let mut far = SizeRange { least: objective, most: objective }.needs_scaling();
     let root = objective.sqrt();
     for place in Places::<T>::new(qp.dims) {
         let (here, next) = rows.split_at_mut_checked(place.row + place.rows).unwrap_or_default();
         let (variables, general) =
             part_mut(here, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
-        for (row, limits) in variables.iter_mut().zip(limits(qp, &place, reading)) {
+        for (row, limits) in variables.iter_mut().zip(stage_bounds(qp, &place, reading)) {
             let size = root / *row;
-            let mut sizes = Sizes::new();
+            let mut sizes = SizeRange::new();
             sizes.add(size);
             limits.sizes().into_iter().for_each(|size| sizes.add(size));
-            far |= sizes.are_far_from_one();
+            far |= sizes.needs_scaling();
             // Without a curvature there is only the room, where it is narrow.
-            let (size, room) = (if size.is_finite() { size } else { T::ONE }, limits.room());
-            let room = T::from_f64(ROOMS) * room;
+            let (size, room) = (if size.is_finite() { size } else { T::ONE }, limits.bound_range());
+            let room = T::from_f64(MAX_UNIT_PER_RANGE) * room;
             *row = unit(if T::ZERO < room && room < size { room } else { size });
         }
         part_mut(variables, place.n, place.ld - place.n).fill(T::ONE);
@@ -138,7 +138,7 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
         for (row, column) in general.iter_mut().zip(matrix.chunks_exact(place.ld.max(1))) {
             let terms = column.iter().zip(&*variables);
             let size = terms.fold(T::ZERO, |most, (c, &unit)| (c.abs() * unit).max(most));
-            far |= Sizes { least: size, most: size }.are_far_from_one();
+            far |= SizeRange { least: size, most: size }.needs_scaling();
             *row = unit(size);
         }
         // A state that costs nothing anywhere is as large as what leads to it.
@@ -155,14 +155,14 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
 }
 
 /// The unit of the objective, and the roots of all curvatures; nothing of a linear program.
-fn unit_of_objective<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
-    let (mut gains, mut rooms) = (Mean::EMPTY, Sizes::new());
+fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
+    let (mut gains, mut rooms) = (Mean::NO_SIZES, SizeRange::new());
     let mut any = false;
     for place in Places::<T>::new(qp.dims).rev() {
         any |= curvatures(qp, &place, rows, &mut gains);
         let roots = part(rows, place.row, place.n);
-        for ((limits, &root), slope) in limits(qp, &place, reading).zip(roots).zip(slopes(qp, &place)) {
-            let room = limits.room();
+        for ((limits, &root), slope) in stage_bounds(qp, &place, reading).zip(roots).zip(slopes(qp, &place)) {
+            let room = limits.bound_range();
             rooms.add(root * room);
             gains.add(root * limits.distance());
             let is_bounded = slope > root * root * room;
@@ -171,7 +171,7 @@ fn unit_of_objective<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mu
     }
     // Where there is little to gain, at a point of rest, it is what the least room costs, but for
     // problems with units near one.
-    let gain = gains.square();
+    let gain = gains.squared_mean();
     let most = gain.max(if rooms.most > T::ZERO { rooms.least * rooms.least } else { T::ZERO });
     any.then(|| unit(gain.max(most.min(T::ONE))))
 }
@@ -200,18 +200,18 @@ fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], 
 }
 
 /// The bounds of the variables of a stage.
-fn limits<T: Real>(
+fn stage_bounds<T: Real>(
     qp: QpView<'_, T>,
     place: &StageOffsets,
     reading: &Reading<T>,
-) -> impl Iterator<Item = Limits<T>> {
+) -> impl Iterator<Item = ScalingBounds<T>> {
     let no_bound = reading.no_bound;
-    let bound = |row| part(qp.data, place.data + place.row_data(row), place.n).iter();
-    let bounds = bound(Row::Lower).zip(bound(Row::Upper));
-    let penalties = bound(Row::LowerLinear).zip(bound(Row::UpperLinear));
+    let bound = |row| part(qp.data, place.data + place.constraint_vector_begin(row), place.n).iter();
+    let bounds = bound(ConstraintVector::Lower).zip(bound(ConstraintVector::Upper));
+    let penalties = bound(ConstraintVector::LowerLinear).zip(bound(ConstraintVector::UpperLinear));
     bounds.zip(penalties).map(move |((&lower, &upper), (of_lower, of_upper))| {
         let hard = !of_lower.is_finite() && !of_upper.is_finite();
-        Limits { lower, upper, hard, no_bound }
+        ScalingBounds { lower, upper, hard, no_bound }
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::qp::element::set;
 use crate::qp::layout::{StageOffsets, part_mut};
-use crate::qp::marked;
+use crate::qp::marked_indices;
 use crate::scalar::Real;
 
 /// Where the recursion leaves what belongs to shared controls.
@@ -17,7 +17,7 @@ pub struct Shared<'s, T> {
 
 impl<'s, T: Real> Shared<'s, T> {
     /// There are none.
-    pub fn none() -> Self {
+    pub fn without_shared_controls() -> Self {
         Self { marks: &[], columns: &mut [], length: 0 }
     }
 
@@ -28,9 +28,9 @@ impl<'s, T: Real> Shared<'s, T> {
 
     /// Takes rows and columns of shared controls out of `M`, and leaves those of the identity:
     /// elimination passes them by.
-    pub fn set_apart(&mut self, place: &StageOffsets, m: &mut [T]) {
+    pub fn extract_shared_controls(&mut self, place: &StageOffsets, m: &mut [T]) {
         let StageOffsets { nx, nu, n, ld, .. } = *place;
-        let rows = || marked(self.marks).filter(|&j| j < nu).map(|j| nx + j);
+        let rows = || marked_indices(self.marks).filter(|&j| j < nu).map(|j| nx + j);
         for (c, row) in rows().enumerate() {
             let column = part_mut(self.columns, c * self.length + place.v, ld);
             for (i, element) in column.iter_mut().enumerate().take(n) {

@@ -10,12 +10,12 @@ use super::units::Units;
 use crate::qp::element::set;
 use crate::qp::layout::{Places, part, take_mut};
 use crate::qp::problem::QpView;
-use crate::qp::stage::Row;
+use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
 /// What violations of bounds cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Penalties {
+pub enum PenaltyMode {
     /// What the problem says.
     Given,
     /// Nothing where the problem says what; one for each unit, linearly, where the bound is hard.
@@ -29,7 +29,7 @@ pub enum Penalties {
 pub struct Reading<T> {
     /// Whether the state at the start is given, and is no constraint.
     pub fixed: bool,
-    pub penalties: Penalties,
+    pub penalties: PenaltyMode,
     /// Bounds from here on mean that there is none.
     pub no_bound: T,
 }
@@ -53,12 +53,12 @@ impl Counts {
         self.lower + self.upper
     }
     /// All pairs of complementary variables.
-    pub const fn pairs(&self) -> usize {
+    pub const fn pair_count(&self) -> usize {
         self.sides() + self.soft
     }
     /// How many numbers the arrays take.
     pub const fn numbers(&self) -> usize {
-        8 * self.pairs() + 3 * self.sides() + 4 * self.equations + 2 * self.soft
+        8 * self.pair_count() + 3 * self.sides() + 4 * self.equations + 2 * self.soft
     }
     /// How many indices the lists take.
     pub const fn indices(&self) -> usize {
@@ -99,7 +99,7 @@ fn kind<T: Real>(penalty: Option<T>, (linear, quadratic): (T, T), absent: bool) 
 }
 
 /// Whether the state at the start is given: hard and equal bounds of every component.
-pub fn is_first_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
+pub fn is_initial_state_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
     let Some(stage) = qp.stage(0) else { return true };
     let b = stage.x_bounds();
     let equal = b.lower.iter().zip(b.upper).all(|(l, u)| l == u);
@@ -110,10 +110,12 @@ pub fn is_first_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
 fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constraint<T>)) {
     for place in Places::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
-        let vector = |row| part(data, place.row_data(row), place.rows);
-        let bounds = vector(Row::Lower).iter().zip(vector(Row::Upper));
-        let lower = vector(Row::LowerLinear).iter().zip(vector(Row::LowerQuadratic));
-        let upper = vector(Row::UpperLinear).iter().zip(vector(Row::UpperQuadratic));
+        let vector = |row| part(data, place.constraint_vector_begin(row), place.rows);
+        let bounds = vector(ConstraintVector::Lower).iter().zip(vector(ConstraintVector::Upper));
+        let lower =
+            vector(ConstraintVector::LowerLinear).iter().zip(vector(ConstraintVector::LowerQuadratic));
+        let upper =
+            vector(ConstraintVector::UpperLinear).iter().zip(vector(ConstraintVector::UpperQuadratic));
         let skipped = if place.stage == 0 && fixed { place.nx } else { 0 };
         for (i, ((bounds, lower), upper)) in bounds.zip(lower).zip(upper).enumerate().skip(skipped) {
             f(Constraint {
@@ -130,11 +132,11 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 
 impl<T: Real> Constraint<T> {
     /// Whether it is an equation, and otherwise its sides.
-    fn kinds(&self, reading: &Reading<T>) -> (bool, Kind<T>, Kind<T>) {
+    fn equation_or_sides(&self, reading: &Reading<T>) -> (bool, Kind<T>, Kind<T>) {
         let ten = T::from_f64(10.0);
         let penalty = match reading.penalties {
-            Penalties::Given => None,
-            Penalties::Hard => Some(if self.control { ten } else { T::ONE }),
+            PenaltyMode::Given => None,
+            PenaltyMode::Hard => Some(if self.control { ten } else { T::ONE }),
         };
         // What is NaN is no bound either; the data is checked before.
         let (is_lower, is_upper) = (self.lower > -reading.no_bound, self.upper < reading.no_bound);
@@ -149,7 +151,7 @@ impl<T: Real> Constraint<T> {
 pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
     let mut counts = Counts::default();
     constraints(qp, reading.fixed, |constraint| {
-        let (equation, lower, upper) = constraint.kinds(reading);
+        let (equation, lower, upper) = constraint.equation_or_sides(reading);
         if equation {
             counts.equations += 1;
             return;
@@ -163,7 +165,7 @@ pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
 }
 
 /// All sides, and what an interior point keeps of each.
-pub struct Sides<'a, T> {
+pub struct Inequalities<'a, T> {
     pub counts: Counts,
     /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the
     /// regularisation of the dual, in units.
@@ -215,10 +217,10 @@ pub struct Sides<'a, T> {
     pub free_step: &'a mut [T],
 }
 
-impl<'a, T: Real> Sides<'a, T> {
+impl<'a, T: Real> Inequalities<'a, T> {
     /// In memory whose contents stay.
     pub fn new(counts: Counts, numbers: &mut &'a mut [T], indices: &mut &'a mut [u32]) -> Self {
-        let (pairs, sides) = (counts.pairs(), counts.sides());
+        let (pairs, sides) = (counts.pair_count(), counts.sides());
         Self {
             counts,
             compliance: T::ZERO,
@@ -253,7 +255,7 @@ impl<'a, T: Real> Sides<'a, T> {
         let (mut lower, mut upper, mut soft, mut equations) = (0, list.counts.lower, 0, 0);
         constraints(qp, reading.fixed, |constraint| {
             let row = constraint.row as u32;
-            let (equation, lower_kind, upper_kind) = constraint.kinds(reading);
+            let (equation, lower_kind, upper_kind) = constraint.equation_or_sides(reading);
             if equation {
                 set(list.equations, equations, row);
                 set(list.equation_bound, equations, constraint.lower);
@@ -282,7 +284,7 @@ impl<'a, T: Real> Sides<'a, T> {
 
     /// What sides and equations give way is measured in units, and so are penalties that are those
     /// of no user.
-    pub fn measure_in(&mut self, units: Units<'_, T>, own_penalties: bool) {
+    pub fn set_units(&mut self, units: Units<'_, T>, own_penalties: bool) {
         if units.rows.is_empty() {
             return;
         }

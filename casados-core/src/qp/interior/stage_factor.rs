@@ -2,11 +2,11 @@
 
 use super::cholesky::{Pivots, cholesky};
 use super::kernels::{Columns, Part, Source, copy, mirror, product};
-use super::riccati::{Equations, First, Riccati};
+use super::riccati::{Equations, InitialStateKind, Riccati};
 use super::shared::Shared;
 use crate::qp::element::add;
 use crate::qp::error::QpError;
-use crate::qp::layout::{StageOffsets, pad, part, part_mut};
+use crate::qp::layout::{StageOffsets, padded_len, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Riccati<'_, T> {
@@ -20,7 +20,7 @@ impl<T: Real> Riccati<'_, T> {
         shared: &mut Shared<'_, T>,
     ) -> Result<(), QpError> {
         self.assemble::<E>(place, equations);
-        shared.set_apart(place, self.m);
+        shared.extract_shared_controls(place, self.m);
         let StageOffsets { nx, nu, n, ld, stage, .. } = *place;
         let Equations { qp, first, indefinite, .. } = *equations;
         let largest = self.largest;
@@ -42,11 +42,11 @@ impl<T: Real> Riccati<'_, T> {
         }
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
         let (before, _) = self.m.split_at_checked(nx * ld).unwrap_or_default();
-        if stage == 0 && first == First::Fixed {
+        if stage == 0 && first == InitialStateKind::Fixed {
             return Ok(());
         }
         let panel = Columns { data: part(kept, 0, nu * ld), ld };
-        let ld_x = pad::<T>(nx);
+        let ld_x = padded_len::<T>(nx);
         let source = Source::Matrix(Columns { data: before, ld });
         product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
         if indefinite {
@@ -63,7 +63,7 @@ impl<T: Real> Riccati<'_, T> {
                 }
             }
         }
-        if stage > 0 || first == First::Coupled {
+        if stage > 0 || first == InitialStateKind::Coupled {
             mirror::<T, E>(self.p, ld_x, nx);
             return Ok(());
         }
@@ -106,7 +106,7 @@ impl<T: Real> Riccati<'_, T> {
         // Columns are computed four at a time. The first with a control among them are needed
         // whole.
         let whole = nx / 4 * 4;
-        if stage > 0 || first != First::Fixed {
+        if stage > 0 || first != InitialStateKind::Fixed {
             product::<T, E>(self.m, ld, source, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
         product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);

@@ -46,27 +46,27 @@ pub trait Store<T>: AsRef<[T]> + AsMut<[T]> {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError>;
 }
 
-fn fixed<T>(slice: &mut [T], expected: usize, field: QpField) -> Result<&mut [T], QpError> {
+fn checked_slice<T>(slice: &mut [T], expected: usize, field: QpField) -> Result<&mut [T], QpError> {
     let found = slice.len();
     slice.get_mut(..expected).ok_or(QpError::Dimension { field, stage: 0, expected, found })
 }
 
 impl<T, const N: usize> Store<T> for [T; N] {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError> {
-        fixed(self, length, field)
+        checked_slice(self, length, field)
     }
 }
 
 impl<T> Store<T> for &mut [T] {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError> {
-        fixed(self, length, field)
+        checked_slice(self, length, field)
     }
 }
 
 #[cfg(feature = "alloc")]
 impl<T: Copy + Default> Store<T> for alloc::vec::Vec<T> {
     fn at_least(&mut self, length: usize, field: QpField) -> Result<&mut [T], QpError> {
-        crate::qp::memory::reserve(self, length)?;
-        fixed(self, length, field)
+        crate::qp::memory::try_resize(self, length)?;
+        checked_slice(self, length, field)
     }
 }

@@ -32,7 +32,7 @@ pub struct Symmetric<'a, T> {
 }
 
 /// A factorisation on its way.
-struct Elimination<'a, T> {
+struct BunchKaufman<'a, T> {
     a: &'a mut [T],
     n: usize,
     exchanged: &'a mut [T],
@@ -46,7 +46,7 @@ fn element<T: Real>(a: &[T], n: usize, row: usize, column: usize) -> T {
 }
 
 /// The inverse of a block of two pivots times a vector.
-fn of_pair<T: Real>(a: &[T], n: usize, k: usize, [x, y]: [T; 2]) -> [T; 2] {
+fn solve_2x2_block<T: Real>(a: &[T], n: usize, k: usize, [x, y]: [T; 2]) -> [T; 2] {
     let at = |i, j| element(a, n, i, j);
     let (a, b, c) = (at(k, k), at(k + 1, k), at(k + 1, k + 1));
     // Divided by `b` first: its square may not be a number.
@@ -55,9 +55,9 @@ fn of_pair<T: Real>(a: &[T], n: usize, k: usize, [x, y]: [T; 2]) -> [T; 2] {
     [(c * x - y) / determinant, (a * y - x) / determinant]
 }
 
-impl<T: Real> Elimination<'_, T> {
+impl<T: Real> BunchKaufman<'_, T> {
     /// Pivots below `noise` times the largest element vanish.
-    fn run(&mut self, noise: T) {
+    fn factorise(&mut self, noise: T) {
         let n = self.n;
         let mut largest = T::ZERO;
         for j in 0..n {
@@ -82,7 +82,7 @@ impl<T: Real> Elimination<'_, T> {
     }
 
     /// The largest element of a column from some row on, without that of the diagonal.
-    fn largest(&self, column: usize, from: usize) -> (usize, T) {
+    fn largest_off_diagonal(&self, column: usize, from: usize) -> (usize, T) {
         let mut found = (from, T::ZERO);
         for row in from..self.n {
             let size = self.get(row, column).abs();
@@ -96,27 +96,27 @@ impl<T: Real> Elimination<'_, T> {
     /// Chooses and eliminates the next one or two pivots; how many.
     fn eliminate(&mut self, k: usize, small: T) -> usize {
         let alpha = T::from_f64(ALPHA);
-        let (row, below) = self.largest(k, k + 1);
+        let (row, below) = self.largest_off_diagonal(k, k + 1);
         let size = self.get(k, k).abs();
         if size.max(below) <= small {
             self.inertia.vanished += 1;
-            self.single(k, k, true);
+            self.eliminate_1x1(k, k, true);
             return 1;
         }
         if size >= alpha * below {
-            self.single(k, k, false);
+            self.eliminate_1x1(k, k, false);
             return 1;
         }
-        let (_, beside) = self.largest(row, k);
+        let (_, beside) = self.largest_off_diagonal(row, k);
         if size * beside >= alpha * below * below {
-            self.single(k, k, false);
+            self.eliminate_1x1(k, k, false);
             return 1;
         }
         if self.get(row, row).abs() >= alpha * beside {
-            self.single(k, row, false);
+            self.eliminate_1x1(k, row, false);
             return 1;
         }
-        self.pair(k, row);
+        self.eliminate_2x2(k, row);
         2
     }
 
@@ -141,7 +141,7 @@ impl<T: Real> Elimination<'_, T> {
     }
 
     /// Eliminates one pivot, that of `row`.
-    fn single(&mut self, k: usize, row: usize, vanished: bool) {
+    fn eliminate_1x1(&mut self, k: usize, row: usize, vanished: bool) {
         self.exchange(k, row);
         set(self.exchanged, k, T::from_whole(row + 1));
         if vanished {
@@ -169,7 +169,7 @@ impl<T: Real> Elimination<'_, T> {
     }
 
     /// Eliminates two pivots, `k` and `row`.
-    fn pair(&mut self, k: usize, row: usize) {
+    fn eliminate_2x2(&mut self, k: usize, row: usize) {
         self.exchange(k + 1, row);
         set(self.exchanged, k, -T::from_whole(k + 1));
         set(self.exchanged, k + 1, -T::from_whole(row + 1));
@@ -177,14 +177,14 @@ impl<T: Real> Elimination<'_, T> {
         self.inertia.negative += 1;
         let n = self.n;
         for j in k + 2..n {
-            let [first, second] = of_pair(self.a, n, k, [self.get(j, k), self.get(j, k + 1)]);
+            let [first, second] = solve_2x2_block(self.a, n, k, [self.get(j, k), self.get(j, k + 1)]);
             let (before, rest) = self.a.split_at_mut_checked(j * n).unwrap_or_default();
             let column = part_mut(rest, j, n - j);
             add_scaled(column, -first, part(before, k * n + j, n - j));
             add_scaled(column, -second, part(before, (k + 1) * n + j, n - j));
         }
         for i in k + 2..self.n {
-            let [first, second] = of_pair(self.a, self.n, k, [self.get(i, k), self.get(i, k + 1)]);
+            let [first, second] = solve_2x2_block(self.a, self.n, k, [self.get(i, k), self.get(i, k + 1)]);
             self.set(i, k, first);
             self.set(i, k + 1, second);
         }
@@ -194,8 +194,8 @@ impl<T: Real> Elimination<'_, T> {
 impl<'a, T: Real> Symmetric<'a, T> {
     /// Factorises a matrix. Pivots below `noise` times the largest element vanish.
     pub fn factor(a: &mut [T], n: usize, exchanged: &mut [T], noise: T) -> Inertia {
-        let mut elimination = Elimination { a, n, exchanged, inertia: Inertia::default() };
-        elimination.run(noise);
+        let mut elimination = BunchKaufman { a, n, exchanged, inertia: Inertia::default() };
+        elimination.factorise(noise);
         elimination.inertia
     }
 
@@ -209,12 +209,12 @@ impl<'a, T: Real> Symmetric<'a, T> {
     }
 
     /// Whether a pivot is one of two.
-    fn is_pair(&self, k: usize) -> bool {
+    fn is_2x2_pivot(&self, k: usize) -> bool {
         self.exchanged.get(k).is_some_and(|&e| e < T::ZERO)
     }
 
     /// The row that a pivot was exchanged with.
-    fn partner(&self, k: usize) -> usize {
+    fn exchanged_row(&self, k: usize) -> usize {
         self.exchanged.get(k).map_or(k, |e| (e.abs().to_f64() as usize).saturating_sub(1))
     }
 
@@ -225,11 +225,11 @@ impl<'a, T: Real> Symmetric<'a, T> {
             return;
         }
         for i in 0..n {
-            x.swap(i, self.partner(i).min(n - 1));
+            x.swap(i, self.exchanged_row(i).min(n - 1));
         }
         let mut k = 0;
         while k < n {
-            let size = 1 + usize::from(self.is_pair(k));
+            let size = 1 + usize::from(self.is_2x2_pivot(k));
             for j in k..k + size {
                 let factor = x.get(j).copied().unwrap_or(T::ZERO);
                 for i in k + size..n {
@@ -242,8 +242,8 @@ impl<'a, T: Real> Symmetric<'a, T> {
         let mut k = 0;
         while k < n {
             let at = |i: usize| x.get(i).copied().unwrap_or(T::ZERO);
-            if self.is_pair(k) {
-                let [first, second] = of_pair(self.a, n, k, [at(k), at(k + 1)]);
+            if self.is_2x2_pivot(k) {
+                let [first, second] = solve_2x2_block(self.a, n, k, [at(k), at(k + 1)]);
                 set(x, k, first);
                 set(x, k + 1, second);
                 k += 2;
@@ -255,7 +255,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
         }
         let mut end = n;
         while end > 0 {
-            let size = 1 + usize::from(end > 1 && self.is_pair(end - 1));
+            let size = 1 + usize::from(end > 1 && self.is_2x2_pivot(end - 1));
             let begin = end - size;
             for j in begin..end {
                 let mut value = x.get(j).copied().unwrap_or(T::ZERO);
@@ -267,7 +267,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
             end = begin;
         }
         for i in (0..n).rev() {
-            x.swap(i, self.partner(i).min(n - 1));
+            x.swap(i, self.exchanged_row(i).min(n - 1));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What residuals are sums of: what rounding leaves of them is a part of it.
 
-use super::vector::larger;
+use super::vector::largest_magnitude_ignoring_nan;
 use crate::qp::statistics;
 use crate::scalar::{Packed, Real};
 
@@ -15,38 +15,38 @@ pub struct Terms<T> {
 
 /// The largest terms in units, and as they are.
 #[derive(Clone, Copy)]
-pub struct Most<T> {
+pub struct LargestTerms<T> {
     pub in_units: T,
     pub own: T,
 }
 
-impl<T: Real> Most<T> {
-    pub const NONE: Self = Most { in_units: T::ZERO, own: T::ZERO };
+impl<T: Real> LargestTerms<T> {
+    pub const NONE: Self = LargestTerms { in_units: T::ZERO, own: T::ZERO };
 
     /// Terms that are multiplied by units.
     #[inline(always)]
     pub fn add_forces<E: Packed<T>>(&mut self, all: &[T], units: &[T]) {
-        self.add::<E>(all, units, |term, unit| term * unit);
+        self.update_both_scalings::<E>(all, units, |term, unit| term * unit);
     }
 
     /// Terms that are divided by units.
     #[inline(always)]
     pub fn add_values<E: Packed<T>>(&mut self, all: &[T], units: &[T]) {
-        self.add::<E>(all, units, |term, unit| term / unit);
+        self.update_both_scalings::<E>(all, units, |term, unit| term / unit);
     }
 
     #[inline(always)]
-    fn add<E: Packed<T>>(&mut self, all: &[T], units: &[T], measure: fn(T, T) -> T) {
-        self.own = larger::<T, E>(self.own, all);
+    fn update_both_scalings<E: Packed<T>>(&mut self, all: &[T], units: &[T], measure: fn(T, T) -> T) {
+        self.own = largest_magnitude_ignoring_nan::<T, E>(self.own, all);
         if !units.is_empty() {
-            self.measure(all, units, measure);
+            self.update_scaled(all, units, measure);
         }
     }
 
     #[inline(never)]
-    fn measure(&mut self, all: &[T], units: &[T], measure: fn(T, T) -> T) {
+    fn update_scaled(&mut self, all: &[T], units: &[T], measure: fn(T, T) -> T) {
         for (term, &unit) in all.iter().zip(units) {
-            self.in_units = statistics::larger(self.in_units, measure(term.abs(), unit));
+            self.in_units = statistics::nan_max(self.in_units, measure(term.abs(), unit));
         }
     }
 }

@@ -49,7 +49,7 @@ pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T])
 
 /// The largest `|a|`, at least `least`. NaN is not seen.
 #[inline(always)]
-pub fn larger<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
+pub fn largest_magnitude_ignoring_nan<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
     let (a, rest) = split!(all);
     let mut largest = super::kernels::splat::<T, E>(least);
     for a in a {
@@ -61,14 +61,14 @@ pub fn larger<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
 
 /// The largest of `|a|` in units, at least `least`; NaN if one of them is.
 #[inline(never)]
-pub fn largest_of<T: Real>(least: T, all: &[T], units: &[T], measure: fn(T, T) -> T) -> T {
-    all.iter().zip(units).fold(least, |most, (a, &unit)| statistics::larger(most, measure(a.abs(), unit)))
+pub fn largest_scaled_magnitude<T: Real>(least: T, all: &[T], units: &[T], measure: fn(T, T) -> T) -> T {
+    all.iter().zip(units).fold(least, |most, (a, &unit)| statistics::nan_max(most, measure(a.abs(), unit)))
 }
 
 /// The largest `|a|`; NaN if one of them is, or if their squares overflow.
 #[inline(always)]
 pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
-    let largest = larger::<T, E>(T::ZERO, all);
+    let largest = largest_magnitude_ignoring_nan::<T, E>(T::ZERO, all);
     // What is compared with NaN does not show it: sums do.
     if dot::<T, E>(all, all).is_finite() { largest } else { T::from_f64(f64::NAN) }
 }
@@ -83,7 +83,7 @@ pub fn add_scaled<T: Real>(a: &mut [T], factor: T, b: &[T]) {
 
 /// `factor · a`
 #[inline(always)]
-pub fn shrink<T: Real>(a: &mut [T], factor: T) {
+pub fn scale_vector<T: Real>(a: &mut [T], factor: T) {
     for a in a {
         *a = *a * factor;
     }

@@ -1,52 +1,55 @@
 //! What is said of a problem that has no solution, and why that is true.
 
 use super::iterate::Iterate;
-use super::limits::Limits;
-use super::residuals::Largest;
+use super::limits::ResidualTolerances;
+use super::residuals::MaxResiduals;
 use super::vector::dot;
 use crate::qp::element::set;
-use crate::qp::layout::{assign, part};
-use crate::qp::statistics::larger;
+use crate::qp::layout::{copy_common, part};
+use crate::qp::statistics::nan_max;
 use crate::scalar::{Packed, Real};
 
 /// Of double precision `ε` is below.
-const FINE: f64 = 1e-10;
+const DOUBLE_PRECISION_EPSILON: f64 = 1e-10;
 
 /// Multipliers that have grown so much, where violations stay, may be a certificate.
 const GROWTH: f64 = 10.0;
 /// Numbers of feasible points that are not ruled out, over those of the iterate: enough for a
 /// suspicion.
-const SUSPECTED: f64 = 1e2;
+const SUSPICION_FACTOR: f64 = 1e2;
 /// The iterations before the first test.
-const FIRST: usize = 3;
+const MIN_ITERATIONS_BEFORE_TEST: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
     /// Whether multipliers of the run with the objective are nearly a certificate: where no point
     /// satisfies all constraints they grow without bound in its direction, since what the objective
     /// adds to the gradient is bounded. `known` is how large forces were at first.
     #[inline(always)]
-    pub fn is_suspicious<E: Packed<T>>(
+    pub fn suspects_infeasibility<E: Packed<T>>(
         &mut self,
         iterations: usize,
         known: T,
-        (residuals, limits): (Largest<T>, &Limits<T>),
+        (residuals, limits): (MaxResiduals<T>, &ResidualTolerances<T>),
         multipliers: &mut [T],
     ) -> bool {
         let values = limits.of(self.terms).values;
         let violates = residuals.inequalities > values || residuals.dynamics > values;
-        if iterations < FIRST || !violates || self.force() < T::from_f64(GROWTH) * known {
+        if iterations < MIN_ITERATIONS_BEFORE_TEST
+            || !violates
+            || self.largest_multiplier() < T::from_f64(GROWTH) * known
+        {
             return false;
         }
         // Soft bounds contradict nothing: their forces belong to the objective.
         let sides = &mut self.sides;
-        assign(sides.multiplier_step, sides.multiplier);
+        copy_common(sides.multiplier_step, sides.multiplier);
         for &side in &*sides.soft {
             set(sides.multiplier, side as usize, T::ZERO);
         }
         let objective = core::mem::replace(&mut self.objective, false);
-        let suspicious = self.is_certificate::<E>(T::from_f64(SUSPECTED), multipliers);
+        let suspicious = self.is_certificate::<E>(T::from_f64(SUSPICION_FACTOR), multipliers);
         self.objective = objective;
-        assign(self.sides.multiplier, self.sides.multiplier_step);
+        copy_common(self.sides.multiplier, self.sides.multiplier_step);
         if !suspicious {
             let _ = self.evaluate::<E>(multipliers);
         }
@@ -54,7 +57,7 @@ impl<T: Real> Iterate<'_, T> {
     }
 
     /// The largest multiplier of a side or an equation in units.
-    fn force(&self) -> T {
+    fn largest_multiplier(&self) -> T {
         let sides = &self.sides;
         let of_sides = sides.multiplier.iter().zip(&*sides.rows);
         let of_equations = sides.free.iter().zip(&*sides.equations);
@@ -70,8 +73,11 @@ impl<T: Real> Iterate<'_, T> {
     /// `g` vanishes and `L` is positive there is none. With a `g` that is small there is none but
     /// where numbers are 1e5 times (of single precision a hundred times) as large as here.
     #[inline(always)]
-    pub fn is_infeasible<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
-        self.is_certificate::<E>(T::from_f64(if T::EPSILON < FINE { 1e5 } else { 1e2 }), multipliers)
+    pub fn proves_infeasibility<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
+        self.is_certificate::<E>(
+            T::from_f64(if T::EPSILON < DOUBLE_PRECISION_EPSILON { 1e5 } else { 1e2 }),
+            multipliers,
+        )
     }
 
     /// The same, where numbers may be `far` times as large.
@@ -87,9 +93,9 @@ impl<T: Real> Iterate<'_, T> {
         if let Some(coupling) = &self.coupling {
             lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
         }
-        let gradient = self.gradient_size::<E>(self.measure);
+        let gradient = self.max_gradient::<E>(self.measure);
         let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
-        let gradient = larger(gradient * far, rounding);
+        let gradient = nan_max(gradient * far, rounding);
         lagrangian > gradient * (T::ONE + self.terms.values)
     }
 }

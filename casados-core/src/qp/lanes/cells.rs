@@ -3,7 +3,7 @@
 //! Matrices lie column after column. Everything is inlined into the function that was compiled for
 //! `E`.
 
-use crate::qp::layout::assign;
+use crate::qp::layout::copy_common;
 use crate::scalar::{Lanes, Scalar};
 
 /// An element in memory.
@@ -33,7 +33,7 @@ pub enum Start<'a, C> {
 
 /// As many columns of a tile as leave room in the registers: sixteen sums where there are
 /// thirty-two of them, eight elsewhere.
-const fn columns_of_tiles<E>() -> usize {
+const fn tile_columns<E>() -> usize {
     if cfg!(target_arch = "x86_64") && size_of::<E>() < 64 { 2 } else { 4 }
 }
 
@@ -94,7 +94,7 @@ pub fn product<E: Lanes>(
     let mut j = 0;
     while j < columns {
         let width = match columns - j {
-            4.. if columns_of_tiles::<E>() == 4 => 4,
+            4.. if tile_columns::<E>() == 4 => 4,
             2.. => 2,
             _ => 1,
         };
@@ -196,7 +196,7 @@ pub fn scale<E: Lanes>(x: &mut [Cell<E>], a: E) {
 
 /// `to = −x`
 #[inline(always)]
-pub fn assign_negative<E: Lanes>(to: &mut [Cell<E>], x: &[Cell<E>]) {
+pub fn assign_negated<E: Lanes>(to: &mut [Cell<E>], x: &[Cell<E>]) {
     for (to, x) in to.iter_mut().zip(x) {
         (-E::load(x)).store(to);
     }
@@ -208,7 +208,7 @@ pub fn mirror<C: Copy>(matrix: &mut [C], n: usize) {
     for j in 0..n {
         for i in j + 1..n {
             let Some(&below) = matrix.get(j * n + i) else { return };
-            assign(matrix.get_mut(i * n + j..).unwrap_or_default(), &[below]);
+            copy_common(matrix.get_mut(i * n + j..).unwrap_or_default(), &[below]);
         }
     }
 }

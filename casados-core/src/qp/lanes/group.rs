@@ -11,9 +11,9 @@
 //! multiplier, of others what is left of the equations.
 
 use super::cells::{
-    Matrix, Start, assign_negative, mirror, product, scale, subtract, subtract_scaled, subtract_transposed,
+    Matrix, Start, assign_negated, mirror, product, scale, subtract, subtract_scaled, subtract_transposed,
 };
-use crate::qp::layout::{StageDims, assign, part, part_mut, take_mut};
+use crate::qp::layout::{StageDims, copy_common, part, part_mut, take_mut};
 use crate::scalar::Lanes;
 
 /// Pivots below this part of the diagonal that they are left of may be rounding errors: such a
@@ -127,7 +127,7 @@ impl<'m, C: Copy> Group<'m, C> {
     pub fn solve<E: Lanes<Cell = C>>(&mut self) {
         self.backward::<E>();
         self.forward::<E>();
-        self.multiply::<E>();
+        self.dynamics_multipliers::<E>();
     }
 
     /// The recursion, and which pivots are weak.
@@ -136,20 +136,20 @@ impl<'m, C: Copy> Group<'m, C> {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         let last = part(self.hessian, intervals * n * n, n * n);
         for (p, h) in self.p.chunks_exact_mut(nx.max(1)).zip(last.chunks_exact(n.max(1))) {
-            assign(p, h);
+            copy_common(p, h);
         }
-        assign(self.g, part(self.gradient, intervals * n, n));
+        copy_common(self.g, part(self.gradient, intervals * n, n));
         let mut weak = E::from_f64(0.0);
         for k in (0..intervals).rev() {
             let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
             let hessian = Matrix { data: part(self.hessian, k * n * n, n * n), ld: n };
             let p = Matrix { data: &*self.p, ld: nx };
-            assign_negative::<E>(part_mut(self.minus, 0, nx), self.g);
+            assign_negated::<E>(part_mut(self.minus, 0, nx), self.g);
             subtract::<E>(self.minus, p, part(self.offset, k * nx, nx), [nx, nx]);
             product::<E>((self.w, n), Start::Zero, (dynamics, p), [n, nx, nx], false);
             let w = Matrix { data: &*self.w, ld: n };
             product::<E>((self.m, n), Start::Matrix(hessian), (dynamics, w), [n, n, nx], true);
-            assign(self.g, part(self.gradient, k * n, n));
+            copy_common(self.g, part(self.gradient, k * n, n));
             subtract::<E>(self.g, dynamics, self.minus, [n, nx]);
             self.fix_active::<E>(k);
             weak = weak + self.eliminate::<E>(k);
@@ -249,7 +249,7 @@ impl<'m, C: Copy> Group<'m, C> {
             let here = part_mut(here, k * n, n);
             let (x, controls) = here.split_at_mut_checked(nx).unwrap_or_default();
             // Lᵀ u = −(y + Kᵀ x)
-            assign_negative::<E>(controls, part(self.y, k * nu, nu));
+            assign_negated::<E>(controls, part(self.y, k * nu, nu));
             let panels = Matrix { data: panel, ld: n };
             subtract_transposed::<E>(controls, panels, x);
             for c in (0..nu).rev() {
@@ -263,29 +263,29 @@ impl<'m, C: Copy> Group<'m, C> {
                 (sum * inverse).store(u);
             }
             let minus = part_mut(self.minus, 0, nx);
-            assign_negative::<E>(minus, part(self.offset, k * nx, nx));
+            assign_negated::<E>(minus, part(self.offset, k * nx, nx));
             let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
             subtract_transposed::<E>(minus, dynamics, here);
-            assign_negative::<E>(part_mut(next, 0, nx), minus);
+            assign_negated::<E>(part_mut(next, 0, nx), minus);
         }
     }
 
     /// Multipliers of the dynamics, and slopes.
     #[inline(always)]
-    fn multiply<E: Lanes<Cell = C>>(&mut self) {
+    fn dynamics_multipliers<E: Lanes<Cell = C>>(&mut self) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         for k in (0..=intervals).rev() {
-            assign(self.g, part(self.gradient, k * n, n));
-            assign_negative::<E>(self.minus, part(self.v, k * n, n));
+            copy_common(self.g, part(self.gradient, k * n, n));
+            assign_negated::<E>(self.minus, part(self.v, k * n, n));
             let hessian = Matrix { data: part(self.hessian, k * n * n, n * n), ld: n };
             subtract::<E>(self.g, hessian, self.minus, [n, if k < intervals { n } else { nx }]);
             if k < intervals {
-                assign_negative::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
+                assign_negated::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
                 let dynamics = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
                 subtract::<E>(self.g, dynamics, self.minus, [n, nx]);
-                assign(part_mut(self.slope, k * nu, nu), part(self.g, nx, nu));
+                copy_common(part_mut(self.slope, k * nu, nu), part(self.g, nx, nu));
             }
-            assign(part_mut(self.multipliers, k * nx, nx), part(self.g, 0, nx));
+            copy_common(part_mut(self.multipliers, k * nx, nx), part(self.g, 0, nx));
         }
     }
 }

@@ -25,11 +25,11 @@ mod transfer;
 
 use super::error::QpError;
 use super::instance::QpInstance;
-use super::interior::{InteriorPointOptions, is_first_fixed};
+use super::interior::{InteriorPointOptions, is_initial_state_fixed};
 use super::layout::Places;
-use super::memory::{reserve, room};
+use super::memory::{try_reserve, try_resize};
 use super::solver::QpStart;
-use super::stage::Row;
+use super::stage::ConstraintVector;
 use super::statistics::{QpStatistics, Residuals};
 use crate::qp::layout::part;
 use crate::scalar::lanes::second_level_cache;
@@ -37,19 +37,19 @@ use crate::scalar::{Packed, Real, Registers, compiled};
 use alloc::vec::Vec;
 use group::Group;
 pub use group::Size;
-use sets::Judged;
-use transfer::MOST_LANES;
+use sets::LaneResiduals;
+use transfer::MAX_LANES;
 
 /// Sets that are tried: of problems whose sets settle at all nearly all need less.
-const SETS: usize = 16;
+const MAX_ACTIVE_SETS: usize = 16;
 /// What a group may take of the second-level cache.
-const WORKING_SET: f64 = 5.0 / 8.0;
+const CACHE_FRACTION: f64 = 5.0 / 8.0;
 /// Residuals are below this part of the tolerance: a single solve is as good, or better, in units.
-const SHARE: f64 = 0.1;
+const TOLERANCE_FRACTION: f64 = 0.1;
 
 /// The memory of groups.
 #[derive(Clone, Debug)]
-pub struct Together<T> {
+pub struct LaneWorkspace<T> {
     numbers: Vec<T>,
     /// Sets of active bounds of all problems.
     sets: Vec<i8>,
@@ -59,7 +59,7 @@ pub struct Together<T> {
     alone: Vec<u32>,
 }
 
-impl<T> Default for Together<T> {
+impl<T> Default for LaneWorkspace<T> {
     fn default() -> Self {
         Self { numbers: Vec::new(), sets: Vec::new(), pending: Vec::new(), alone: Vec::new() }
     }
@@ -72,14 +72,14 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
     let qp = qp.view();
     let size = Size::of(qp.dims)?;
     let is_plain = options.active_sets > 0 && options.max_iterations > 0 && options.tolerance > 0.0;
-    if !is_plain || qp.is_coupled() || solution.dims() != qp.dims || !is_first_fixed(qp) {
+    if !is_plain || qp.is_coupled() || solution.dims() != qp.dims || !is_initial_state_fixed(qp) {
         return None;
     }
     let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
     for place in Places::<T>::new(qp.dims) {
         let variables = if place.next > 0 { place.n } else { place.nx };
-        let vector = |row| part(qp.data, place.data + place.row_data(row), variables);
-        let (lower, upper) = (vector(Row::Lower), vector(Row::Upper));
+        let vector = |row| part(qp.data, place.data + place.constraint_vector_begin(row), variables);
+        let (lower, upper) = (vector(ConstraintVector::Lower), vector(ConstraintVector::Upper));
         // No branch for each number.
         let mut good = true;
         for (&lower, &upper) in lower.iter().zip(upper) {
@@ -93,7 +93,7 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
                 good &= (lower <= -none) & (upper >= none);
             }
         }
-        for row in [Row::LowerLinear, Row::UpperLinear] {
+        for row in [ConstraintVector::LowerLinear, ConstraintVector::UpperLinear] {
             let penalties = vector(row);
             for &penalty in penalties {
                 good &= penalty >= T::ZERO;
@@ -102,7 +102,7 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
                 good &= penalty == infinity;
             }
         }
-        for row in [Row::LowerQuadratic, Row::UpperQuadratic] {
+        for row in [ConstraintVector::LowerQuadratic, ConstraintVector::UpperQuadratic] {
             for &penalty in vector(row) {
                 good &= (penalty >= T::ZERO) & (penalty < infinity);
             }
@@ -119,35 +119,35 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
 /// # Errors
 /// [`QpError::OutOfMemory`]
 pub fn solve<T: Real>(
-    together: &mut Together<T>,
+    together: &mut LaneWorkspace<T>,
     size: Size,
     problems: (&mut [QpInstance<T>], &mut [Result<QpStatistics, QpError>]),
     (options, start): (&InteriorPointOptions, QpStart),
 ) -> Result<(), QpError> {
     let count = problems.0.len();
     // One register more, so that the first one may begin at a line of the cache.
-    let length = size.cells().saturating_add(1).saturating_mul(MOST_LANES);
-    reserve(&mut together.numbers, length)?;
-    reserve(&mut together.sets, count.saturating_mul(size.intervals * size.nu))?;
+    let length = size.cells().saturating_add(1).saturating_mul(MAX_LANES);
+    try_resize(&mut together.numbers, length)?;
+    try_resize(&mut together.sets, count.saturating_mul(size.intervals * size.nu))?;
     for list in [&mut together.pending, &mut together.alone] {
         list.clear();
-        room(list, count)?;
+        try_reserve(list, count)?;
     }
     together.pending.extend((0..count).map(|index| index as u32));
     T::compiled::<Solves>(Solve { together, size, problems, options, start });
     Ok(())
 }
 
-impl<T> Together<T> {
+impl<T> LaneWorkspace<T> {
     /// The problems of the last call that are to be solved alone.
-    pub fn alone(&self) -> impl Iterator<Item = usize> {
+    pub fn unsolved_indices(&self) -> impl Iterator<Item = usize> {
         self.alone.iter().map(|&index| index as usize)
     }
 }
 
 /// See [`solve`].
 pub struct Solve<'r, T: Real> {
-    together: &'r mut Together<T>,
+    together: &'r mut LaneWorkspace<T>,
     size: Size,
     problems: (&'r mut [QpInstance<T>], &'r mut [Result<QpStatistics, QpError>]),
     options: &'r InteriorPointOptions,
@@ -163,12 +163,12 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(mut self) {
         let bytes = self.size.cells().saturating_mul(size_of::<E::Cell>());
-        if E::LANES < 2 || bytes as f64 > WORKING_SET * second_level_cache() as f64 {
+        if E::LANES < 2 || bytes as f64 > CACHE_FRACTION * second_level_cache() as f64 {
             core::mem::swap(&mut self.together.pending, &mut self.together.alone);
             return;
         }
         let mut numbers = core::mem::take(&mut self.together.numbers);
-        let skipped = numbers.as_ptr().align_offset(64).min(MOST_LANES);
+        let skipped = numbers.as_ptr().align_offset(64).min(MAX_LANES);
         let cells = E::cells_mut(numbers.get_mut(skipped..).unwrap_or_default());
         let mut group = Group::new(self.size, cells.get_mut(..self.size.cells()).unwrap_or_default());
         for cell in &mut *group.hessian {
@@ -176,7 +176,7 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
         }
         let mut first = true;
         while !self.together.pending.is_empty() {
-            self.round::<E>(&mut group, first);
+            self.iterate_pending::<E>(&mut group, first);
             first = false;
         }
         self.together.numbers = numbers;
@@ -186,26 +186,26 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
 impl<T: Real> Solve<'_, T> {
     /// Goes through what is pending, group by group.
     #[inline(always)]
-    fn round<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, first: bool) {
+    fn iterate_pending<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, first: bool) {
         let (count, mut kept) = (self.together.pending.len(), 0);
         for begin in (0..count).step_by(E::LANES) {
-            let mut indices = [0; MOST_LANES];
+            let mut indices = [0; MAX_LANES];
             let members = E::LANES.min(count - begin);
             for (to, &index) in indices.iter_mut().zip(part(&self.together.pending, begin, members)) {
                 *to = index as usize;
             }
             let indices = indices.get(..members).unwrap_or_default();
-            self.place::<E>(group, indices);
+            self.load_problems::<E>(group, indices);
             let mut convex = (1u32 << members) - 1;
             if first && self.start == QpStart::Warm {
                 convex = self.convex::<E>(group, indices);
             }
-            self.place_sets::<E>(group, indices, first);
+            self.load_active_sets::<E>(group, indices, first);
             let left = self.iterate::<E>(group, indices, convex, count > E::LANES);
             for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| left >> lane & 1 == 1) {
                 let sets = self.size.intervals * self.size.nu;
                 let set = self.together.sets.get_mut(index * sets..).and_then(|rest| rest.get_mut(..sets));
-                group.read_set::<T, E>(lane, set.unwrap_or_default());
+                group.store_active_set::<T, E>(lane, set.unwrap_or_default());
                 if let Some(place) = self.together.pending.get_mut(kept) {
                     *place = index as u32;
                 }
@@ -217,8 +217,8 @@ impl<T: Real> Solve<'_, T> {
 
     /// Writes problems into the lanes; lanes that are left hold the last one once more.
     #[inline(always)]
-    fn place<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize]) {
-        let mut data: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
+    fn load_problems<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize]) {
+        let mut data: [&[T]; MAX_LANES] = [&[]; MAX_LANES];
         let (mut last, mut dims): (&[T], _) = (&[], &[][..]);
         for (lane, data) in data.iter_mut().enumerate() {
             if let Some(instance) = indices.get(lane).and_then(|&index| self.problems.0.get(index)) {
@@ -234,7 +234,7 @@ impl<T: Real> Solve<'_, T> {
     #[inline(always)]
     fn convex<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
         group.backward::<E>();
-        let weak = group.weak.first().map_or([0.0; MOST_LANES], |weak| lanes::<T, E>(E::load(weak)));
+        let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
         let mut convex = 0;
         for (lane, (&index, &weak)) in indices.iter().zip(&weak).enumerate() {
             if weak == 0.0 {
@@ -248,12 +248,12 @@ impl<T: Real> Solve<'_, T> {
 
     /// Writes the sets that the problems begin with: those of a group before, or of a warm start.
     #[inline(always)]
-    fn place_sets<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
+    fn load_active_sets<E: Packed<T>>(&self, group: &mut Group<'_, E::Cell>, indices: &[usize], first: bool) {
         let Size { nx, nu, intervals } = self.size;
         for (lane, &index) in indices.iter().enumerate() {
             if !first {
                 let set = part(&self.together.sets, index * intervals * nu, intervals * nu);
-                group.write_set::<T, E>(lane, set.iter().copied());
+                group.load_active_set::<T, E>(lane, set.iter().copied());
             } else if let (QpStart::Warm, Some(instance)) = (self.start, self.problems.0.get(index)) {
                 let least = T::from_f64(self.options.tolerance);
                 let [lower, upper] = instance.solution.sides();
@@ -261,7 +261,7 @@ impl<T: Real> Solve<'_, T> {
                 let rows = places.flat_map(|place| place.row + nx..place.row + nx + nu);
                 let is_at = |side: &[T], row: usize| side.get(row).is_some_and(|&force| force > least);
                 let set = rows.map(|row| i8::from(is_at(upper, row)) - i8::from(is_at(lower, row)));
-                group.write_set::<T, E>(lane, set);
+                group.load_active_set::<T, E>(lane, set);
             }
         }
     }
@@ -276,18 +276,18 @@ impl<T: Real> Solve<'_, T> {
         mut left: u32,
         others: bool,
     ) -> u32 {
-        let tolerance = E::from_f64(0.5 * SHARE * self.options.tolerance);
+        let tolerance = E::from_f64(0.5 * TOLERANCE_FRACTION * self.options.tolerance);
         loop {
             group.solve::<E>();
-            let changes = lanes::<T, E>(group.change::<E>(tolerance));
-            let weak = group.weak.first().map_or([0.0; MOST_LANES], |weak| lanes::<T, E>(E::load(weak)));
+            let changes = lanes::<T, E>(group.update_active_sets::<E>(tolerance));
+            let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
             let mut settled = 0;
             let going = left;
             for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| going >> lane & 1 == 1) {
                 let (Some(changes), Some(weak)) = (changes.get(lane), weak.get(lane)) else { return 0 };
                 let Some(Ok(statistics)) = self.problems.1.get_mut(index) else { return 0 };
                 statistics.iterations += 1;
-                let is_over = statistics.iterations >= SETS.min(self.options.max_iterations);
+                let is_over = statistics.iterations >= MAX_ACTIVE_SETS.min(self.options.max_iterations);
                 if *changes == 0.0 && *weak == 0.0 {
                     settled |= 1 << lane;
                 } else if changes.is_nan() || *weak != 0.0 || is_over {
@@ -308,13 +308,13 @@ impl<T: Real> Solve<'_, T> {
     /// Judges and stores solutions of lanes whose sets have settled.
     #[inline(always)]
     fn store<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize], settled: u32) {
-        let Judged { stationarity, dynamics, inequalities, objective } = group.judge::<E>();
+        let LaneResiduals { stationarity, dynamics, inequalities, objective } = group.judge::<E>();
         let of = [stationarity, dynamics, inequalities, objective].map(|value| lanes::<T, E>(value));
         for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| settled >> lane & 1 == 1) {
             let [stationarity, dynamics, inequalities, objective] =
                 of.map(|lanes| lanes.get(lane).copied().unwrap_or(f64::NAN));
             let residuals = Residuals { stationarity, dynamics, inequalities, complementarity: 0.0 };
-            let is_small = residuals.largest() <= SHARE * self.options.tolerance;
+            let is_small = residuals.largest() <= TOLERANCE_FRACTION * self.options.tolerance;
             let problem = (self.problems.0.get_mut(index), self.problems.1.get_mut(index));
             let (Some(instance), Some(Ok(statistics))) = problem else { return };
             if !(is_small && objective.is_finite()) {
@@ -337,10 +337,10 @@ impl<T: Real> Solve<'_, T> {
 
 /// The numbers of the lanes.
 #[inline(always)]
-fn lanes<T: Real, E: Packed<T>>(register: E) -> [f64; MOST_LANES] {
+fn lanes<T: Real, E: Packed<T>>(register: E) -> [f64; MAX_LANES] {
     let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
     register.store(&mut cell);
-    let mut all = [0.0; MOST_LANES];
+    let mut all = [0.0; MAX_LANES];
     for (lane, to) in all.iter_mut().enumerate().take(E::LANES) {
         *to = E::lane(&cell, lane);
     }

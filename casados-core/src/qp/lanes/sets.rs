@@ -1,12 +1,12 @@
 //! Which bounds are active, and what is left of the conditions of optimality.
 
-use super::cells::{Cell, Matrix, assign_negative, subtract, subtract_transposed};
+use super::cells::{Cell, Matrix, assign_negated, subtract, subtract_transposed};
 use super::group::{Group, Size};
 use crate::qp::layout::{part, part_mut};
 use crate::scalar::{Lanes, Scalar};
 
 /// What is known of the problems of a group, by lanes.
-pub struct Judged<E> {
+pub struct LaneResiduals<E> {
     /// Gradient of the Lagrangian with multipliers that are not negative, and of the dynamics.
     pub stationarity: E,
     pub dynamics: E,
@@ -20,7 +20,7 @@ impl<C: Copy> Group<'_, C> {
     /// negative, both by more than the tolerance. Returns how many changed; NaN where numbers are
     /// not finite.
     #[inline(always)]
-    pub fn change<E: Lanes<Cell = C>>(&mut self, tolerance: E) -> E {
+    pub fn update_active_sets<E: Lanes<Cell = C>>(&mut self, tolerance: E) -> E {
         let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
         let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
         let (mut changes, mut sum) = (zero, zero);
@@ -49,7 +49,7 @@ impl<C: Copy> Group<'_, C> {
 
     /// What is left of the conditions of optimality, computed from the data, and the objective.
     #[inline(always)]
-    pub fn judge<E: Lanes<Cell = C>>(&mut self) -> Judged<E> {
+    pub fn judge<E: Lanes<Cell = C>>(&mut self) -> LaneResiduals<E> {
         let zero = E::from_f64(0.0);
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         let (mut stationarity, mut dynamics, mut inequalities, mut objective) = (zero, zero, zero, zero);
@@ -60,7 +60,7 @@ impl<C: Copy> Group<'_, C> {
             for g in &mut *self.g {
                 zero.store(g);
             }
-            assign_negative::<E>(self.minus, v);
+            assign_negated::<E>(self.minus, v);
             let hessian = Matrix { data: part(self.hessian, k * n * n, n * n), ld: n };
             subtract::<E>(self.g, hessian, self.minus, [n, variables]);
             let gradient = part(self.gradient, k * n, n);
@@ -72,7 +72,7 @@ impl<C: Copy> Group<'_, C> {
             }
             if k < intervals {
                 let matrix = Matrix { data: part(self.dynamics, k * n * nx, n * nx), ld: n };
-                assign_negative::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
+                assign_negated::<E>(part_mut(self.minus, 0, nx), part(self.multipliers, (k + 1) * nx, nx));
                 subtract::<E>(self.g, matrix, self.minus, [n, nx]);
                 // x₊ − b − A x − B u
                 let gap = part_mut(self.minus, 0, nx);
@@ -99,12 +99,12 @@ impl<C: Copy> Group<'_, C> {
                 stationarity = (E::load(g) - E::load(multiplier)).abs().max(stationarity);
             }
         }
-        Judged { stationarity, dynamics, inequalities, objective }
+        LaneResiduals { stationarity, dynamics, inequalities, objective }
     }
 
     /// Bounds that are none become infinite.
     #[inline(always)]
-    pub fn clean_bounds<E: Lanes<Cell = C>>(&mut self, no_bound: E) {
+    pub fn remove_absent_bounds<E: Lanes<Cell = C>>(&mut self, no_bound: E) {
         let infinity = E::from_f64(f64::INFINITY);
         for (to_lower, to_upper) in self.lower.iter_mut().zip(&mut *self.upper) {
             let (lower, upper) = (E::load(to_lower), E::load(to_upper));

@@ -2,22 +2,22 @@
 
 use super::group::{Group, Size};
 use super::sets::forces;
-use crate::qp::layout::{Places, StageOffsets, assign, part, part_mut};
+use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
-use crate::qp::stage::Row;
+use crate::qp::stage::ConstraintVector;
 use crate::qp::{StageDims, element::set};
 use crate::scalar::{Packed, Real};
 
 /// More lanes than any register has.
-pub const MOST_LANES: usize = 16;
+pub const MAX_LANES: usize = 16;
 
 /// Elements of several slices from `begin` on, one slice in each lane: whole registers are read
 /// from each, and transposed.
 #[inline(always)]
-fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MOST_LANES], begin: usize, to: &mut [E::Cell]) {
+fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MAX_LANES], begin: usize, to: &mut [E::Cell]) {
     for (block, to) in to.chunks_mut(E::LANES).enumerate() {
         let at = begin + block * E::LANES;
-        let (mut registers, mut tile) = ([E::from_f64(0.0); MOST_LANES], [zero::<T, E>(); MOST_LANES]);
+        let (mut registers, mut tile) = ([E::from_f64(0.0); MAX_LANES], [zero::<T, E>(); MAX_LANES]);
         let (Some(registers), Some(tile)) = (registers.get_mut(..E::LANES), tile.get_mut(..E::LANES)) else {
             return;
         };
@@ -35,7 +35,7 @@ fn gather<T: Real, E: Packed<T>>(from: &[&[T]; MOST_LANES], begin: usize, to: &m
             }
         }
         E::transpose(registers, tile);
-        assign(to, tile);
+        copy_common(to, tile);
     }
 }
 
@@ -52,7 +52,7 @@ impl<C: Copy> Group<'_, C> {
     pub fn write<T: Real, E: Packed<T, Cell = C>>(
         &mut self,
         dims: &[StageDims],
-        data: &[&[T]; MOST_LANES],
+        data: &[&[T]; MAX_LANES],
         no_bound: f64,
     ) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
@@ -72,7 +72,11 @@ impl<C: Copy> Group<'_, C> {
             }
             gather::<T, E>(data, begin + place.gradient(), part_mut(self.gradient, k * n, variables));
             if k == 0 {
-                gather::<T, E>(data, begin + place.row_data(Row::Lower), part_mut(self.v, 0, nx));
+                gather::<T, E>(
+                    data,
+                    begin + place.constraint_vector_begin(ConstraintVector::Lower),
+                    part_mut(self.v, 0, nx),
+                );
             }
             if k == intervals {
                 break;
@@ -82,19 +86,29 @@ impl<C: Copy> Group<'_, C> {
                 gather::<T, E>(data, begin + j * place.ld, column);
             }
             gather::<T, E>(data, begin + place.offset(), part_mut(self.offset, k * nx, nx));
-            for (row, to) in [(Row::Lower, &mut *self.lower), (Row::Upper, &mut *self.upper)] {
-                gather::<T, E>(data, begin + place.row_data(row) + nx, part_mut(to, k * nu, nu));
+            for (row, to) in
+                [(ConstraintVector::Lower, &mut *self.lower), (ConstraintVector::Upper, &mut *self.upper)]
+            {
+                gather::<T, E>(
+                    data,
+                    begin + place.constraint_vector_begin(row) + nx,
+                    part_mut(to, k * nu, nu),
+                );
             }
         }
         for active in &mut *self.active {
             E::from_f64(0.0).store(active);
         }
-        self.clean_bounds::<E>(E::from_f64(no_bound));
+        self.remove_absent_bounds::<E>(E::from_f64(no_bound));
     }
 
     /// Writes a set of active bounds into a lane, of those that there are.
     #[inline(always)]
-    pub fn write_set<T: Real, E: Packed<T, Cell = C>>(&mut self, lane: usize, of: impl Iterator<Item = i8>) {
+    pub fn load_active_set<T: Real, E: Packed<T, Cell = C>>(
+        &mut self,
+        lane: usize,
+        of: impl Iterator<Item = i8>,
+    ) {
         let bounds = self.lower.iter().zip(&*self.upper);
         for ((active, (lower, upper)), of) in self.active.iter_mut().zip(bounds).zip(of) {
             let bound = if of < 0 { lower } else { upper };
@@ -104,7 +118,7 @@ impl<C: Copy> Group<'_, C> {
 
     /// The set of active bounds of a lane.
     #[inline(always)]
-    pub fn read_set<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, to: &mut [i8]) {
+    pub fn store_active_set<T: Real, E: Packed<T, Cell = C>>(&self, lane: usize, to: &mut [i8]) {
         for (to, active) in to.iter_mut().zip(&*self.active) {
             let active = E::lane(active, lane);
             *to = i8::from(active > 0.0) - i8::from(active < 0.0);

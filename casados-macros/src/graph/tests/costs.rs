@@ -13,13 +13,13 @@ fn nodes(entries: &[Entry]) -> Vec<Node> {
 }
 
 /// Operations of f, f and Jacobian, gradient, Hessian, and the numbers of non-zeros.
-fn costs((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32; 4], [usize; 2]) {
+fn operation_counts((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32; 4], [usize; 2]) {
     let seeds: Vec<(Node, Node)> = (0..).zip(&f).map(|(row, &f)| (f, graph.seed(row))).collect();
     let first = jacobian(&mut graph, &f, variables);
     let gradient = gradient(&mut graph, &seeds, variables);
     let second = hessian(&mut graph, &seeds, variables);
     let both: Vec<Node> = f.iter().copied().chain(nodes(&first)).collect();
-    let counts = [&f, &both, &gradient, &nodes(&second)].map(|nodes| graph.operations(nodes));
+    let counts = [&f, &both, &gradient, &nodes(&second)].map(|nodes| graph.operation_count(nodes));
     (counts, [first.len(), second.len()])
 }
 
@@ -27,7 +27,7 @@ fn costs((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32; 4], [usiz
 /// sparsity.
 #[test]
 fn aircraft_takes_fewer_operations_than_casadi() {
-    let (counts, non_zeros) = costs(aircraft());
+    let (counts, non_zeros) = operation_counts(aircraft());
     assert_eq!(non_zeros, [302, 222]);
     for (count, reference) in counts.into_iter().zip([1035, 4376, 2501, 11626]) {
         assert!(count < reference, "{count} operations instead of {reference}");
@@ -58,7 +58,7 @@ fn chosen_order_is_the_cheapest() {
                 None => jacobian(&mut graph, &f, variables),
             };
             assert!(!entries.is_empty());
-            graph.operations(&f.iter().copied().chain(nodes(&entries)).collect::<Vec<_>>())
+            graph.operation_count(&f.iter().copied().chain(nodes(&entries)).collect::<Vec<_>>())
         };
         let chosen = count(None);
         let (reverse, forward) = (count(Some(Order::Reverse)), count(Some(Order::Forward)));
@@ -75,8 +75,8 @@ fn chosen_order_is_the_cheapest() {
 #[test]
 fn large_chain() {
     let begin = Instant::now();
-    let (small, _) = costs(chain(17));
-    let (large, _) = costs(chain(33));
+    let (small, _) = operation_counts(chain(17));
+    let (large, _) = operation_counts(chain(33));
     assert!(begin.elapsed() < Duration::from_secs(20));
     for (small, large) in small.into_iter().zip(large) {
         assert!(f64::from(large) < 2.2 * f64::from(small), "{small}, {large}");

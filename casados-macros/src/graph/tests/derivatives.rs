@@ -5,7 +5,7 @@ use super::models::{aircraft, chain};
 use crate::graph::elimination::Order;
 use crate::graph::hessian::hessian_in_order;
 use crate::graph::jacobian::jacobian_in_order;
-use crate::graph::{Binary, Degree, Entry, Graph, Node, Point, Unary, gradient, hessian, jacobian};
+use crate::graph::{Binary, Degree, Entry, EvaluationPoint, Graph, Node, Unary, gradient, hessian, jacobian};
 use std::cell::RefCell;
 
 const ORDERS: [Order; 3] = [Order::Reverse, Order::Forward, Order::Markowitz];
@@ -50,11 +50,11 @@ fn dense(entries: &[Entry], values: &[f64], rows: usize, columns: usize) -> Vec<
     matrix
 }
 
-fn values(graph: &Graph, entries: &[Entry], point: Point) -> Vec<f64> {
+fn values(graph: &Graph, entries: &[Entry], point: EvaluationPoint) -> Vec<f64> {
     graph.evaluate(&entries.iter().map(|entry| entry.2).collect::<Vec<_>>(), point)
 }
 
-fn seeded(graph: &mut Graph, outputs: &[Node]) -> Vec<(Node, Node)> {
+fn with_seeds(graph: &mut Graph, outputs: &[Node]) -> Vec<(Node, Node)> {
     (0..).zip(outputs).map(|(row, &f)| (f, graph.seed(row))).collect()
 }
 
@@ -74,11 +74,11 @@ fn assert_close(a: &[Vec<f64>], b: &[Vec<f64>], tolerance: f64, what: &str) {
 /// Everything there is about one function at one point, all ways. Rounding: the entries are sums
 /// over paths of products of partial derivatives; a few hundred operations without growth give some
 /// hundred ulps of the largest entry.
-fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Point) {
-    const ROUNDING: f64 = 2048.0 * f64::EPSILON;
+fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: EvaluationPoint) {
+    const ROUNDING_TOLERANCE: f64 = 2048.0 * f64::EPSILON;
     let n = variables as usize;
     let mut g = graph.clone();
-    let seeds = seeded(&mut g, f);
+    let seeds = with_seeds(&mut g, f);
     let gradient_nodes = gradient(&mut g, &seeds, variables);
     let exact = g.evaluate(&gradient_nodes, point);
 
@@ -96,12 +96,12 @@ fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Po
         let mut g = graph.clone();
         let (entries, _) = jacobian_in_order(&mut g, f, variables, order, usize::MAX).unwrap();
         let matrix = dense(&entries, &values(&g, &entries, point), f.len(), n);
-        assert_close(&reference, &matrix, ROUNDING, "Jacobian");
+        assert_close(&reference, &matrix, ROUNDING_TOLERANCE, "Jacobian");
     }
     // μᵀ J
     let product: Vec<f64> =
         (0..n).map(|j| reference.iter().zip(point.seeds).map(|(row, mu)| row[j] * mu).sum()).collect();
-    assert_close(&[exact], &[product], ROUNDING * size(reference.iter().flatten()), "gradient");
+    assert_close(&[exact], &[product], ROUNDING_TOLERANCE * size(reference.iter().flatten()), "gradient");
 
     // The Hessian is the Jacobian of the gradient.
     let rows = jacobian_in_order(&mut g, &gradient_nodes, variables, Order::Markowitz, usize::MAX).unwrap().0;
@@ -113,11 +113,11 @@ fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Po
             matrix[column as usize][row as usize] = matrix[row as usize][column as usize];
         }
         assert!(entries.is_sorted_by_key(|entry| (entry.0, entry.1)));
-        assert_close(&rows, &matrix, ROUNDING, "Hessian");
+        assert_close(&rows, &matrix, ROUNDING_TOLERANCE, "Hessian");
     };
     for order in ORDERS {
         let mut g = graph.clone();
-        let seeds = seeded(&mut g, f);
+        let seeds = with_seeds(&mut g, f);
         let (entries, _) = hessian_in_order(&mut g, &seeds, variables, order, usize::MAX).unwrap();
         check(&g, &entries);
     }
@@ -126,14 +126,14 @@ fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Po
 }
 
 #[test]
-fn random_graphs_all_ways() {
+fn random_graphs_agree() {
     let mut random = Random(7);
     for round in 0..60 {
         let (variables, size) = (2 + round % 6, 10 + 2 * round as usize);
         let (graph, f) = random_graph(&mut random, variables, size, 1 + round as usize % 4);
         let point: Vec<f64> = (0..variables).map(|_| random.between(-1.0, 1.0)).collect();
         let seeds: Vec<f64> = f.iter().map(|_| random.between(-1.0, 1.0)).collect();
-        let point = Point { variables: &point, seeds: &seeds, ..Point::default() };
+        let point = EvaluationPoint { variables: &point, seeds: &seeds, ..EvaluationPoint::default() };
         // The last variable plays the part of time: nothing is differentiated with respect to it.
         check_against_each_other(&graph, &f, variables - 1, point);
         check_against_each_other(&graph, &f, variables, point);
@@ -141,7 +141,7 @@ fn random_graphs_all_ways() {
 }
 
 #[test]
-fn models_all_ways() {
+fn models_agree() {
     let mut random = Random(3);
     let mut check = |(graph, f, variables): (Graph, Vec<Node>, u32), around: &[f64]| {
         let point: Vec<f64> = around.iter().map(|value| value + random.between(-0.1, 0.1)).collect();
@@ -150,7 +150,7 @@ fn models_all_ways() {
             &graph,
             &f,
             variables,
-            Point { variables: &point, seeds: &seeds, ..Point::default() },
+            EvaluationPoint { variables: &point, seeds: &seeds, ..EvaluationPoint::default() },
         );
     };
     let around: Vec<f64> = (0..45).map(|i| f64::from(i) * 0.3 % 2.0).collect();
@@ -175,19 +175,19 @@ fn random_graphs_against_differences() {
         let (graph, f) = random_graph(&mut random, 4, 24, 2);
         let center: Vec<f64> = (0..4).map(|_| random.between(-1.0, 1.0)).collect();
         let mut g = graph.clone();
-        let seeds = seeded(&mut g, &f);
+        let seeds = with_seeds(&mut g, &f);
         let first = gradient(&mut g, &seeds, 4);
         let second = hessian(&mut g, &seeds, 4);
         let mu = [0.7, -0.4];
         let at = |variables: &[f64]| {
-            let point = Point { variables, seeds: &mu, ..Point::default() };
+            let point = EvaluationPoint { variables, seeds: &mu, ..EvaluationPoint::default() };
             let values = g.evaluate(&f, point);
             let mut all = vec![mu[0] * values[0] + mu[1] * values[1]];
             all.extend(g.evaluate(&first, point));
             all
         };
         let exact = at(&center);
-        let point = Point { variables: &center, seeds: &mu, ..Point::default() };
+        let point = EvaluationPoint { variables: &center, seeds: &mu, ..EvaluationPoint::default() };
         let lower = dense(&second, &values(&g, &second, point), 4, 4);
         for j in 0..4 {
             let mut sum = [0.0; 5];
@@ -231,12 +231,12 @@ fn entries_that_cancel_are_dropped_and_constant_ones_are_constants() {
     assert_eq!(entries, [(0, 1, Some(2.0)), (1, 0, Some(2.0)), (1, 1, None)]);
     assert_eq!(g.degrees(&f, |variable| variable < 2), [Degree::Linear, Degree::Linear, Degree::Constant]);
     assert_eq!(g.degrees(&f[1..2], |_| true), [Degree::Nonlinear]);
-    let seeds = seeded(&mut g, &f);
+    let seeds = with_seeds(&mut g, &f);
     assert_eq!(hessian(&mut g, &seeds, 2), []);
 }
 
 #[test]
-fn linearity() {
+fn linear_entries_are_constant() {
     let graph = RefCell::new(Graph::default());
     let v = E::variables(&graph, 3);
     let cases = [
@@ -270,11 +270,11 @@ fn deep_selections() {
         let constant = graph.binary(Binary::Add, border, step);
         y = graph.select(below, constant, y);
     }
-    let seeds = seeded(&mut graph, &[y]);
+    let seeds = with_seeds(&mut graph, &[y]);
     let slope = gradient(&mut graph, &seeds, 1);
     let curvature = hessian(&mut graph, &seeds, 1);
     let nodes = [slope[0], curvature[0].2];
-    let at = |x: f64| graph.evaluate(&nodes, Point { variables: &[x], seeds: &[1.0], opaque: &[] });
+    let at = |x: f64| graph.evaluate(&nodes, EvaluationPoint { variables: &[x], seeds: &[1.0], opaque: &[] });
     for x in [0.5, 8.5, 18.5, 18.999] {
         assert_eq!(at(x), [0.0, 0.0]);
     }

@@ -10,9 +10,9 @@ use proptest::prelude::*;
 
 const VARIABLES: usize = 3;
 /// The complex step, a power of two so that it rounds nothing: `2⁻⁶⁶⁴`.
-const STEP: f64 = f64::from_bits((1023 - 664) << 52);
+const COMPLEX_STEP: f64 = f64::from_bits((1023 - 664) << 52);
 /// Operations of a reference for one of `Forward`, at most.
-const REFERENCE: f64 = 4.0;
+const REFERENCE_ERROR_FACTOR: f64 = 4.0;
 
 /// An expression, with arguments brought into the domain of each function when the graph is built.
 #[derive(Clone, Debug)]
@@ -210,7 +210,7 @@ fn binary<S: Scalar>(function: Binary, a: S, b: S) -> S {
 
 /// Equal within both errors; says nothing where there is no bound.
 fn close(what: &str, found: Bounded, expected: f64, error: f64) -> Result<(), TestCaseError> {
-    let tolerance = found.error + REFERENCE * error;
+    let tolerance = found.error + REFERENCE_ERROR_FACTOR * error;
     let difference = (found.value - expected).abs();
     prop_assert!(
         difference <= tolerance || !tolerance.is_finite(),
@@ -255,11 +255,11 @@ proptest! {
             let bound = evaluate_with(unary_of_reference, &graph, &[f], &[0, 1, 2].map(seeded), seeded(0))[0].d;
             let dual = [0, 1, 2].map(|k| Dual64::new(point[k], is(k, i)));
             let dual = evaluate(&graph, &[f], &dual, Dual64::from(mu))[0].eps;
-            let complex = [0, 1, 2].map(|k| Complex64::new(point[k], STEP * is(k, i)));
-            let complex = evaluate(&graph, &[f], &complex, Complex64::from(mu))[0].im / STEP;
+            let complex = [0, 1, 2].map(|k| Complex64::new(point[k], COMPLEX_STEP * is(k, i)));
+            let complex = evaluate(&graph, &[f], &complex, Complex64::from(mu))[0].im / COMPLEX_STEP;
             close("num-dual", first[i], dual, bound.error)?;
             close("complex step", first[i], complex, bound.error)?;
-            let product = exact(mu) * Bounded { value: dual, error: REFERENCE * bound.error };
+            let product = exact(mu) * Bounded { value: dual, error: REFERENCE_ERROR_FACTOR * bound.error };
             close("adjoint", adjoint[i], product.value, product.error)?;
 
             for (j, entry) in curvature[i].iter().enumerate().take(i + 1) {
@@ -270,7 +270,7 @@ proptest! {
                 let bound = evaluate_with(unary_of_reference, &graph, &[f], &[0, 1, 2].map(nested), nested(0))[0].d.d;
                 let hyper = [0, 1, 2].map(|k| HyperDual64::new(point[k], is(k, i), is(k, j), 0.0));
                 let hyper = evaluate(&graph, &[f], &hyper, HyperDual64::from(mu))[0].eps1eps2;
-                let product = exact(mu) * Bounded { value: hyper, error: REFERENCE * bound.error };
+                let product = exact(mu) * Bounded { value: hyper, error: REFERENCE_ERROR_FACTOR * bound.error };
                 close("Hessian", *entry, product.value, product.error)?;
             }
         }

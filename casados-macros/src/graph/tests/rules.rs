@@ -4,17 +4,17 @@ use super::expression::E;
 use crate::graph::elimination::Order;
 use crate::graph::hessian::hessian_in_order;
 use crate::graph::jacobian::jacobian_in_order;
-use crate::graph::{Binary, Graph, Node, Op, Point, Unary, gradient, hessian};
+use crate::graph::{Binary, EvaluationPoint, Graph, Node, Op, Unary, gradient, hessian};
 use std::cell::RefCell;
 use std::f64::consts::{E as EULER, LN_2, LOG2_E, LOG10_E};
 
 /// A function of two variables: its value, gradient and Hessian `[aa, ab, bb]`.
-struct Function {
+struct BinaryCase {
     graph: Graph,
     outputs: [Node; 6],
 }
 
-impl Function {
+impl BinaryCase {
     fn new(build: impl Fn(E, E) -> Node) -> Self {
         let graph = RefCell::new(Graph::default());
         let v = E::variables(&graph, 2);
@@ -31,14 +31,16 @@ impl Function {
     }
 
     /// `[f, f_a, f_b, f_aa, f_ab, f_bb]`
-    fn at(&self, a: f64, b: f64) -> [f64; 6] {
-        let values = self.graph.evaluate(&self.outputs, Point { variables: &[a, b], ..Point::default() });
+    fn values_at(&self, a: f64, b: f64) -> [f64; 6] {
+        let values = self
+            .graph
+            .evaluate(&self.outputs, EvaluationPoint { variables: &[a, b], ..EvaluationPoint::default() });
         std::array::from_fn(|i| values[i])
     }
 }
 
-fn unary(function: Unary) -> Function {
-    Function::new(|a, _| a.unary(function).1)
+fn unary(function: Unary) -> BinaryCase {
+    BinaryCase::new(|a, _| a.unary(function).1)
 }
 
 /// Central difference of order 8, and a bound of its rounding error for values of the given size.
@@ -58,18 +60,18 @@ fn difference(f: impl Fn(f64) -> f64, at: f64, h: f64) -> (f64, f64) {
 /// All derivatives at a point against differences of the value and of the first derivatives. `h` is
 /// small beside the distance to the next singularity: with ratio 1/100 the truncation error of
 /// order 8 is below 1e-15 of the derivative times a factorial over 630, together below 1e-12.
-fn check_differences(name: &str, function: &Function, a: f64, b: f64, h: f64) {
-    let exact = function.at(a, b);
+fn check_differences(name: &str, function: &BinaryCase, a: f64, b: f64, h: f64) {
+    let exact = function.values_at(a, b);
     let check = |what: &str, value: f64, (reference, rounding): (f64, f64)| {
         let error = (value - reference).abs();
         let bound = rounding + 1e-11 * value.abs().max(1.0);
         assert!(error <= bound, "{name} {what} at ({a}, {b}): {value} instead of {reference}");
     };
-    check("f_a", exact[1], difference(|a| function.at(a, b)[0], a, h));
-    check("f_aa", exact[3], difference(|a| function.at(a, b)[1], a, h));
-    check("f_b", exact[2], difference(|b| function.at(a, b)[0], b, h));
-    check("f_ab", exact[4], difference(|b| function.at(a, b)[1], b, h));
-    check("f_bb", exact[5], difference(|b| function.at(a, b)[2], b, h));
+    check("f_a", exact[1], difference(|a| function.values_at(a, b)[0], a, h));
+    check("f_aa", exact[3], difference(|a| function.values_at(a, b)[1], a, h));
+    check("f_b", exact[2], difference(|b| function.values_at(a, b)[0], b, h));
+    check("f_ab", exact[4], difference(|b| function.values_at(a, b)[1], b, h));
+    check("f_bb", exact[5], difference(|b| function.values_at(a, b)[2], b, h));
 }
 
 #[test]
@@ -148,7 +150,7 @@ fn functions_of_one_argument_against_closed_values() {
         (Signum, -2.0, 0.0, 0.0),
     ];
     for (function, a, first, second) in cases {
-        let [_, f_a, _, f_aa, _, _] = unary(function).at(a, 0.0);
+        let [_, f_a, _, f_aa, _, _] = unary(function).values_at(a, 0.0);
         // A handful of operations, each within 2 ulp, none of which cancels at these points.
         let close =
             |value: f64, reference: f64| (value - reference).abs() <= 16.0 * f64::EPSILON * reference.abs();
@@ -164,12 +166,12 @@ fn no_cancellation_near_one() {
     let a = 1.0 - distance;
     let close = |value: f64, reference: f64| (value / reference - 1.0).abs() < 16.0 * f64::EPSILON;
     let root = (distance * (2.0 - distance)).sqrt();
-    assert!(close(unary(Unary::Asin).at(a, 0.0)[1], 1.0 / root));
-    assert!(close(unary(Unary::Acos).at(a, 0.0)[1], -1.0 / root));
-    assert!(close(unary(Unary::Atanh).at(a, 0.0)[1], 1.0 / (distance * (2.0 - distance))));
+    assert!(close(unary(Unary::Asin).values_at(a, 0.0)[1], 1.0 / root));
+    assert!(close(unary(Unary::Acos).values_at(a, 0.0)[1], -1.0 / root));
+    assert!(close(unary(Unary::Atanh).values_at(a, 0.0)[1], 1.0 / (distance * (2.0 - distance))));
     let root = (distance * (2.0 + distance)).sqrt();
-    assert!(close(unary(Unary::Acosh).at(1.0 + distance, 0.0)[1], 1.0 / root));
-    assert!(close(unary(Unary::Acosh).at(1e200, 0.0)[1], 1e-200));
+    assert!(close(unary(Unary::Acosh).values_at(1.0 + distance, 0.0)[1], 1.0 / root));
+    assert!(close(unary(Unary::Acosh).values_at(1e200, 0.0)[1], 1e-200));
 }
 
 #[test]
@@ -177,12 +179,12 @@ fn functions_of_two_arguments() {
     let signs = [(0.7, 1.3), (-0.7, 1.3), (2.1, -0.4), (-1.1, -0.9)];
     let functions = [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Atan2, Binary::Hypot];
     for function in functions {
-        let derivatives = Function::new(|a, b| a.binary(function, b).1);
+        let derivatives = BinaryCase::new(|a, b| a.binary(function, b).1);
         for (a, b) in signs {
             check_differences(&format!("{function:?}"), &derivatives, a, b, 1.0 / 512.0);
         }
     }
-    let power = Function::new(|a, b| a.binary(Binary::Powf, b).1);
+    let power = BinaryCase::new(|a, b| a.binary(Binary::Powf, b).1);
     for (a, b) in [(0.7, 1.3), (2.0, -0.5), (3.0, 2.0)] {
         check_differences("Powf", &power, a, b, 1.0 / 512.0);
     }
@@ -212,7 +214,7 @@ fn operands_that_are_not_independent() {
     ];
     for (name, build) in cases {
         for (a, b) in [(0.7, 1.3), (2.0, 0.4)] {
-            check_differences(name, &Function::new(build), a, b, 1.0 / 512.0);
+            check_differences(name, &BinaryCase::new(build), a, b, 1.0 / 512.0);
         }
     }
 }
@@ -221,51 +223,51 @@ fn operands_that_are_not_independent() {
 fn powers() {
     for n in [-3, -2, -1, 0, 1, 2, 3, 4, 7] {
         for a in [-1.4, 0.6, 2.0] {
-            let derivatives = Function::new(|a, _| a.powi(n).1);
+            let derivatives = BinaryCase::new(|a, _| a.powi(n).1);
             check_differences(&format!("powi {n}"), &derivatives, a, 0.0, 1.0 / 512.0);
         }
     }
     for exponent in [-1.5, -1.0, 0.15, 0.5, 1.0, 1.5, 2.0, 3.0, 4.2561, 12.5] {
         for a in [0.6, 1.0, 2.0] {
-            let derivatives = Function::new(|a, _| a.powf(exponent).1);
+            let derivatives = BinaryCase::new(|a, _| a.powf(exponent).1);
             check_differences(&format!("powf {exponent}"), &derivatives, a, 0.0, 1.0 / 512.0);
         }
     }
     // Finite derivatives at zero stay finite.
-    assert_eq!(Function::new(|a, _| a.powf(2.5).1).at(0.0, 0.0), [0.0; 6]);
-    assert_eq!(Function::new(|a, _| a.powf(1.5).1).at(0.0, 0.0)[..2], [0.0; 2]);
-    assert_eq!(Function::new(|a, _| a.powi(3).1).at(0.0, 0.0), [0.0; 6]);
-    assert_eq!(Function::new(|a, _| a.powf(2.0).1).at(0.0, 0.0)[3], 2.0);
-    let power = Function::new(|a, b| a.binary(Binary::Powf, b).1).at(0.0, 3.0);
+    assert_eq!(BinaryCase::new(|a, _| a.powf(2.5).1).values_at(0.0, 0.0), [0.0; 6]);
+    assert_eq!(BinaryCase::new(|a, _| a.powf(1.5).1).values_at(0.0, 0.0)[..2], [0.0; 2]);
+    assert_eq!(BinaryCase::new(|a, _| a.powi(3).1).values_at(0.0, 0.0), [0.0; 6]);
+    assert_eq!(BinaryCase::new(|a, _| a.powf(2.0).1).values_at(0.0, 0.0)[3], 2.0);
+    let power = BinaryCase::new(|a, b| a.binary(Binary::Powf, b).1).values_at(0.0, 3.0);
     assert_eq!(power, [0.0; 6]);
     // Where the derivative is infinite it is not finite.
-    assert!(!Function::new(|a, _| a.powf(0.5).1).at(0.0, 0.0)[1].is_finite());
-    assert!(!Function::new(|a, _| a.powf(1.5).1).at(0.0, 0.0)[3].is_finite());
-    assert_eq!(Function::new(|a, _| a.powi(i32::MIN).1).at(1.0, 0.0)[1], f64::from(i32::MIN));
+    assert!(!BinaryCase::new(|a, _| a.powf(0.5).1).values_at(0.0, 0.0)[1].is_finite());
+    assert!(!BinaryCase::new(|a, _| a.powf(1.5).1).values_at(0.0, 0.0)[3].is_finite());
+    assert_eq!(BinaryCase::new(|a, _| a.powi(i32::MIN).1).values_at(1.0, 0.0)[1], f64::from(i32::MIN));
 }
 
 /// The branch not taken may be singular.
 #[test]
 fn selection_differentiates_the_branch_taken() {
-    let piecewise = Function::new(|a, b| {
+    let piecewise = BinaryCase::new(|a, b| {
         let zero = a.of(0.0);
         zero.if_less(a, b * a.sqrt(), zero).1
     });
-    assert_eq!(piecewise.at(0.0, 3.0), [0.0; 6]);
-    assert_eq!(piecewise.at(-1.0, 3.0), [0.0; 6]);
-    assert_eq!(piecewise.at(4.0, 3.0), [6.0, 0.75, 2.0, -3.0 / 32.0, 0.25, 0.0]);
-    let nested = Function::new(|a, b| {
+    assert_eq!(piecewise.values_at(0.0, 3.0), [0.0; 6]);
+    assert_eq!(piecewise.values_at(-1.0, 3.0), [0.0; 6]);
+    assert_eq!(piecewise.values_at(4.0, 3.0), [6.0, 0.75, 2.0, -3.0 / 32.0, 0.25, 0.0]);
+    let nested = BinaryCase::new(|a, b| {
         let (zero, two) = (a.of(0.0), a.of(2.0));
         let inner = a.if_less(b, a / b, b.unary(Unary::Ln) / a);
         zero.if_less(a, inner, two * b / (a - 1.0)).1
     });
     // 2 b / (a − 1) at a = 0
-    assert_eq!(nested.at(0.0, 3.0), [-6.0, -6.0, -2.0, -12.0, -2.0, 0.0]);
+    assert_eq!(nested.values_at(0.0, 3.0), [-6.0, -6.0, -2.0, -12.0, -2.0, 0.0]);
     check_differences("a / b", &nested, 0.5, 1.5, 1.0 / 512.0);
     check_differences("ln b / a", &nested, 2.0, 0.7, 1.0 / 512.0);
     check_differences("2 b / (a − 1)", &nested, -1.0, 0.7, 1.0 / 512.0);
     // One minimum, both of whose branches contain the variables.
-    let minimum = Function::new(|a, b| {
+    let minimum = BinaryCase::new(|a, b| {
         let product = a * b;
         product.if_less(a, product, a).sqrt().1
     });
@@ -285,7 +287,7 @@ fn the_branch_not_taken_is_singular() {
     let both = zero.if_less(a, root, zero) - small.if_less(a, root * b, zero);
     let f = [one.1, (3.0 * both * b).1];
     let mut g = graph.into_inner();
-    let point = Point { variables: &[0.0, 2.0], seeds: &[1.0, 1.0], ..Point::default() };
+    let point = EvaluationPoint { variables: &[0.0, 2.0], seeds: &[1.0, 1.0], ..EvaluationPoint::default() };
     for order in [Order::Reverse, Order::Forward, Order::Markowitz] {
         let entries = jacobian_in_order(&mut g, &f, 2, order, usize::MAX).map_or(Vec::new(), |j| j.0);
         let nodes: Vec<Node> = entries.iter().map(|entry| entry.2).collect();
@@ -300,7 +302,7 @@ fn the_branch_not_taken_is_singular() {
 /// A selection of constants has no derivative, and a condition none either.
 #[test]
 fn conditions_are_not_differentiated() {
-    let step = Function::new(|a, b| a.if_less(b, a.of(1.0), a.of(-1.0)).1);
+    let step = BinaryCase::new(|a, b| a.if_less(b, a.of(1.0), a.of(-1.0)).1);
     for output in &step.outputs[1..] {
         assert_eq!(step.graph.op(*output), Op::Constant(0));
     }
@@ -311,16 +313,17 @@ fn conditions_are_not_differentiated() {
 fn tables_are_differentiated_by_their_orders() {
     use crate::graph::Table;
     let table = |orders| Table { index: 2, orders, degree: 3 };
-    let one = Function::new(|a, b| (a * b).unary(Unary::Table(Table { index: 1, orders: [0], degree: 3 })).1);
-    let two = Function::new(|a, b| (a * a).binary(Binary::Table(table([0, 0])), b).1);
-    let linear = Function::new(|a, b| {
+    let one =
+        BinaryCase::new(|a, b| (a * b).unary(Unary::Table(Table { index: 1, orders: [0], degree: 3 })).1);
+    let two = BinaryCase::new(|a, b| (a * a).binary(Binary::Table(table([0, 0])), b).1);
+    let linear = BinaryCase::new(|a, b| {
         let line = Table { index: 1, orders: [0], degree: 1 };
         (a.unary(Unary::Table(line)) * b).1
     });
     assert_eq!(linear.graph.value(linear.outputs[3]), Some(0.0));
     let (a, b) = (0.7, -0.4);
-    let s = |order: u8| Table { index: 1, orders: [order], degree: 3 }.stand_in([a * b]);
-    let t = |i, j| table([i, j]).stand_in([a * a, b]);
+    let s = |order: u8| Table { index: 1, orders: [order], degree: 3 }.sample_value([a * b]);
+    let t = |i, j| table([i, j]).sample_value([a * a, b]);
     let expected = [
         [s(0), b * s(1), a * s(1), b * b * s(2), s(1) + a * b * s(2), a * a * s(2)],
         [
@@ -333,13 +336,13 @@ fn tables_are_differentiated_by_their_orders() {
         ],
     ];
     for (function, expected) in [&one, &two].into_iter().zip(&expected) {
-        for (found, expected) in function.at(a, b).into_iter().zip(expected) {
+        for (found, expected) in function.values_at(a, b).into_iter().zip(expected) {
             assert!((found - expected).abs() < 1e-14, "{found} {expected}");
         }
     }
     // Differences of what stands for tables.
     let h = 1e-5;
-    let value = |a, b| two.at(a, b)[0];
+    let value = |a, b| two.values_at(a, b)[0];
     assert!(((value(a + h, b) - value(a - h, b)) / (2.0 * h) - expected[1][1]).abs() < 1e-9);
     assert!(((value(a, b + h) - value(a, b - h)) / (2.0 * h) - expected[1][2]).abs() < 1e-9);
 }

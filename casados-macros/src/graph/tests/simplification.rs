@@ -2,7 +2,7 @@
 
 use super::expression::{E, Random};
 use crate::graph::evaluate::{binary_value, unary_value};
-use crate::graph::{Binary, Compare, Graph, Point, Unary};
+use crate::graph::{Binary, Compare, EvaluationPoint, Graph, Unary};
 use std::cell::RefCell;
 
 /// Random expressions full of zeros, ones, negations and powers of two against the same operations
@@ -56,7 +56,7 @@ fn bits_are_kept() {
         let variables: Vec<f64> = values[..4].to_vec();
         let nodes: Vec<_> = expressions.iter().map(|expression| expression.1).collect();
         let graph = graph.into_inner();
-        let point = Point { variables: &variables, ..Point::default() };
+        let point = EvaluationPoint { variables: &variables, ..EvaluationPoint::default() };
         for (simplified, direct) in graph.evaluate(&nodes, point).into_iter().zip(values) {
             assert_eq!((simplified + 0.0).to_bits(), (direct + 0.0).to_bits(), "{simplified} {direct}");
             compared += 1;
@@ -109,7 +109,7 @@ fn conditions_are_folded() {
     let (a, b) = (g.variable(0), g.variable(1));
     let (one, two) = (g.constant(1.0), g.constant(2.0));
     let open = g.compare(Compare::Lt, a, b);
-    assert_eq!(g.truth(open), None);
+    assert_eq!(g.known_condition(open), None);
     for (comparison, x, y, truth) in [
         (Compare::Lt, one, two, true),
         (Compare::Lt, two, one, false),
@@ -119,17 +119,17 @@ fn conditions_are_folded() {
         (Compare::Lt, a, a, false),
     ] {
         let condition = g.compare(comparison, x, y);
-        assert_eq!(g.truth(condition), Some(truth));
+        assert_eq!(g.known_condition(condition), Some(truth));
         assert_eq!(g.select(condition, a, b), if truth { a } else { b });
         let not = g.not(condition);
-        assert_eq!(g.truth(not), Some(!truth));
+        assert_eq!(g.known_condition(not), Some(!truth));
         let (and, or) = (g.and(condition, open), g.or(open, condition));
         assert_eq!(and, if truth { open } else { condition });
         assert_eq!(or, if truth { condition } else { open });
     }
     // A comparison with itself is false for NaN: only `<` is known.
     let itself = g.compare(Compare::Le, a, a);
-    assert_eq!(g.truth(itself), None);
+    assert_eq!(g.known_condition(itself), None);
     assert_eq!(g.select(open, a, a), a);
     let not = g.not(open);
     assert_eq!(g.not(not), open);
@@ -153,6 +153,6 @@ fn printed() {
         g.print(&[select]),
         "#0 = v[0]\n#1 = mu[1]\n#2 = 0.5\n#3 = Sqrt #0\n#5 = Mul #2 #3\n#6 = Le #5 #1\n#7 = Select #6 #5 #1\n"
     );
-    assert_eq!(g.operations(&[select]), 4);
+    assert_eq!(g.operation_count(&[select]), 4);
     assert_eq!(g.dependencies(&[select, b]), [vec![0], vec![]]);
 }

@@ -1,6 +1,6 @@
 //! Methods of iterators: those that adapt them, search them, or change them in place.
 
-use super::iterator::{Iter, holds, into_iter, known_option};
+use super::iterator::{Iter, holds, into_iter, option_content};
 use super::{Call, Receiver, option};
 use crate::language::arithmetic::Comparison;
 use crate::language::evaluator::{Evaluator, error};
@@ -37,17 +37,17 @@ pub fn method(
         return Ok(None);
     }
     let iter = into_iter(evaluator, value.clone(), call.at)?;
-    if let Some(value) = in_place(evaluator, receiver, iter.clone(), call)? {
+    if let Some(value) = mutating_method(evaluator, receiver, iter.clone(), call)? {
         return Ok(Some(value));
     }
-    if let Some(adapted) = adapt(evaluator, iter.clone(), call)? {
+    if let Some(adapted) = adaptor_method(evaluator, iter.clone(), call)? {
         return Ok(Some(Value::iterator(adapted)));
     }
     super::consume::consume(evaluator, iter, call)
 }
 
 /// Methods that take `&mut self`.
-fn in_place(
+fn mutating_method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
     mut iter: Iter,
@@ -87,7 +87,7 @@ fn in_place(
                 Receiver::Value(value) => value.clone(),
             }));
         }
-        "find" | "position" | "any" | "all" | "find_map" => search(evaluator, &mut iter, call)?,
+        "find" | "position" | "any" | "all" | "find_map" => searching_method(evaluator, &mut iter, call)?,
         _ => return Ok(None),
     };
     option::update(evaluator, receiver, Value::iterator(iter), call)?;
@@ -95,7 +95,7 @@ fn in_place(
 }
 
 /// Methods that stop early.
-fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Value> {
+fn searching_method(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Value> {
     let (closure, at) = (call.only()?, call.at);
     match call.name {
         "any" | "all" => {
@@ -111,7 +111,7 @@ fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Val
                 let holds = match result {
                     Value::Condition(node) => {
                         let undecided = if any { evaluator.graph.not(node) } else { node };
-                        evaluator.only_if(undecided, next, at)?
+                        evaluator.run_conditionally(undecided, next, at)?
                     }
                     _ => next(evaluator)?,
                 };
@@ -130,7 +130,7 @@ fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Val
         "find_map" => {
             while let Some(value) = iter.next(evaluator, at)? {
                 let value = evaluator.call(closure, vec![value], at)?;
-                if let Some(value) = known_option(value, at)? {
+                if let Some(value) = option_content(value, at)? {
                     return Ok(Value::some(value));
                 }
             }
@@ -150,12 +150,12 @@ fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Val
 }
 
 /// Adaptors.
-fn adapt(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<Iter>> {
+fn adaptor_method(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<Iter>> {
     let at = call.at;
     let inner = Box::new(iter);
     Ok(Some(match call.name {
         "iter" | "into_iter" | "copied" | "cloned" | "fuse" => {
-            call.expect(0)?;
+            call.expect_argument_count(0)?;
             *inner
         }
         "zip" => Iter::Zip(inner, Box::new(into_iter(evaluator, call.only()?.clone(), at)?)),
@@ -173,7 +173,7 @@ fn adapt(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<It
         "skip_while" => Iter::SkipWhile(inner, Some(call.only()?.clone())),
         "map_while" => Iter::MapWhile(Some(inner), call.only()?.clone()),
         "scan" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             Iter::Scan { inner, state: call.arguments[0].clone(), closure: call.arguments[1].clone() }
         }
         "rev" => Iter::Rev(inner),

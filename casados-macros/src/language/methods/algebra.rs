@@ -8,7 +8,7 @@ use super::Call;
 use super::block::column;
 use crate::graph::{Binary, Node, Unary};
 use crate::language::arithmetic::Operator;
-use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::evaluator::{Evaluator, TokenSpan, error, unsupported};
 use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
@@ -19,7 +19,7 @@ pub fn operator(
     operator: Operator,
     a: &Value,
     b: &Value,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     match (operator, a, b) {
         (Operator::Add | Operator::Sub, Value::Matrix(x), Value::Matrix(y)) => {
@@ -53,8 +53,8 @@ pub(super) fn shapes(symbol: &str, a: &Matrix, b: &Matrix) -> String {
 }
 
 /// `Σₖ a_ik b_kj`, from the first `k` to the last.
-pub(super) fn product(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> Result<Value> {
-    evaluator.tick(a.rows.saturating_mul(a.columns).saturating_mul(b.columns), at)?;
+pub(super) fn product(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSpan) -> Result<Value> {
+    evaluator.count_steps(a.rows.saturating_mul(a.columns).saturating_mul(b.columns), at)?;
     let (x, y) = (nodes(evaluator, a, at)?, nodes(evaluator, b, at)?);
     let mut elements = Vec::with_capacity(a.rows * b.columns);
     for j in 0..b.columns {
@@ -75,7 +75,7 @@ pub(super) fn product(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At)
 }
 
 /// `Σ aᵢⱼ bᵢⱼ` in the order of nalgebra's `dot`.
-pub(super) fn dot(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> Result<Node> {
+pub(super) fn dot(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSpan) -> Result<Node> {
     let terms = products(evaluator, a, b, at)?;
     let mut add = |a: Node, b: Node| evaluator.graph.binary(Binary::Add, a, b);
     if a.columns == 1 {
@@ -117,7 +117,7 @@ pub(super) fn dot(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> 
 }
 
 /// Column after column, as nalgebra does it.
-pub(super) fn norm_squared(evaluator: &mut Evaluator, matrix: &Matrix, at: At) -> Result<Node> {
+pub(super) fn norm_squared(evaluator: &mut Evaluator, matrix: &Matrix, at: TokenSpan) -> Result<Node> {
     let mut sum = evaluator.graph.constant(0.0);
     for c in 0..matrix.columns {
         let column = column(matrix, c);
@@ -127,7 +127,7 @@ pub(super) fn norm_squared(evaluator: &mut Evaluator, matrix: &Matrix, at: At) -
     Ok(sum)
 }
 
-pub(super) fn determinant(evaluator: &mut Evaluator, matrix: &Matrix, at: At) -> Result<Node> {
+pub(super) fn determinant(evaluator: &mut Evaluator, matrix: &Matrix, at: TokenSpan) -> Result<Node> {
     if matrix.rows != matrix.columns {
         return Err(error(at, "`determinant` is of a square matrix"));
     }
@@ -167,11 +167,16 @@ pub(super) fn same_shape(a: &Matrix, b: &Matrix, call: &Call) -> Result<()> {
 }
 
 /// The elements as numbers.
-pub fn nodes(evaluator: &mut Evaluator, matrix: &Matrix, at: At) -> Result<Vec<Node>> {
+pub fn nodes(evaluator: &mut Evaluator, matrix: &Matrix, at: TokenSpan) -> Result<Vec<Node>> {
     matrix.elements.iter().map(|element| evaluator.real(element, at)).collect()
 }
 
-pub(super) fn products(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> Result<Vec<Node>> {
+pub(super) fn products(
+    evaluator: &mut Evaluator,
+    a: &Matrix,
+    b: &Matrix,
+    at: TokenSpan,
+) -> Result<Vec<Node>> {
     let (a, b) = (nodes(evaluator, a, at)?, nodes(evaluator, b, at)?);
     Ok(a.into_iter().zip(b).map(|(a, b)| evaluator.graph.binary(Binary::Mul, a, b)).collect())
 }
@@ -181,7 +186,7 @@ pub(super) fn zip(
     a: &Matrix,
     b: &Matrix,
     operation: Binary,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Matrix> {
     let (x, y) = (nodes(evaluator, a, at)?, nodes(evaluator, b, at)?);
     let elements = x.into_iter().zip(y).map(|(x, y)| Value::Real(evaluator.graph.binary(operation, x, y)));
@@ -193,14 +198,19 @@ pub(super) fn scale(
     a: &Matrix,
     operation: Binary,
     factor: Node,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Value> {
     let x = nodes(evaluator, a, at)?;
     let elements = x.into_iter().map(|x| Value::Real(evaluator.graph.binary(operation, x, factor))).collect();
     Ok(Value::matrix(a.rows, a.columns, elements))
 }
 
-pub(super) fn elementwise(evaluator: &mut Evaluator, a: &Matrix, function: Unary, at: At) -> Result<Value> {
+pub(super) fn elementwise(
+    evaluator: &mut Evaluator,
+    a: &Matrix,
+    function: Unary,
+    at: TokenSpan,
+) -> Result<Value> {
     let x = nodes(evaluator, a, at)?;
     let elements = x.into_iter().map(|x| Value::Real(evaluator.graph.unary(function, x))).collect();
     Ok(Value::matrix(a.rows, a.columns, elements))

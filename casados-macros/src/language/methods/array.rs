@@ -17,19 +17,23 @@ pub fn method(
     call: &Call,
 ) -> Result<Option<Value>> {
     let Value::Array(elements) = value else { return Ok(None) };
-    let found = read(evaluator, elements, call)?;
+    let found = reading_method(evaluator, elements, call)?;
     if found.is_some() {
         return Ok(found);
     }
-    let found = parts(evaluator, receiver, elements, call)?;
+    let found = splitting_method(evaluator, receiver, elements, call)?;
     if found.is_some() {
         return Ok(found);
     }
-    change(evaluator, receiver, elements, call)
+    mutating_method(evaluator, receiver, elements, call)
 }
 
 /// Methods that only read.
-fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Result<Option<Value>> {
+fn reading_method(
+    evaluator: &mut Evaluator,
+    elements: &Rc<Vec<Value>>,
+    call: &Call,
+) -> Result<Option<Value>> {
     let (at, length) = (call.at, elements.len());
     let value = match call.name {
         "len" => Value::usize(length),
@@ -40,9 +44,9 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
         "as_slice" | "each_ref" | "as_array" => Value::Array(elements.clone()),
         "first" => Value::Option(elements.first().cloned().map(Box::new)),
         "last" => Value::Option(elements.last().cloned().map(Box::new)),
-        "get" => match evaluator.load(call.only()?.clone(), at)? {
+        "get" => match evaluator.follow_value(call.only()?.clone(), at)? {
             Value::Range(range) => {
-                let (start, end) = evaluator.bounds(&range, length, at)?;
+                let (start, end) = evaluator.range_bounds(&range, length, at)?;
                 Value::Option(elements.get(start..end).map(|part| Box::new(Value::array(part.to_vec()))))
             }
             index => {
@@ -62,10 +66,13 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
         "concat" | "as_flattened" => {
             let mut all = Vec::new();
             for element in elements.iter() {
-                match evaluator.load(element.clone(), at)? {
+                match evaluator.follow_value(element.clone(), at)? {
                     Value::Array(inner) => all.extend(inner.iter().cloned()),
                     other => {
-                        return Err(error(at, format!("`{}` of arrays, not of {}", call.name, other.kind())));
+                        return Err(error(
+                            at,
+                            format!("`{}` of arrays, not of {}", call.name, other.description()),
+                        ));
                     }
                 }
             }
@@ -82,7 +89,7 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
         }
         "windows" | "chunks" | "chunks_exact" | "rchunks" | "array_windows" | "as_chunks"
         | "array_chunks" => {
-            return slices(evaluator, elements, call).map(Some);
+            return slicing_method(evaluator, elements, call).map(Some);
         }
         "sum" | "product" | "fold" | "zip" | "enumerate" | "rev" => {
             return Err(error(
@@ -102,7 +109,7 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
 }
 
 /// Consecutive parts of an array.
-fn slices(evaluator: &mut Evaluator, elements: &[Value], call: &Call) -> Result<Value> {
+fn slicing_method(evaluator: &mut Evaluator, elements: &[Value], call: &Call) -> Result<Value> {
     let of_const = matches!(call.name, "array_windows" | "as_chunks" | "array_chunks");
     let size = match (of_const, call.constant()) {
         (true, Some(size)) => usize::try_from(size).unwrap_or(0),
@@ -121,7 +128,7 @@ fn slices(evaluator: &mut Evaluator, elements: &[Value], call: &Call) -> Result<
         "rchunks" => elements.rchunks(size).map(slice).collect(),
         _ => elements.chunks_exact(size).map(slice).collect(),
     };
-    evaluator.tick(parts.len().saturating_mul(size), call.at)?;
+    evaluator.count_steps(parts.len().saturating_mul(size), call.at)?;
     if call.name == "as_chunks" {
         let rest = elements.len() - elements.len() % size;
         return Ok(Value::tuple(vec![Value::array(parts), slice(&elements[rest..])]));
@@ -130,7 +137,7 @@ fn slices(evaluator: &mut Evaluator, elements: &[Value], call: &Call) -> Result<
 }
 
 /// Methods that split, and those that give out `&mut` to parts.
-fn parts(
+fn splitting_method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
     elements: &Rc<Vec<Value>>,
@@ -144,7 +151,7 @@ fn parts(
             Receiver::Place(place) if mutable => {
                 Ok(Value::Reference(evaluator.project(place, projection, at)?))
             }
-            _ => evaluator.part(&Value::Array(elements.clone()), projection, at),
+            _ => evaluator.value_part(&Value::Array(elements.clone()), projection, at),
         }
     };
     let value = match call.name.trim_end_matches("_mut") {
@@ -218,7 +225,7 @@ fn parts(
 }
 
 /// Methods that change the array.
-fn change(
+fn mutating_method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
     elements: &Rc<Vec<Value>>,
@@ -228,7 +235,7 @@ fn change(
     let mut new = (**elements).clone();
     match call.name {
         "fill" => {
-            let value = evaluator.load(call.only()?.clone(), at)?;
+            let value = evaluator.follow_value(call.only()?.clone(), at)?;
             new.fill(value);
         }
         "fill_with" => {
@@ -237,7 +244,7 @@ fn change(
             }
         }
         "swap" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let (a, b) = (evaluator.usize(&call.arguments[0], at)?, evaluator.usize(&call.arguments[1], at)?);
             if let Some(out) = [a, b].into_iter().find(|&index| index >= length) {
                 return Err(error(
@@ -255,7 +262,7 @@ fn change(
             }
             if call.name == "rotate_left" { new.rotate_left(by) } else { new.rotate_right(by) }
         }
-        "copy_from_slice" | "clone_from_slice" => match evaluator.load(call.only()?.clone(), at)? {
+        "copy_from_slice" | "clone_from_slice" => match evaluator.follow_value(call.only()?.clone(), at)? {
             Value::Array(source) if source.len() == length => new.clone_from_slice(&source),
             Value::Array(source) => {
                 return Err(error(
@@ -267,7 +274,7 @@ fn change(
                     ),
                 ));
             }
-            other => return Err(error(at, format!("expected a slice, found {}", other.kind()))),
+            other => return Err(error(at, format!("expected a slice, found {}", other.description()))),
         },
         "sort" | "sort_by" | "sort_unstable" | "sort_unstable_by" | "sort_by_key" => {
             return Err(unsupported(at, format!("`{}`, whose order depends on values,", call.name)));

@@ -60,12 +60,12 @@ pub(super) fn blocks(
         Receiver::Place(place) if mutable => {
             Ok(Some(Value::Reference(evaluator.project(place, projection, at)?)))
         }
-        _ => evaluator.part(&Value::Matrix(matrix.clone()), projection, at).map(Some),
+        _ => evaluator.value_part(&Value::Matrix(matrix.clone()), projection, at).map(Some),
     }
 }
 
 /// Methods that change the matrix.
-pub(super) fn change(
+pub(super) fn mutating_method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
     matrix: &Rc<Matrix>,
@@ -102,7 +102,7 @@ pub(super) fn change(
             (0..rows.min(columns)).for_each(|i| new.elements[i + i * rows] = value.clone());
         }
         "set_column" | "set_row" => {
-            set_line(evaluator, &mut new, call)?;
+            set_row_or_column(evaluator, &mut new, call)?;
         }
         "set_diagonal" => {
             let source = argument(evaluator, call, 0)?;
@@ -139,9 +139,9 @@ pub(super) fn change(
 }
 
 /// A column or a row of a matrix.
-fn set_line(evaluator: &mut Evaluator, new: &mut Matrix, call: &Call) -> Result<()> {
+fn set_row_or_column(evaluator: &mut Evaluator, new: &mut Matrix, call: &Call) -> Result<()> {
     let (at, rows, columns) = (call.at, new.rows, new.columns);
-    call.expect(2)?;
+    call.expect_argument_count(2)?;
     let index = evaluator.usize(&call.arguments[0], at)?;
     let source = argument(evaluator, call, 1)?;
     let by_column = call.name == "set_column";

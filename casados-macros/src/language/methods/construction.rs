@@ -1,7 +1,7 @@
 //! Construction of nalgebra matrices: `Vector3::new`, `SMatrix::from_row_slice`, ..
 
 use super::Call;
-use crate::language::evaluator::{At, Evaluator, error};
+use crate::language::evaluator::{Evaluator, TokenSpan, error};
 use crate::language::types::Type;
 use crate::language::value::{Builtin, Matrix, Value};
 use std::rc::Rc;
@@ -13,12 +13,12 @@ pub fn from_arrays(
     elements: &[Value],
     rows: Option<usize>,
     columns: Option<usize>,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Value> {
     let mut all = Vec::new();
     let mut height = None;
     for element in elements {
-        match evaluator.load(element.clone(), at)? {
+        match evaluator.follow_value(element.clone(), at)? {
             Value::Array(column) => {
                 if *height.get_or_insert(column.len()) != column.len() {
                     return Err(error(at, "the columns have different lengths"));
@@ -75,7 +75,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
             let (rows, columns) = size(evaluator)?;
             let closure = call.only()?;
             from_fn(rows, columns, |r, c| {
-                evaluator.tick(1, at)?;
+                evaluator.count_steps(1, at)?;
                 evaluator.call(closure, vec![Value::usize(r), Value::usize(c)], at)
             })?
         }
@@ -83,7 +83,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         "new" => {
             let (rows, columns) = size(evaluator)?;
             let elements = reals(evaluator, &call.arguments, at)?;
-            fits(elements.len(), rows, columns, at)?;
+            check_element_count(elements.len(), rows, columns, at)?;
             from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))?
         }
         "from_row_slice"
@@ -94,13 +94,13 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         | "from_row_iterator"
         | "from_column_iterator"
         | "from_iterator" => from_list(evaluator, name, call, (rows, columns))?,
-        "from" => match evaluator.load(call.only()?.clone(), at)? {
+        "from" => match evaluator.follow_value(call.only()?.clone(), at)? {
             Value::Array(elements) => from_arrays(evaluator, &elements, rows, columns, at)?,
             other => other,
         },
         "from_columns" | "from_rows" => from_vectors(evaluator, name, call, (rows, columns))?,
         "from_diagonal" => {
-            let Value::Matrix(diagonal) = evaluator.load(call.only()?.clone(), at)? else {
+            let Value::Matrix(diagonal) = evaluator.follow_value(call.only()?.clone(), at)? else {
                 return Err(error(at, "`from_diagonal` takes a vector"));
             };
             let zero = constant(evaluator, 0.0);
@@ -122,11 +122,11 @@ fn known_size(
     evaluator: &mut Evaluator,
     name: &str,
     size: (Option<usize>, Option<usize>),
-    at: At,
+    at: TokenSpan,
 ) -> Result<(usize, usize)> {
     match size {
         (Some(rows), Some(columns)) => {
-            evaluator.tick(rows.saturating_mul(columns), at)?;
+            evaluator.count_steps(rows.saturating_mul(columns), at)?;
             Ok((rows, columns))
         }
         _ => Err(error(
@@ -145,12 +145,12 @@ fn from_list(
     call: &Call,
     (rows, columns): (Option<usize>, Option<usize>),
 ) -> Result<Value> {
-    let elements = elements_of(evaluator, call, rows.zip(columns))?;
+    let elements = take_elements(evaluator, call, rows.zip(columns))?;
     let (rows, columns) = match (rows, columns) {
         (None, Some(1)) => (elements.len(), 1),
         size => known_size(evaluator, name, size, call.at)?,
     };
-    fits(elements.len(), rows, columns, call.at)?;
+    check_element_count(elements.len(), rows, columns, call.at)?;
     if name.starts_with("from_row") {
         from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))
     } else {
@@ -158,11 +158,11 @@ fn from_list(
     }
 }
 
-fn reals(evaluator: &mut Evaluator, values: &[Value], at: At) -> Result<Vec<Value>> {
+fn reals(evaluator: &mut Evaluator, values: &[Value], at: TokenSpan) -> Result<Vec<Value>> {
     values.iter().map(|value| evaluator.real(value, at).map(Value::Real)).collect()
 }
 
-fn fits(found: usize, rows: usize, columns: usize, at: At) -> Result<()> {
+fn check_element_count(found: usize, rows: usize, columns: usize, at: TokenSpan) -> Result<()> {
     if found == rows * columns {
         return Ok(());
     }
@@ -187,10 +187,10 @@ fn from_fn(
 }
 
 /// Numbers of an iterator, at most as many as there are elements.
-fn elements_of(evaluator: &mut Evaluator, call: &Call, size: Option<(usize, usize)>) -> Result<Vec<Value>> {
+fn take_elements(evaluator: &mut Evaluator, call: &Call, size: Option<(usize, usize)>) -> Result<Vec<Value>> {
     let at = call.at;
     let mut elements = Vec::new();
-    let source = evaluator.load(call.only()?.clone(), at)?;
+    let source = evaluator.follow_value(call.only()?.clone(), at)?;
     let mut iter = super::iterator::into_iter(evaluator, source, at)?;
     let limit = size.map_or(usize::MAX, |(rows, columns)| rows.saturating_mul(columns));
     while elements.len() < limit {
@@ -208,14 +208,14 @@ fn from_vectors(
     (rows, columns): (Option<usize>, Option<usize>),
 ) -> Result<Value> {
     let at = call.at;
-    let Value::Array(parts) = evaluator.load(call.only()?.clone(), at)? else {
+    let Value::Array(parts) = evaluator.follow_value(call.only()?.clone(), at)? else {
         return Err(error(at, format!("`{name}` takes an array of vectors")));
     };
     let mut vectors: Vec<Rc<Matrix>> = Vec::new();
     for part in parts.iter() {
-        match evaluator.load(part.clone(), at)? {
+        match evaluator.follow_value(part.clone(), at)? {
             Value::Matrix(vector) => vectors.push(vector),
-            other => return Err(error(at, format!("expected a vector, found {}", other.kind()))),
+            other => return Err(error(at, format!("expected a vector, found {}", other.description()))),
         }
     }
     let length = vectors.first().map_or(0, |vector| vector.elements.len());

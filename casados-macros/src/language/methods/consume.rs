@@ -12,7 +12,7 @@ use syn::Result;
 pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let value = match call.name {
-        "fold" | "rfold" | "reduce" | "sum" | "product" => fold(evaluator, iter, call)?,
+        "fold" | "rfold" | "reduce" | "sum" | "product" => reducing_method(evaluator, iter, call)?,
         "for_each" => {
             let closure = call.only()?;
             while let Some(value) = iter.next(evaluator, at)? {
@@ -37,7 +37,7 @@ pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result
         }
         "min" | "max" | "min_by_key" | "max_by_key" => extreme(evaluator, iter, call)?,
         "eq" | "ne" | "lt" | "le" | "gt" | "ge" => {
-            let Some((_, Some(comparison))) = float::operator(call.name) else { return Ok(None) };
+            let Some((_, Some(comparison))) = float::operator_by_name(call.name) else { return Ok(None) };
             let mut other = super::iterator::into_iter(evaluator, call.only()?.clone(), at)?;
             let (mut a, mut b) = (Vec::new(), Vec::new());
             while let Some(value) = iter.next(evaluator, at)? {
@@ -69,11 +69,11 @@ pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result
 }
 
 /// One value out of all.
-fn fold(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
+fn reducing_method(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
     let at = call.at;
     Ok(match call.name {
         "fold" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let mut accumulated = call.arguments[0].clone();
             while let Some(value) = iter.next(evaluator, at)? {
                 accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
@@ -81,7 +81,7 @@ fn fold(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value>
             accumulated
         }
         "rfold" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let mut accumulated = call.arguments[0].clone();
             while let Some(value) = iter.next_back(evaluator, at)? {
                 accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
@@ -103,9 +103,9 @@ fn fold(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value>
         _ => {
             let operator = if call.name == "sum" { Operator::Add } else { Operator::Mul };
             let Some(first) = iter.next(evaluator, at)? else {
-                return empty(evaluator, call);
+                return empty_result(evaluator, call);
             };
-            let mut accumulated = evaluator.load(first, at)?;
+            let mut accumulated = evaluator.follow_value(first, at)?;
             while let Some(value) = iter.next(evaluator, at)? {
                 accumulated = evaluator.binary(operator, &accumulated, &value, at)?;
             }
@@ -115,7 +115,7 @@ fn fold(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value>
 }
 
 /// The sum or product of nothing.
-fn empty(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
+fn empty_result(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     let given = call.turbofish.iter().find_map(|generic| match generic {
         Generic::Type(Type::Unknown) | Generic::Const(_) => None,
         Generic::Type(ty) => Some(ty.clone()),

@@ -15,11 +15,11 @@ use syn::Result;
 /// A method of `f64`. `None` if there is no such method.
 pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value>> {
     if let Some(function) = unary(call.name) {
-        call.expect(0)?;
+        call.expect_argument_count(0)?;
         return Ok(Some(Value::Real(evaluator.graph.unary(function, a))));
     }
-    if let Some((operator, comparison)) = operator(call.name) {
-        call.expect(1)?;
+    if let Some((operator, comparison)) = operator_by_name(call.name) {
+        call.expect_argument_count(1)?;
         let other = &call.arguments[0];
         let a = Value::Real(a);
         return match (operator, comparison) {
@@ -31,19 +31,19 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
     let value = match call.name {
         "neg" => evaluator.graph.unary(Unary::Neg, a),
         "sin_cos" => {
-            call.expect(0)?;
+            call.expect_argument_count(0)?;
             let sin = evaluator.graph.unary(Unary::Sin, a);
             let cos = evaluator.graph.unary(Unary::Cos, a);
             return Ok(Some(Value::tuple(vec![Value::Real(sin), Value::Real(cos)])));
         }
         "powi" => {
-            call.expect(1)?;
+            call.expect_argument_count(1)?;
             let n = evaluator.integer(&call.arguments[0], call.at)?.value;
             let n = i32::try_from(n).map_err(|_| error(call.at, format!("the exponent {n} is no `i32`")))?;
             evaluator.graph.powi(a, n)
         }
         "powf" | "atan2" | "hypot" => {
-            let [b] = numbers(evaluator, call)?;
+            let [b] = argument_nodes(evaluator, call)?;
             let function = match call.name {
                 "powf" => Binary::Powf,
                 "atan2" => Binary::Atan2,
@@ -52,58 +52,58 @@ pub fn method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<
             evaluator.graph.binary(function, a, b)
         }
         "log" => {
-            let [base] = numbers(evaluator, call)?;
+            let [base] = argument_nodes(evaluator, call)?;
             let (a, base) = (evaluator.graph.unary(Unary::Ln, a), evaluator.graph.unary(Unary::Ln, base));
             evaluator.graph.binary(Binary::Div, a, base)
         }
         "mul_add" => {
-            let [b, c] = numbers(evaluator, call)?;
+            let [b, c] = argument_nodes(evaluator, call)?;
             let product = evaluator.graph.binary(Binary::Mul, a, b);
             evaluator.graph.binary(Binary::Add, product, c)
         }
         "recip" => {
-            call.expect(0)?;
+            call.expect_argument_count(0)?;
             let one = evaluator.graph.constant(1.0);
             evaluator.graph.binary(Binary::Div, one, a)
         }
         "max" => {
-            let [b] = numbers(evaluator, call)?;
-            larger(evaluator, a, b)
+            let [b] = argument_nodes(evaluator, call)?;
+            max_node(evaluator, a, b)
         }
         "min" => {
-            let [b] = numbers(evaluator, call)?;
-            smaller(evaluator, a, b)
+            let [b] = argument_nodes(evaluator, call)?;
+            min_node(evaluator, a, b)
         }
         "clamp" => clamp(evaluator, a, call)?,
         "copysign" => copysign(evaluator, a, call)?,
         "to_radians" => {
-            call.expect(0)?;
+            call.expect_argument_count(0)?;
             let factor = evaluator.graph.constant(core::f64::consts::PI / 180.0);
             evaluator.graph.binary(Binary::Mul, a, factor)
         }
         "to_degrees" => {
-            call.expect(0)?;
+            call.expect_argument_count(0)?;
             let factor = evaluator.graph.constant(180.0 / core::f64::consts::PI);
             evaluator.graph.binary(Binary::Mul, a, factor)
         }
-        _ => return known(evaluator, a, call),
+        _ => return known_number_method(evaluator, a, call),
     };
     Ok(Some(Value::Real(value)))
 }
 
 fn clamp(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
-    let [low, high] = numbers(evaluator, call)?;
+    let [low, high] = argument_nodes(evaluator, call)?;
     if let (Some(low), Some(high)) = (evaluator.graph.value(low), evaluator.graph.value(high))
         && !matches!(low.partial_cmp(&high), Some(Ordering::Less | Ordering::Equal))
     {
         return Err(error(call.at, format!("the bounds of `clamp` are {low} > {high}, or NaN")));
     }
-    let a = larger(evaluator, a, low);
-    Ok(smaller(evaluator, a, high))
+    let a = max_node(evaluator, a, low);
+    Ok(min_node(evaluator, a, high))
 }
 
 fn copysign(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
-    let [sign] = numbers(evaluator, call)?;
+    let [sign] = argument_nodes(evaluator, call)?;
     let size = evaluator.graph.unary(Unary::Abs, a);
     Ok(match evaluator.graph.value(sign) {
         Some(sign) if sign.is_sign_negative() => evaluator.graph.unary(Unary::Neg, size),
@@ -116,7 +116,7 @@ fn copysign(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Node> {
 }
 
 /// `a` if it is not less than `b`.
-fn larger(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
+fn max_node(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
     if let (Some(a), Some(b)) = (evaluator.graph.value(a), evaluator.graph.value(b)) {
         return evaluator.graph.constant(a.max(b));
     }
@@ -125,7 +125,7 @@ fn larger(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
 }
 
 /// `a` if it is not greater than `b`.
-fn smaller(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
+fn min_node(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
     if let (Some(a), Some(b)) = (evaluator.graph.value(a), evaluator.graph.value(b)) {
         return evaluator.graph.constant(a.min(b));
     }
@@ -135,7 +135,7 @@ fn smaller(evaluator: &mut Evaluator, a: Node, b: Node) -> Node {
 
 /// Methods of known numbers.
 #[rustfmt::skip]
-const KNOWN: &[&str] = &[
+const KNOWN_NUMBER_METHODS: &[&str] = &[
     "floor", "ceil", "round", "round_ties_even", "trunc", "fract", "rem_euclid", "div_euclid", "is_nan",
     "is_finite", "is_infinite", "is_sign_positive", "is_sign_negative", "total_cmp", "partial_cmp", "to_bits",
 ];
@@ -143,14 +143,14 @@ const KNOWN: &[&str] = &[
 /// Whether `f64` has a method of its own of a name, not by a trait.
 pub fn is_inherent(name: &str) -> bool {
     unary(name).is_some()
-        || KNOWN.contains(&name) && name != "partial_cmp"
+        || KNOWN_NUMBER_METHODS.contains(&name) && name != "partial_cmp"
         || matches!(name, "sin_cos" | "powi" | "powf" | "atan2" | "hypot" | "log" | "mul_add" | "recip")
         || matches!(name, "max" | "min" | "clamp" | "copysign" | "to_radians" | "to_degrees")
 }
 
 /// Methods without a useful derivative: of numbers that are known, they are known too.
-fn known(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value>> {
-    if !KNOWN.contains(&call.name) {
+fn known_number_method(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value>> {
+    if !KNOWN_NUMBER_METHODS.contains(&call.name) {
         return Ok(None);
     }
     let refuse = || unsupported(call.at, format!("`{}` of a model variable", call.name));
@@ -163,7 +163,7 @@ fn known(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value
         "trunc" => a.trunc(),
         "fract" => a.fract(),
         "rem_euclid" | "div_euclid" => {
-            let [b] = numbers(evaluator, call)?;
+            let [b] = argument_nodes(evaluator, call)?;
             let b = evaluator.graph.value(b).ok_or_else(refuse)?;
             if call.name == "rem_euclid" { a.rem_euclid(b) } else { a.div_euclid(b) }
         }
@@ -178,8 +178,8 @@ fn known(evaluator: &mut Evaluator, a: Node, call: &Call) -> Result<Option<Value
 }
 
 /// The arguments as numbers.
-fn numbers<const N: usize>(evaluator: &mut Evaluator, call: &Call) -> Result<[Node; N]> {
-    call.expect(N)?;
+fn argument_nodes<const N: usize>(evaluator: &mut Evaluator, call: &Call) -> Result<[Node; N]> {
+    call.expect_argument_count(N)?;
     let mut numbers = [Node(0); N];
     for (number, argument) in numbers.iter_mut().zip(&call.arguments) {
         *number = evaluator.real(argument, call.at)?;
@@ -217,7 +217,7 @@ fn unary(name: &str) -> Option<Unary> {
 }
 
 /// Methods of `core::ops` and `core::cmp`.
-pub fn operator(name: &str) -> Option<(Option<Operator>, Option<Comparison>)> {
+pub fn operator_by_name(name: &str) -> Option<(Option<Operator>, Option<Comparison>)> {
     Some(match name {
         "add" => (Some(Operator::Add), None),
         "sub" => (Some(Operator::Sub), None),

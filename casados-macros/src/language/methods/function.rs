@@ -2,7 +2,7 @@
 
 use super::iterator::{self, Iter};
 use super::{Call, float, integer, matrix, table};
-use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::evaluator::{Evaluator, TokenSpan, error, unsupported};
 use crate::language::place::Place;
 use crate::language::types::Type;
 use crate::language::value::{Builtin, Function, Integer, IntegerType, Struct, Value};
@@ -28,13 +28,13 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
         ("array", "from_ref") | ("convert", "identity") => call.only()?.clone(),
         ("array", "repeat") => {
             let length = array_length(call)?;
-            evaluator.tick(length, at)?;
+            evaluator.count_steps(length, at)?;
             Value::array(vec![call.only()?.clone(); length])
         }
-        ("iter", _) => return made_iterator(evaluator, name, call),
-        ("mem", "swap" | "replace") => exchange(evaluator, name, call)?,
+        ("iter", _) => return iterator_constructor(evaluator, name, call),
+        ("mem", "swap" | "replace") => swap_or_replace(evaluator, name, call)?,
         ("cmp", "min" | "max") => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let a = evaluator.integer(&call.arguments[0], at)?;
             let inner = Call {
                 name,
@@ -47,7 +47,7 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
         }
         ("mem" | "", "drop") => Value::unit(),
         ("", "Some" | "Ok") | ("Option", "Some") | ("Result", "Ok") => Value::some(call.only()?.clone()),
-        ("f64", "from") => match evaluator.load(call.only()?.clone(), at)? {
+        ("f64", "from") => match evaluator.follow_value(call.only()?.clone(), at)? {
             Value::Integer(integer) => Value::Real(evaluator.graph.constant(integer.value as f64)),
             Value::Bool(known) => Value::Real(evaluator.graph.constant(f64::from(u8::from(known)))),
             other => Value::Real(evaluator.real(&other, at)?),
@@ -62,13 +62,14 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
                 ty => default(evaluator, &ty, at).map(Some),
             };
         }
-        (ty, "from" | "try_from") if IntegerType::named(ty).is_some() => {
-            let integer = match evaluator.load(call.only()?.clone(), at)? {
+        (ty, "from" | "try_from") if IntegerType::by_name(ty).is_some() => {
+            let integer = match evaluator.follow_value(call.only()?.clone(), at)? {
                 Value::Bool(known) => Integer { value: i128::from(known), ty: None },
                 value => evaluator.integer(&value, at)?,
             };
-            let ty = IntegerType::named(ty);
-            let fitted = crate::language::arithmetic::fit(Some(integer.value), ty).map(Value::Integer);
+            let ty = IntegerType::by_name(ty);
+            let fitted =
+                crate::language::arithmetic::checked_integer(Some(integer.value), ty).map(Value::Integer);
             match (name, fitted) {
                 ("try_from", fitted) => Value::Option(fitted.map(Box::new)),
                 (_, Some(value)) => value,
@@ -87,12 +88,12 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
 }
 
 /// Iterators of `core::iter`.
-fn made_iterator(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Option<Value>> {
+fn iterator_constructor(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     Ok(Some(match name {
         "repeat" => Value::iterator(Iter::Repeat(call.only()?.clone())),
         "repeat_n" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let n = evaluator.usize(&call.arguments[1], at)?;
             Value::iterator(Iter::Take(Box::new(Iter::Repeat(call.arguments[0].clone())), n))
         }
@@ -100,16 +101,18 @@ fn made_iterator(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<O
         "once" => Value::iterator(Iter::of(vec![call.only()?.clone()])),
         "empty" => Value::iterator(Iter::of(Vec::new())),
         "successors" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             match &call.arguments[0] {
                 Value::Option(first) => {
                     Value::iterator(Iter::Successors(first.clone(), call.arguments[1].clone()))
                 }
-                other => return Err(error(at, format!("expected an `Option`, found {}", other.kind()))),
+                other => {
+                    return Err(error(at, format!("expected an `Option`, found {}", other.description())));
+                }
             }
         }
         "zip" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let a = iterator::into_iter(evaluator, call.arguments[0].clone(), at)?;
             let b = iterator::into_iter(evaluator, call.arguments[1].clone(), at)?;
             Value::iterator(Iter::Zip(Box::new(a), Box::new(b)))
@@ -119,9 +122,9 @@ fn made_iterator(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<O
 }
 
 /// `mem::swap`, `mem::replace`
-fn exchange(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Value> {
+fn swap_or_replace(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Value> {
     let at = call.at;
-    call.expect(2)?;
+    call.expect_argument_count(2)?;
     let place = reference(&call.arguments[0], at)?;
     let old = evaluator.read(&place, at)?;
     if name == "swap" {
@@ -131,7 +134,7 @@ fn exchange(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Value>
         evaluator.write(&other, old, at)?;
         return Ok(Value::unit());
     }
-    let new = evaluator.load(call.arguments[1].clone(), at)?;
+    let new = evaluator.follow_value(call.arguments[1].clone(), at)?;
     evaluator.write(&place, new, at)?;
     Ok(old)
 }
@@ -143,7 +146,7 @@ fn from_fn(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     let element = call.expected.element();
     let mut elements = Vec::with_capacity(length.min(1 << 16));
     for index in 0..length {
-        evaluator.tick(1, call.at)?;
+        evaluator.count_steps(1, call.at)?;
         elements.push(evaluator.call_expecting(closure, vec![Value::usize(index)], &element, call.at)?);
     }
     Ok(Value::array(elements))
@@ -165,15 +168,15 @@ fn array_length(call: &Call) -> Result<usize> {
 }
 
 /// The place behind a `&mut`.
-fn reference(value: &Value, at: At) -> Result<Place> {
+fn reference(value: &Value, at: TokenSpan) -> Result<Place> {
     match value {
         Value::Reference(place) => Ok(place.clone()),
-        other => Err(error(at, format!("expected a mutable reference, found {}", other.kind()))),
+        other => Err(error(at, format!("expected a mutable reference, found {}", other.description()))),
     }
 }
 
 /// Zero, and what is made of zeros.
-pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
+pub fn default(evaluator: &mut Evaluator, ty: &Type, at: TokenSpan) -> Result<Value> {
     Ok(match ty {
         Type::Integer(ty) => Value::Integer(Integer { value: 0, ty: Some(*ty) }),
         Type::Bool => Value::Bool(false),
@@ -183,12 +186,12 @@ pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
             Value::tuple(parts?)
         }
         Type::Array(element, Some(length)) => {
-            evaluator.tick(*length, at)?;
+            evaluator.count_steps(*length, at)?;
             let element = default(evaluator, element, at)?;
             Value::array(vec![element; *length])
         }
         Type::Matrix(Some(rows), Some(columns)) => {
-            evaluator.tick(rows.saturating_mul(*columns), at)?;
+            evaluator.count_steps(rows.saturating_mul(*columns), at)?;
             let zero = Value::Real(evaluator.graph.constant(0.0));
             Value::matrix(*rows, *columns, vec![zero; rows * columns])
         }
@@ -234,7 +237,7 @@ pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
         Some(Type::Real) => {
             return float::constant("f64", name).map(|value| Value::Real(evaluator.graph.constant(value)));
         }
-        _ => IntegerType::named(module),
+        _ => IntegerType::by_name(module),
     };
     integer::constant(ty?, name)
 }

@@ -1,15 +1,15 @@
 //! Methods and constants of integers, which are always known.
 
 use super::Call;
-use crate::language::arithmetic::{fit, wrap};
+use crate::language::arithmetic::{checked_integer, wrapped_integer};
 use crate::language::evaluator::{Evaluator, error};
 use crate::language::value::{Integer, IntegerType, Value};
 use syn::Result;
 
 /// A method of an integer. `None` if there is no such method.
 pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Option<Value>> {
-    if let Some((operator, comparison)) = super::float::operator(call.name) {
-        call.expect(1)?;
+    if let Some((operator, comparison)) = super::float::operator_by_name(call.name) {
+        call.expect_argument_count(1)?;
         let (a, other) = (Value::Integer(a), &call.arguments[0]);
         return match (operator, comparison) {
             (Some(operator), _) => evaluator.binary(operator, &a, other, call.at).map(Some),
@@ -19,7 +19,7 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
     }
     let mut others = Vec::new();
     if takes_integers(call.name) {
-        call.expect(if call.name == "clamp" { 2 } else { 1 })?;
+        call.expect_argument_count(if call.name == "clamp" { 2 } else { 1 })?;
         for argument in &call.arguments {
             others.push(evaluator.integer(argument, call.at)?);
         }
@@ -27,19 +27,20 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
     let ty = if call.name.ends_with("pow") { a.ty } else { others.iter().fold(a.ty, |ty, b| ty.or(b.ty)) };
     let (x, y) = (a.value, others.first().map_or(0, |b| b.value));
     let whole = |value: Option<i128>| {
-        fit(value, ty)
+        checked_integer(value, ty)
             .map(|value| Some(Value::Integer(value)))
             .ok_or_else(|| error(call.at, format!("`{}` of {x} overflows here, or has no value", call.name)))
     };
     let checked = |value: Option<i128>| {
-        Ok(Some(Value::Option(fit(value, ty).map(|value| Box::new(Value::Integer(value))))))
+        Ok(Some(Value::Option(checked_integer(value, ty).map(|value| Box::new(Value::Integer(value))))))
     };
     let saturated = |value: i128| {
         let value = ty.map_or(value, |ty| value.clamp(ty.min(), ty.max()));
         Ok(Some(Value::Integer(Integer { value, ty })))
     };
-    let wrapped =
-        |value: i128| Ok(Some(Value::Integer(ty.map_or(Integer { value, ty }, |ty| wrap(value, ty)))));
+    let wrapped = |value: i128| {
+        Ok(Some(Value::Integer(ty.map_or(Integer { value, ty }, |ty| wrapped_integer(value, ty)))))
+    };
     match call.name {
         "pow" => whole(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
         "min" => whole(Some(x.min(y))),
@@ -79,12 +80,12 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         "checked_div" => checked(x.checked_div(y)),
         "checked_pow" => checked(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
         // Negative numbers have the bits of their type.
-        "count_ones" => Ok(Some(bits((x << (128 - ty.map_or(32, IntegerType::bits))).count_ones()))),
+        "count_ones" => Ok(Some(bit_count((x << (128 - ty.map_or(32, IntegerType::bits))).count_ones()))),
         "trailing_zeros" => {
-            Ok(Some(bits(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() })))
+            Ok(Some(bit_count(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() })))
         }
         "ilog2" => match x.checked_ilog2() {
-            Some(log) => Ok(Some(bits(log))),
+            Some(log) => Ok(Some(bit_count(log))),
             None => whole(None),
         },
         _ => Ok(None),
@@ -127,7 +128,7 @@ pub fn is_inherent(name: &str) -> bool {
         || matches!(name, "is_negative" | "count_ones" | "trailing_zeros" | "ilog2")
 }
 
-fn bits(value: u32) -> Value {
+fn bit_count(value: u32) -> Value {
     Value::Integer(Integer { value: i128::from(value), ty: Some(IntegerType::U32) })
 }
 
@@ -136,7 +137,7 @@ pub fn constant(ty: IntegerType, name: &str) -> Option<Value> {
     match name {
         "MAX" => Some(Value::Integer(Integer { value: ty.max(), ty: Some(ty) })),
         "MIN" => Some(Value::Integer(Integer { value: ty.min(), ty: Some(ty) })),
-        "BITS" => Some(bits(ty.bits())),
+        "BITS" => Some(bit_count(ty.bits())),
         _ => None,
     }
 }

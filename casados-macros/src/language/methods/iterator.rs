@@ -5,7 +5,7 @@
 mod adapters;
 mod ends;
 
-use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::evaluator::{Evaluator, TokenSpan, error, unsupported};
 use crate::language::place::{Place, Projection};
 use crate::language::value::{IntegerType, Value};
 use std::rc::Rc;
@@ -73,7 +73,7 @@ impl Iter {
     }
 
     /// How many elements are left. An error if that is known only after they are read.
-    pub fn length(&self, evaluator: &mut Evaluator, at: At) -> Result<usize> {
+    pub fn length(&self, evaluator: &mut Evaluator, at: TokenSpan) -> Result<usize> {
         Ok(match self {
             Iter::Elements { front, back, .. } | Iter::Places { front, back, .. } => {
                 back.saturating_sub(*front)
@@ -109,10 +109,10 @@ impl Iter {
 }
 
 /// The content of an option that a closure returned.
-pub(super) fn known_option(value: Value, at: At) -> Result<Option<Value>> {
+pub(super) fn option_content(value: Value, at: TokenSpan) -> Result<Option<Value>> {
     match value {
         Value::Option(content) => Ok(content.map(|value| *value)),
-        other => Err(error(at, format!("expected an `Option`, found {}", other.kind()))),
+        other => Err(error(at, format!("expected an `Option`, found {}", other.description()))),
     }
 }
 
@@ -122,17 +122,17 @@ pub(super) fn holds(
     closure: &Value,
     value: Value,
     method: &str,
-    at: At,
+    at: TokenSpan,
 ) -> Result<bool> {
     match evaluator.call(closure, vec![value], at)? {
         Value::Bool(known) => Ok(known),
         Value::Condition(_) => Err(unsupported(at, format!("`{method}` by a comparison of model variables"))),
-        other => Err(error(at, format!("expected a `bool`, found {}", other.kind()))),
+        other => Err(error(at, format!("expected a `bool`, found {}", other.description()))),
     }
 }
 
 /// `IntoIterator::into_iter`: arrays, ranges, iterators, `&mut` to arrays, options.
-pub fn into_iter(evaluator: &mut Evaluator, value: Value, at: At) -> Result<Iter> {
+pub fn into_iter(evaluator: &mut Evaluator, value: Value, at: TokenSpan) -> Result<Iter> {
     match value {
         Value::Iterator(iterator) => Ok(*iterator),
         Value::Array(array) => Ok(Iter::Elements { front: 0, back: array.len(), array }),
@@ -154,16 +154,22 @@ pub fn into_iter(evaluator: &mut Evaluator, value: Value, at: At) -> Result<Iter
         }
         Value::Reference(place) => match evaluator.read(&place, at)? {
             Value::Array(array) => Ok(Iter::Places { place, front: 0, back: array.len() }),
-            Value::Matrix(matrix) => places(evaluator, &place, matrix.rows, matrix.columns, at),
+            Value::Matrix(matrix) => element_places(evaluator, &place, matrix.rows, matrix.columns, at),
             Value::Iterator(_) => Ok(Iter::ByRef(place)),
             other => into_iter(evaluator, other, at),
         },
-        other => Err(error(at, format!("{} is no iterator", other.kind()))),
+        other => Err(error(at, format!("{} is no iterator", other.description()))),
     }
 }
 
 /// `&mut` to each element of a matrix, column after column.
-fn places(evaluator: &mut Evaluator, place: &Place, rows: usize, columns: usize, at: At) -> Result<Iter> {
+fn element_places(
+    evaluator: &mut Evaluator,
+    place: &Place,
+    rows: usize,
+    columns: usize,
+    at: TokenSpan,
+) -> Result<Iter> {
     let mut places = Vec::with_capacity(rows * columns);
     for column in 0..columns {
         for row in 0..rows {

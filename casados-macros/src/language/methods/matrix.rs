@@ -1,12 +1,12 @@
 //! Methods of small nalgebra matrices.
 
 use super::algebra::{determinant, dot, elementwise, nodes, norm_squared, products, same_shape, scale, zip};
-use super::block::{blocks, change, column, pairs, row};
+use super::block::{blocks, column, mutating_method, pairs, row};
 use super::iterator::Iter;
 use super::{Call, Receiver, construction};
 use crate::graph::{Binary, Node, Unary};
 use crate::language::arithmetic::Operator;
-use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::evaluator::{Evaluator, TokenSpan, error, unsupported};
 use crate::language::types::Type;
 use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
@@ -30,7 +30,7 @@ pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> 
 }
 
 /// The length of a difference: squares are summed one after the other, not as `dot` does it.
-fn distance(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: At) -> Result<Node> {
+fn distance(evaluator: &mut Evaluator, a: &Matrix, b: &Matrix, at: TokenSpan) -> Result<Node> {
     let mut squared = evaluator.graph.constant(0.0);
     for element in &zip(evaluator, a, b, Binary::Sub, at)?.elements {
         let element = evaluator.real(element, at)?;
@@ -63,7 +63,7 @@ pub fn method(
     if let Some(value) = blocks(evaluator, receiver, matrix, call)? {
         return Ok(Some(value));
     }
-    if let Some(value) = change(evaluator, receiver, matrix, call)? {
+    if let Some(value) = mutating_method(evaluator, receiver, matrix, call)? {
         return Ok(Some(value));
     }
     if let Some(value) = algebra(evaluator, matrix, call)? {
@@ -147,14 +147,16 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
         }
         "cross" => cross(evaluator, matrix, call),
         "cross_matrix" => cross_matrix(evaluator, matrix, call),
-        "sum" | "trace" | "product" | "mean" => sum(evaluator, matrix, call),
+        "sum" | "trace" | "product" | "mean" => reduction_method(evaluator, matrix, call),
         "determinant" => determinant(evaluator, matrix, at).map(|node| Some(Value::Real(node))),
         "tr_mul" | "ad_mul" => transposed_product(evaluator, matrix, call),
         "kronecker" => kronecker(evaluator, matrix, call),
         "lerp" => lerp(evaluator, matrix, call),
         "neg" => evaluator.negate(&Value::Matrix(matrix.clone()), at).map(Some),
         "add" | "sub" | "mul" | "div" => {
-            let Some((Some(operator), _)) = super::float::operator(call.name) else { return Ok(None) };
+            let Some((Some(operator), _)) = super::float::operator_by_name(call.name) else {
+                return Ok(None);
+            };
             evaluator.binary(operator, &Value::Matrix(matrix.clone()), call.only()?, at).map(Some)
         }
         "abs" => elementwise(evaluator, matrix, Unary::Abs, at).map(Some),
@@ -193,7 +195,7 @@ fn cross_matrix(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> 
 }
 
 /// Sums and products of elements.
-fn sum(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+fn reduction_method(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let real = |node: Node| Ok(Some(Value::Real(node)));
     let all = nodes(evaluator, matrix, at)?;
@@ -250,7 +252,7 @@ fn kronecker(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Res
 /// Between two matrices.
 fn lerp(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
-    call.expect(2)?;
+    call.expect_argument_count(2)?;
     // nalgebra: rhs * t, then self * (1 - t) added.
     let other = argument(evaluator, call, 0)?;
     same_shape(matrix, &other, call)?;
@@ -303,7 +305,7 @@ fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<
             Value::matrix(rows, columns, elements)
         }
         "zip_map" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let other = argument(evaluator, call, 0)?;
             same_shape(matrix, &other, call)?;
             let mut elements = Vec::with_capacity(rows * columns);
@@ -313,7 +315,7 @@ fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<
             Value::matrix(rows, columns, elements)
         }
         "fold" => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             let mut accumulated = call.arguments[0].clone();
             for element in &matrix.elements {
                 accumulated = evaluator.call(&call.arguments[1], vec![accumulated, element.clone()], at)?;
@@ -348,13 +350,13 @@ fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<
 /// An argument as a matrix.
 pub(super) fn argument(evaluator: &mut Evaluator, call: &Call, index: usize) -> Result<Rc<Matrix>> {
     let Some(argument) = call.arguments.get(index) else {
-        call.expect(index + 1)?;
+        call.expect_argument_count(index + 1)?;
         return Err(error(call.at, "an argument is missing"));
     };
-    match evaluator.load(argument.clone(), call.at)? {
+    match evaluator.follow_value(argument.clone(), call.at)? {
         Value::Matrix(matrix) => Ok(matrix),
-        Value::Opaque(_) => Err(crate::language::evaluator::opaque(call.at, "a matrix")),
-        other => Err(error(call.at, format!("expected a matrix, found {}", other.kind()))),
+        Value::Opaque(_) => Err(crate::language::evaluator::opaque_value_error(call.at, "a matrix")),
+        other => Err(error(call.at, format!("expected a matrix, found {}", other.description()))),
     }
 }
 

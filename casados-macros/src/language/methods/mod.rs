@@ -17,7 +17,7 @@ mod table;
 
 pub use matrix::field as matrix_field;
 
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{Evaluator, TokenSpan, error};
 use super::place::Place;
 use super::types::Type;
 use super::value::{Builtin, Generic, Value};
@@ -35,7 +35,7 @@ pub enum Receiver {
 
 impl Receiver {
     /// The value.
-    pub fn value(&self, evaluator: &mut Evaluator, at: At) -> Result<Value> {
+    pub fn value(&self, evaluator: &mut Evaluator, at: TokenSpan) -> Result<Value> {
         match self {
             Receiver::Place(place) => evaluator.read(place, at),
             Receiver::Value(value) => Ok(value.clone()),
@@ -54,12 +54,12 @@ pub struct Call<'a> {
     /// The type that the context expects of the result, as far as it is known.
     pub expected: &'a Type,
     /// What errors point at.
-    pub at: At<'a>,
+    pub at: TokenSpan<'a>,
 }
 
 impl Call<'_> {
     /// Checks the number of arguments.
-    fn expect(&self, arguments: usize) -> Result<()> {
+    fn expect_argument_count(&self, arguments: usize) -> Result<()> {
         if self.arguments.len() == arguments {
             return Ok(());
         }
@@ -71,7 +71,7 @@ impl Call<'_> {
 
     /// The argument of a call that has one.
     fn only(&self) -> Result<&Value> {
-        self.expect(1)?;
+        self.expect_argument_count(1)?;
         Ok(&self.arguments[0])
     }
 
@@ -87,11 +87,13 @@ impl Call<'_> {
 /// A method call. `None` if there is no such method.
 pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Result<Option<Value>> {
     let value = receiver.value(evaluator, call.at)?;
-    let value = evaluator.load(value, call.at)?;
+    let value = evaluator.follow_value(value, call.at)?;
     let special = match &value {
         Value::Real(node) => float::method(evaluator, *node, call)?,
         Value::Table(of) => table::method(evaluator, of, call)?,
-        Value::Opaque(of) if table::is_method(call.name) => Some(table::from_outside(evaluator, of, call)?),
+        Value::Opaque(of) if table::is_method(call.name) => {
+            Some(table::opaque_table_method(evaluator, of, call)?)
+        }
         Value::Opaque(_) if is_common(call.name) => None,
         Value::Opaque(_) => {
             let node = evaluator.real(&value, call.at)?;
@@ -131,7 +133,7 @@ fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option
     if !is_common(call.name) {
         return Ok(None);
     }
-    call.expect(0)?;
+    call.expect_argument_count(0)?;
     Ok(Some(match call.name {
         "into" => convert(evaluator, value, call.expected, call.at)?,
         "try_into" => {
@@ -141,7 +143,7 @@ fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option
             };
             match (&value, &ty) {
                 (Value::Integer(integer), Type::Integer(ty)) => {
-                    let fitted = super::arithmetic::fit(Some(integer.value), Some(*ty));
+                    let fitted = super::arithmetic::checked_integer(Some(integer.value), Some(*ty));
                     Value::Option(fitted.map(|integer| Box::new(Value::Integer(integer))))
                 }
                 (Value::Integer(_), _) => {
@@ -158,13 +160,14 @@ fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option
 }
 
 /// `From` and `Into` between numbers, arrays and matrices; to an unknown type the value itself.
-pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: At) -> Result<Value> {
+pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: TokenSpan) -> Result<Value> {
     match (&value, ty) {
         (Value::Integer(integer), Type::Real) => {
             Ok(Value::Real(evaluator.graph.constant(integer.value as f64)))
         }
         (Value::Integer(integer), Type::Integer(ty)) => {
-            let fitted = super::arithmetic::fit(Some(integer.value), Some(*ty)).map(Value::Integer);
+            let fitted =
+                super::arithmetic::checked_integer(Some(integer.value), Some(*ty)).map(Value::Integer);
             fitted.ok_or_else(|| error(at, format!("{} does not fit into `{}`", integer.value, ty.name())))
         }
         (Value::Array(elements), Type::Matrix(rows, columns)) => {
@@ -196,7 +199,7 @@ pub fn matrix_operator(
     operator: super::arithmetic::Operator,
     a: &Value,
     b: &Value,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     algebra::operator(evaluator, operator, a, b, at)
 }

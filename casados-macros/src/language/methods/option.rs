@@ -54,11 +54,11 @@ pub fn method(
         ("map" | "and_then" | "filter" | "zip", None) => Value::Option(None),
         ("and_then", Some(value)) => evaluator.call(call.only()?, vec![value.clone()], call.at)?,
         ("map_or", Some(value)) => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             evaluator.call(&call.arguments[1], vec![value.clone()], call.at)?
         }
         ("map_or", None) => {
-            call.expect(2)?;
+            call.expect_argument_count(2)?;
             call.arguments[0].clone()
         }
         ("or", _) => match content {

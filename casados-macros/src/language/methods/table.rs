@@ -3,7 +3,7 @@
 use super::Call;
 use crate::graph::{self, Binary, Node, Unary};
 use crate::language::Table;
-use crate::language::evaluator::{At, Evaluator, error};
+use crate::language::evaluator::{Evaluator, TokenSpan, error};
 use crate::language::value::{Interpolation, Value};
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -29,10 +29,10 @@ fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
 /// `Spline::natural(points, values)` and the others. `None` if it is none of them.
 pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Option<Value>> {
     let Some((name, variables, arguments, degree)) = form(ty, call.name) else { return Ok(None) };
-    call.expect(arguments)?;
+    call.expect_argument_count(arguments)?;
     let mut arguments = Vec::new();
     for argument in &call.arguments {
-        arguments.push(numbers(evaluator, argument, call.at)?);
+        arguments.push(numeric_tokens(evaluator, argument, call.at)?);
     }
     for points in &call.arguments[..variables] {
         increasing(evaluator, points, call.at)?;
@@ -43,13 +43,15 @@ pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Opt
 }
 
 /// Numbers and arrays of them as they are emitted.
-fn numbers(evaluator: &mut Evaluator, value: &Value, at: At) -> Result<TokenStream> {
-    Ok(match evaluator.load(value.clone(), at)? {
+fn numeric_tokens(evaluator: &mut Evaluator, value: &Value, at: TokenSpan) -> Result<TokenStream> {
+    Ok(match evaluator.follow_value(value.clone(), at)? {
         Value::Opaque(tokens) => (*tokens).clone(),
         Value::Array(elements) => {
-            evaluator.tick(elements.len(), at)?;
-            let elements =
-                elements.iter().map(|value| numbers(evaluator, value, at)).collect::<Result<Vec<_>>>()?;
+            evaluator.count_steps(elements.len(), at)?;
+            let elements = elements
+                .iter()
+                .map(|value| numeric_tokens(evaluator, value, at))
+                .collect::<Result<Vec<_>>>()?;
             quote!([#(#elements),*])
         }
         Value::Real(node) => match (evaluator.graph.value(node), evaluator.graph.op(node)) {
@@ -67,15 +69,15 @@ fn numbers(evaluator: &mut Evaluator, value: &Value, at: At) -> Result<TokenStre
         other => {
             return Err(error(
                 at,
-                format!("a table is made of arrays of `f64`, but {} is among them", other.kind()),
+                format!("a table is made of arrays of `f64`, but {} is among them", other.description()),
             ));
         }
     })
 }
 
 /// Whether points increase, as far as they are known here; the compiler asks the others.
-fn increasing(evaluator: &mut Evaluator, points: &Value, at: At) -> Result<()> {
-    let Value::Array(points) = evaluator.load(points.clone(), at)? else { return Ok(()) };
+fn increasing(evaluator: &mut Evaluator, points: &Value, at: TokenSpan) -> Result<()> {
+    let Value::Array(points) = evaluator.follow_value(points.clone(), at)? else { return Ok(()) };
     let known = |value: &Value| match value {
         Value::Real(node) => evaluator.graph.value(*node),
         _ => None,
@@ -112,16 +114,16 @@ pub fn method(evaluator: &mut Evaluator, of: &Interpolation, call: &Call) -> Res
             format!("`{name}` of a `{}` takes {takes}, but {given} {are} given", of.name),
         ));
     }
-    apply(evaluator, &of.expression, of.degree, call)
+    evaluate_table(evaluator, &of.expression, of.degree, call)
 }
 
 /// A method of a constant that is defined where the macro does not see it.
-pub fn from_outside(evaluator: &mut Evaluator, of: &TokenStream, call: &Call) -> Result<Value> {
-    let value = apply(evaluator, of, CUBIC, call)?;
+pub fn opaque_table_method(evaluator: &mut Evaluator, of: &TokenStream, call: &Call) -> Result<Value> {
+    let value = evaluate_table(evaluator, of, CUBIC, call)?;
     value.ok_or_else(|| error(call.at, "a table has one or two variables"))
 }
 
-fn apply(
+fn evaluate_table(
     evaluator: &mut Evaluator,
     expression: &TokenStream,
     degree: u8,
@@ -133,14 +135,18 @@ fn apply(
     }
     let index = evaluator.table(expression, at.len());
     Ok(match (call.name, at.as_slice()) {
-        ("value", &[a]) => Some(of_one(evaluator, graph::Table { index, orders: [0], degree }, a)),
-        ("derivative", &[a]) => Some(of_one(evaluator, graph::Table { index, orders: [1], degree }, a)),
-        ("value", &[a, b]) => Some(of_two(evaluator, graph::Table { index, orders: [0, 0], degree }, [a, b])),
+        ("value", &[a]) => Some(univariate_value(evaluator, graph::Table { index, orders: [0], degree }, a)),
+        ("derivative", &[a]) => {
+            Some(univariate_value(evaluator, graph::Table { index, orders: [1], degree }, a))
+        }
+        ("value", &[a, b]) => {
+            Some(bivariate_value(evaluator, graph::Table { index, orders: [0, 0], degree }, [a, b]))
+        }
         ("gradient", &[a, b]) => {
             let partials = [[1, 0], [0, 1]];
             Some(Value::array(
                 partials
-                    .map(|orders| of_two(evaluator, graph::Table { index, orders, degree }, [a, b]))
+                    .map(|orders| bivariate_value(evaluator, graph::Table { index, orders, degree }, [a, b]))
                     .to_vec(),
             ))
         }
@@ -148,11 +154,11 @@ fn apply(
     })
 }
 
-fn of_one(evaluator: &mut Evaluator, table: graph::Table<1>, a: Node) -> Value {
+fn univariate_value(evaluator: &mut Evaluator, table: graph::Table<1>, a: Node) -> Value {
     Value::Real(evaluator.graph.unary(Unary::Table(table), a))
 }
 
-fn of_two(evaluator: &mut Evaluator, table: graph::Table<2>, [a, b]: [Node; 2]) -> Value {
+fn bivariate_value(evaluator: &mut Evaluator, table: graph::Table<2>, [a, b]: [Node; 2]) -> Value {
     Value::Real(evaluator.graph.binary(Binary::Table(table), a, b))
 }
 

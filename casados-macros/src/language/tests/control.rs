@@ -62,18 +62,18 @@ same! {
     closure_returns: fn f(x: [f64; 6]) -> f64 { let g = |i: usize| -> f64 { if i > 2 { return x[i]; } x[i] * 2.0 }; g(1) + g(4) }
     closures_as_arguments: fn f(x: [f64; 6]) -> f64 {
         fn apply(g: impl Fn(f64) -> f64, v: f64) -> f64 { g(v) + 1.0 }
-        fn each<F: FnMut(usize)>(mut g: F) { for i in 0..3 { g(i); } }
+        fn call_for_indices<F: FnMut(usize)>(mut g: F) { for i in 0..3 { g(i); } }
         fn compose(a: impl Fn(f64) -> f64, b: impl Fn(f64) -> f64) -> impl Fn(f64) -> f64 { move |v| b(a(v)) }
         fn double(v: f64) -> f64 { 2.0 * v }
-        let mut s = 0.0; each(|i| s += x[i]);
+        let mut s = 0.0; call_for_indices(|i| s += x[i]);
         apply(|v| apply(|w| w * v, v), x[0]) + apply(double, s) + compose(double, |v| v - 3.0)(x[1])
     }
     moved_state: fn f(x: [f64; 6]) -> f64 { let mut n = 0; let mut next = move || { n += 1; x[n] }; let a = next(); let b = next(); a - b * n as f64 }
     references: fn f(x: [f64; 6]) -> f64 {
-        fn bump(v: &mut f64, by: f64) { *v += by; }
+        fn add_to(v: &mut f64, by: f64) { *v += by; }
         fn swap(a: &mut [f64; 6], i: usize, j: usize) { let t = a[i]; a[i] = a[j]; a[j] = t; }
-        let mut y = x; bump(&mut y[0], x[1]); swap(&mut y, 0, 3);
-        let r = &mut y; r[2] = 7.0; let q = &mut r[4]; *q *= 2.0; bump(q, 1.0);
+        let mut y = x; add_to(&mut y[0], x[1]); swap(&mut y, 0, 3);
+        let r = &mut y; r[2] = 7.0; let q = &mut r[4]; *q *= 2.0; add_to(q, 1.0);
         let (a, b) = (&x[0], &&y[1]); *a * **b + y[3] + y[4] + y[2]
     }
     reference_fields: fn f(x: [f64; 6]) -> f64 {
@@ -83,8 +83,8 @@ same! {
         for a in x { s.push(a * s.n as f64); } let n = s.n; y[1] + y[5] * n as f64
     }
     returned_references: fn f(x: [f64; 6]) -> f64 {
-        fn at(a: &mut [f64; 6], i: usize) -> &mut f64 { &mut a[i] }
-        let mut y = x; *at(&mut y, 2) = 4.0; *at(&mut y, 3) += y[2]; y[3] * y[2]
+        fn element_mut(a: &mut [f64; 6], i: usize) -> &mut f64 { &mut a[i] }
+        let mut y = x; *element_mut(&mut y, 2) = 4.0; *element_mut(&mut y, 3) += y[2]; y[3] * y[2]
     }
     uninitialised: fn f(x: [f64; 6]) -> f64 { let a; let b: f64; if x.len() > 3 { a = x[0]; b = 1.0; } else { a = x[1]; b = 2.0; } a * b }
     destructuring_assignment: fn f(x: [f64; 6]) -> f64 {

@@ -14,7 +14,7 @@ fn refused(body: &str, message: &str) {
 }
 
 #[test]
-fn refusals() {
+fn refused_expressions() {
     refused("x[6]", "index out of range: the length is 6 but the index is 6");
     refused("x[0 - 1]", "");
     refused("let i = 3usize; x[i - 4]", "overflows `usize`");
@@ -102,10 +102,10 @@ fn nested(head: &str, tail: &str, n: usize) -> String {
 
 #[test]
 fn nesting_is_bounded() {
-    super::like_a_compiler(nest);
+    super::on_compiler_stack(nested_errors);
 }
 
-fn nest() {
+fn nested_errors() {
     // The first of these are expressions, the others blocks, closures and calls.
     const EXPRESSIONS: usize = 13;
     let forms = [
@@ -183,7 +183,7 @@ fn constants_from_outside_in_patterns() {
     let (evaluator, list) = evaluate(source).unwrap();
     let value = |opaque: &[f64]| {
         let variables = &[2.0, 3.0, 5.0, 7.0];
-        evaluator.graph.evaluate(&list, crate::graph::Point { variables, opaque, seeds: &[] })[0]
+        evaluator.graph.evaluate(&list, crate::graph::EvaluationPoint { variables, opaque, seeds: &[] })[0]
     };
     assert_eq!((value(&[2.0, 1.0]), value(&[1.0, 2.0]), value(&[1.0, 1.0])), (15.0, 2.0, 7.0));
 }

@@ -21,9 +21,9 @@ same! {
     }
     nested_functions: fn f(x: [f64; 6]) -> f64 {
         fn outer(a: f64) -> f64 { const K: f64 = 2.0; fn inner(a: f64) -> f64 { a * K } inner(a) + inner(K) }
-        outer(x[0]) * second(x[1]);
-        fn second(a: f64) -> f64 { a - outer(1.0) }
-        second(outer(x[2]))
+        outer(x[0]) * second_function(x[1]);
+        fn second_function(a: f64) -> f64 { a - outer(1.0) }
+        second_function(outer(x[2]))
     }
     argument_patterns: fn f(x: [f64; 6]) -> f64 {
         fn g([a, b]: [f64; 2], (c, _): (f64, f64), mut d: f64) -> f64 { d += a; c * b - d }

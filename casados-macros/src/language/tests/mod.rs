@@ -12,8 +12,8 @@ mod values;
 
 use super::evaluator::Evaluator;
 use super::value::{Function, Value};
+use crate::graph::EvaluationPoint;
 use crate::graph::Node;
-use crate::graph::Point;
 use std::rc::Rc;
 
 /// Points at which snippets are compared: signs differ, some numbers are equal, some are 0.
@@ -26,23 +26,23 @@ pub const POINTS: [[f64; 6]; 5] = [
 ];
 
 /// Numbers in a result, in order.
-pub trait Numbers {
+pub trait CollectNumbers {
     fn numbers(&self, list: &mut Vec<f64>);
 }
 
-impl Numbers for f64 {
+impl CollectNumbers for f64 {
     fn numbers(&self, list: &mut Vec<f64>) {
         list.push(*self);
     }
 }
 
-impl<T: Numbers, const N: usize> Numbers for [T; N] {
+impl<T: CollectNumbers, const N: usize> CollectNumbers for [T; N] {
     fn numbers(&self, list: &mut Vec<f64>) {
         self.iter().for_each(|element| element.numbers(list));
     }
 }
 
-impl<A: Numbers, B: Numbers> Numbers for (A, B) {
+impl<A: CollectNumbers, B: CollectNumbers> CollectNumbers for (A, B) {
     fn numbers(&self, list: &mut Vec<f64>) {
         self.0.numbers(list);
         self.1.numbers(list);
@@ -62,7 +62,7 @@ fn nodes(evaluator: &mut Evaluator, value: &Value, list: &mut Vec<Node>) {
 }
 
 /// Runs a test as compilers run macros: on a stack of 8 MiB.
-pub fn like_a_compiler(test: fn()) {
+pub fn on_compiler_stack(test: fn()) {
     let thread = std::thread::Builder::new().stack_size(8 << 20).spawn(test).unwrap();
     thread.join().unwrap();
 }
@@ -82,7 +82,7 @@ pub fn evaluate(source: &str) -> syn::Result<(Evaluator, Vec<Node>)> {
 }
 
 /// Compares the compiled function with its symbolic execution.
-pub fn compare<R: Numbers>(name: &str, source: &str, compiled: impl Fn([f64; 6]) -> R) {
+pub fn compare<R: CollectNumbers>(name: &str, source: &str, compiled: impl Fn([f64; 6]) -> R) {
     let (evaluator, list) = match evaluate(source) {
         Ok(result) => result,
         Err(error) => panic!("{name}: {error}"),
@@ -90,7 +90,8 @@ pub fn compare<R: Numbers>(name: &str, source: &str, compiled: impl Fn([f64; 6])
     for point in POINTS {
         let mut expected = Vec::new();
         compiled(point).numbers(&mut expected);
-        let found = evaluator.graph.evaluate(&list, Point { variables: &point, ..Default::default() });
+        let found =
+            evaluator.graph.evaluate(&list, EvaluationPoint { variables: &point, ..Default::default() });
         assert_eq!(expected.len(), found.len(), "{name}: number of results");
         for (expected, found) in expected.iter().zip(&found) {
             // Structural zeros have no sign.

@@ -20,7 +20,7 @@ fn a_chain_of_any_length_is_linear_in_size() {
             read(Form::Dae, quote!(NX = [#nx]), chain.clone()).unwrap_or_else(|error| panic!("{error}"));
         let model = &source.parts[0].models[0];
         println!("nx = {nx}: {:?}", start.elapsed());
-        model.graph.operations(&model.residual)
+        model.graph.operation_count(&model.residual)
     };
     // Every further mass costs the same: one spring, one row of accelerations and of velocities.
     let (a, b, c) = (operations(45), operations(51), operations(189));
@@ -29,10 +29,10 @@ fn a_chain_of_any_length_is_linear_in_size() {
 
 #[test]
 fn nesting_of_every_kind_is_bounded() {
-    super::like_a_compiler(nest);
+    super::on_compiler_stack(nested_models);
 }
 
-fn nest() {
+fn nested_models() {
     let wrap = |before: &str, after: &str, n: usize| {
         let body = format!("{}x[0]{}", before.repeat(n), after.repeat(n));
         format!("fn f(x: [f64; 6]) -> f64 {{ fn g(a: f64) -> f64 {{ a }} {body} }}")
@@ -61,7 +61,9 @@ fn sums_of_thousands_of_terms() {
     let source = format!("fn f(x: [f64; 6]) -> f64 {{ {} }}", terms.join(" + "));
     let value = stacker::grow(crate::STACK, || {
         let (evaluator, list) = super::evaluate(&source).unwrap();
-        evaluator.graph.evaluate(&list, crate::graph::Point { variables: &[1.0; 6], ..Default::default() })
+        evaluator
+            .graph
+            .evaluate(&list, crate::graph::EvaluationPoint { variables: &[1.0; 6], ..Default::default() })
     });
     // Half-integers: `Σ (i + ½)`, exact.
     assert_eq!(value, [4_500_000.0]);

@@ -1,6 +1,6 @@
 //! Derivatives of a constraint in time.
 
-use super::variable;
+use super::variable_name;
 use crate::graph::{Binary, Graph, Node, tangent};
 use crate::language::Model;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ pub struct Constraint {
 
 impl Constraint {
     /// How often it is differentiated.
-    pub fn times(&self) -> usize {
+    pub fn differentiation_count(&self) -> usize {
         self.levels.len() - 1
     }
 
@@ -24,7 +24,7 @@ impl Constraint {
     pub fn stabilised(&self, graph: &mut Graph, rates: &[f64]) -> Node {
         // Coefficients of the polynomial, the constant first.
         let mut coefficients = vec![1.0];
-        for rate in rates.iter().take(self.times()) {
+        for rate in rates.iter().take(self.differentiation_count()) {
             let mut product = vec![0.0; coefficients.len() + 1];
             for (power, coefficient) in coefficients.iter().enumerate() {
                 product[power] += rate * coefficient;
@@ -79,7 +79,7 @@ fn check(model: &Model, level: Node, (equation, order): (usize, u32)) -> Result<
     let depends = model.graph.dependencies(&[level]).swap_remove(0);
     let states = |index: &u32| (nx..2 * nx).contains(index) || *index >= 2 * nx + nz + nu;
     let Some(&culprit) = depends.iter().find(|index| !states(index)) else { return Ok(()) };
-    let name = variable(names, culprit);
+    let name = variable_name(names, culprit);
     let of = match order {
         0 => format!("equation {equation}"),
         1 => format!("the derivative of equation {equation}"),

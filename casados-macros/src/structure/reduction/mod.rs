@@ -23,7 +23,7 @@ use constraints::Constraint;
 use quote::format_ident;
 
 /// What became of a model whose index was reduced.
-pub struct Reduced {
+pub struct ReducedModel {
     /// Equations that were differentiated, and how often.
     pub differentiated: Vec<(u32, u32)>,
     /// The rates of Baumgarte's stabilisation, for as many derivatives as there are.
@@ -36,10 +36,10 @@ pub struct Reduced {
 }
 
 /// Reduces the index if that is asked for and there is something to differentiate.
-pub fn reduce(model: &mut Model) -> syn::Result<Option<Reduced>> {
+pub fn reduce(model: &mut Model) -> syn::Result<Option<ReducedModel>> {
     let Some(reduction) = model.reduction.clone() else { return Ok(None) };
     let rows = signature(model);
-    let Some(offsets) = signature::offsets(&rows) else { return Err(undetermined(model, &rows)) };
+    let Some(offsets) = signature::offsets(&rows) else { return Err(undetermined_error(model, &rows)) };
     if offsets.equations.iter().all(|&times| times == 0) {
         return Ok(None);
     }
@@ -50,7 +50,7 @@ pub fn reduce(model: &mut Model) -> syn::Result<Option<Reduced>> {
             constraints.push(constraints::differentiate(model, &rules.rates, equation, times)?);
         }
     }
-    let most = constraints.iter().map(Constraint::times).max().unwrap_or(0);
+    let most = constraints.iter().map(Constraint::differentiation_count).max().unwrap_or(0);
     let rates = match reduction.rates {
         Rates::None => Vec::new(),
         Rates::All(rate) => vec![rate; most],
@@ -69,11 +69,11 @@ pub fn reduce(model: &mut Model) -> syn::Result<Option<Reduced>> {
     }
     let differentiated = constraints
         .iter()
-        .map(|constraint| (constraint.equation as u32, constraint.times() as u32))
+        .map(|constraint| (constraint.equation as u32, constraint.differentiation_count() as u32))
         .collect();
     let invariants = invariants(model, &constraints);
     let projection = reduction.projection.then(|| projection::of(&invariants));
-    Ok(Some(Reduced { differentiated, rates, invariants, projection }))
+    Ok(Some(ReducedModel { differentiated, rates, invariants, projection }))
 }
 
 /// `once`, `twice`, `3 times`
@@ -103,7 +103,7 @@ fn signature(model: &Model) -> Vec<signature::Row> {
 }
 
 /// Equations that leave unknowns open, however often they are differentiated.
-fn undetermined(model: &Model, rows: &[signature::Row]) -> syn::Error {
+fn undetermined_error(model: &Model, rows: &[signature::Row]) -> syn::Error {
     let nx = model.variables.x.len();
     let pattern: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|entry| entry.0).collect()).collect();
     let words = Words {
@@ -120,7 +120,7 @@ fn undetermined(model: &Model, rows: &[signature::Row]) -> syn::Error {
 }
 
 /// The name of a variable `(ẋ, x, z, u, p, t)`.
-fn variable(names: &Variables, index: u32) -> String {
+fn variable_name(names: &Variables, index: u32) -> String {
     let Variables { x, z, u, p } = names;
     let mut index = index as usize;
     if let Some(name) = x.get(index) {
@@ -141,7 +141,7 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
     let mut spans = Vec::new();
     let mut outputs: Vec<Node> = Vec::new();
     for constraint in constraints {
-        for level in &constraint.levels[..constraint.times()] {
+        for level in &constraint.levels[..constraint.differentiation_count()] {
             outputs.push(*level);
             spans.extend(model.spans.get(constraint.equation));
         }

@@ -1,7 +1,7 @@
 //! The matrix `∂f/∂(ẋ, z)` of the reduced model at sample points: structure alone does not show
 //! that constraints repeat each other.
 
-use super::variable;
+use super::variable_name;
 use crate::graph::Node;
 use crate::structure::samples;
 use crate::structure::{Analysis, samplings};
@@ -10,7 +10,7 @@ use syn::{Error, Result};
 /// Pivots below this, relative to the largest of a scaled matrix, are zeros.
 const ZERO: f64 = 1e-11;
 /// Elements of null vectors below this, relative to the largest, are zeros.
-const PRESENT: f64 = 1e-6;
+const MIN_NULL_VECTOR_ELEMENT: f64 = 1e-6;
 
 /// How many of the sample points have a singular matrix, and how many there are; `differentiated`
 /// is whether any equation was.
@@ -45,13 +45,13 @@ pub fn check(analysis: &Analysis, differentiated: bool) -> Result<[u32; 2]> {
     let members = |transposed: bool| -> Vec<usize> {
         let vector = null_vector(matrix(&points[0], transposed), true).unwrap_or_default();
         let largest = vector.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
-        (0..vector.len()).filter(|&index| vector[index].abs() > PRESENT * largest).collect()
+        (0..vector.len()).filter(|&index| vector[index].abs() > MIN_NULL_VECTOR_ELEMENT * largest).collect()
     };
     let (equations, unknowns) = (members(true), members(false));
     let number = |equation: &usize| equation.to_string();
     let name = |&unknown: &usize| {
         let unknown = unknown as u32;
-        variable(&model.variables, if unknown < nx { unknown } else { unknown + nx })
+        variable_name(&model.variables, if unknown < nx { unknown } else { unknown + nx })
     };
     let message = format!(
         "the index cannot be reduced: {}equations {} are dependent at every sample point and do not determine {}. \

@@ -1,7 +1,7 @@
 //! Equations that give an unknown explicitly: `q̇ = v`, or `z = h(x)`.
 
 use super::signature::{Offsets, Row};
-use super::{times, variable};
+use super::{times, variable_name};
 use crate::graph::{Degree, Node, tangent};
 use crate::language::Model;
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,7 +41,7 @@ pub fn find(model: &mut Model, rows: &[Row], offsets: &Offsets) -> Result<Rules>
             }
         }
         let Some((row, expression)) = rule else {
-            return Err(not_explicit(model, variable, matched, highest - order));
+            return Err(not_explicit_error(model, variable, matched, highest - order));
         };
         rules.rates.insert(variable, expression);
         rules.equations.insert(row);
@@ -82,7 +82,7 @@ fn resolve(model: &mut Model, rates: &mut BTreeMap<u32, Node>) -> Result<()> {
         let expressions = model.graph.substitute(&expressions, rates);
         rates.values_mut().zip(expressions).for_each(|(rate, expression)| *rate = expression);
     }
-    let names: Vec<String> = rates.keys().map(|&index| variable(&model.variables, index)).collect();
+    let names: Vec<String> = rates.keys().map(|&index| variable_name(&model.variables, index)).collect();
     let message = format!(
         "{} are given by equations that contain each other, and have to be differentiated: solve these equations for \
          them",
@@ -91,7 +91,7 @@ fn resolve(model: &mut Model, rates: &mut BTreeMap<u32, Node>) -> Result<()> {
     Err(Error::new(model.name.span(), message))
 }
 
-fn not_explicit(model: &Model, unknown: u32, row: usize, missing: u32) -> Error {
+fn not_explicit_error(model: &Model, unknown: u32, row: usize, missing: u32) -> Error {
     let algebraic = unknown as usize >= model.variables.x.len();
     let way_out = if algebraic && missing == 1 {
         "make it a state: then the differentiated equations give its derivative; or solve one of them for it, so that it \
@@ -103,7 +103,7 @@ fn not_explicit(model: &Model, unknown: u32, row: usize, missing: u32) -> Error 
     let message = format!(
         "{} must be differentiated {}, because equation {row} is, but no equation gives it explicitly: {way_out} \
          (equations are counted from 0)",
-        variable(&model.variables, unknown),
+        variable_name(&model.variables, unknown),
         times(missing as usize)
     );
     Error::new(model.spans.get(row).copied().unwrap_or_else(|| model.name.span()), message)

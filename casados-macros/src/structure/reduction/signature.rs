@@ -131,7 +131,7 @@ mod tests {
 
     /// The sum is the largest of all permutations, on patterns at random.
     #[test]
-    fn largest_sum() {
+    fn transversal_has_largest_sum() {
         let mut state = 1u64;
         let mut random = |below: u64| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -150,7 +150,7 @@ mod tests {
                         .collect()
                 })
                 .collect();
-            let best = best(&rows, 0, &mut vec![false; count]);
+            let best = brute_force_transversal(&rows, 0, &mut vec![false; count]);
             let found = offsets(&rows);
             let sum = found.as_ref().map(|found| {
                 let order = |(unknown, &row): (usize, &usize)| {
@@ -169,12 +169,12 @@ mod tests {
     }
 
     /// By trying all.
-    fn best(rows: &[Row], row: usize, taken: &mut Vec<bool>) -> Option<u32> {
+    fn brute_force_transversal(rows: &[Row], row: usize, taken: &mut Vec<bool>) -> Option<u32> {
         let Some(entries) = rows.get(row) else { return Some(0) };
         let mut most = None;
         for &(column, order) in entries {
             if !std::mem::replace(&mut taken[column], true) {
-                let rest = best(rows, row + 1, taken).map(|rest| rest + order);
+                let rest = brute_force_transversal(rows, row + 1, taken).map(|rest| rest + order);
                 most = most.max(rest);
                 taken[column] = false;
             }

@@ -1,15 +1,15 @@
 //! Conditions that may change within an interval.
 
 use super::{accepted, model, mul, sub};
-use crate::graph::{Binary, Compare, Graph, Node, Op, Point, Table, Unary};
+use crate::graph::{Binary, Compare, EvaluationPoint, Graph, Node, Op, Table, Unary};
 use crate::language::Model;
 
 /// The number of branches at a point `(ẋ, x, u, p, t)` of a model with one of each.
-fn branches(model: Model, points: &[[f64; 5]]) -> (usize, Vec<f64>) {
+fn branch_numbers(model: Model, points: &[[f64; 5]]) -> (usize, Vec<f64>) {
     let analysis = accepted(model);
     let found = analysis.branches.expect("conditions");
     let value = |variables: &[f64; 5]| {
-        let point = Point { variables, opaque: &[], seeds: &[] };
+        let point = EvaluationPoint { variables, opaque: &[], seeds: &[] };
         analysis.model.graph.evaluate(&[found.kinks], point)[0]
     };
     (found.count, points.iter().map(value).collect())
@@ -34,7 +34,8 @@ fn each_condition_has_a_power_of_two() {
         g.binary(Binary::Add, size, pushed)
     });
     let at = |x, t| [0.0, x, 0.0, 0.0, t];
-    let (count, numbers) = branches(switched, &[at(1.0, 2.0), at(-1.0, 2.0), at(1.0, 0.0), at(-1.0, 0.0)]);
+    let (count, numbers) =
+        branch_numbers(switched, &[at(1.0, 2.0), at(-1.0, 2.0), at(1.0, 0.0), at(-1.0, 0.0)]);
     assert_eq!(count, 2);
     assert_eq!(numbers[0], 0.0);
     assert_eq!(numbers[1] + numbers[2], 3.0);
@@ -42,7 +43,7 @@ fn each_condition_has_a_power_of_two() {
 }
 
 #[test]
-fn what_only_inputs_decide_stays() {
+fn input_conditions_do_not_count() {
     // if u < p { x } else { |p| x }
     let fixed = ode(|g, v| {
         let condition = g.compare(Compare::Lt, v[2], v[3]);

@@ -1,7 +1,7 @@
 //! Models whose time is a multiple of a parameter: what becomes of their equations, and mistakes.
 
 use super::super::{Analysis, analyse};
-use crate::graph::Point;
+use crate::graph::EvaluationPoint;
 use crate::language::{self, Form};
 
 fn read(form: Form, attribute: &str, item: &str) -> Result<Analysis, String> {
@@ -14,7 +14,7 @@ fn read(form: Form, attribute: &str, item: &str) -> Result<Analysis, String> {
 
 /// Values of the equations at `(ẋ, x, z, u, p, t)`.
 fn values(analysis: &Analysis, v: &[f64]) -> Vec<f64> {
-    let point = Point { variables: v, opaque: &[], seeds: &[] };
+    let point = EvaluationPoint { variables: v, opaque: &[], seeds: &[] };
     analysis.model.graph.evaluate(&analysis.model.residual, point)
 }
 

@@ -2,11 +2,11 @@
 
 use super::super::kinematic::Kinematic;
 use super::super::newton_matrix;
-use super::super::samples::{Position, Term};
+use super::super::samples::{NewtonEntry, Term};
 use super::{Analysis, accepted, model, mul, sub};
 use crate::graph::{Graph, Node, Unary};
 
-fn found(analysis: &Analysis) -> (Vec<Kinematic>, Vec<Position>) {
+fn found(analysis: &Analysis) -> (Vec<Kinematic>, Vec<NewtonEntry>) {
     let Analysis { model, derivatives, facts, .. } = analysis;
     newton_matrix(model, &derivatives.jacobian, derivatives.blocks, &facts.trivial)
 }
@@ -92,7 +92,7 @@ fn kinematic_states() {
 /// Of a row of four that follow one another, the last of them a control, every other one: as many
 /// as there can be.
 #[test]
-fn no_velocity_is_kinematic() {
+fn velocities_are_not_kinematic() {
     let analysis = accepted(model([4, 0, 1, 0], |g, v| {
         vec![sub(g, v[0], v[5]), sub(g, v[1], v[6]), sub(g, v[2], v[7]), sub(g, v[3], v[8])]
     }));

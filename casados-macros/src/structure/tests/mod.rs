@@ -1,8 +1,8 @@
 //! Models whose graphs are built by hand, and what is found out about them.
 
+mod augmented_states;
 mod branches;
 mod duration;
-mod extension;
 mod index;
 mod kinematic;
 mod reduction;
@@ -195,7 +195,7 @@ fn trivial_rows() {
 /// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: that of `u` does not need its row of
 /// `D`.
 #[test]
-fn squares_of_what_is_a_multiple_of_others() {
+fn squares_of_multiples() {
     let facts = |product: bool| {
         accepted(model([2, 1, 1, 0], move |g, v| {
             let two = g.constant(2.0);

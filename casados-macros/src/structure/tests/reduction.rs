@@ -2,7 +2,7 @@
 //! the form that was reduced by hand.
 
 use super::super::{Analysis, analyse};
-use crate::graph::Point;
+use crate::graph::EvaluationPoint;
 use crate::language::{self, Form};
 
 /// A model, or why there is none.
@@ -19,17 +19,17 @@ fn read(attribute: &str, item: &str) -> Result<Analysis, String> {
     analyse(model).map_err(|error| error.to_string())
 }
 
-fn reduced(item: &str) -> Result<Analysis, String> {
+fn read_reduced(item: &str) -> Result<Analysis, String> {
     read("index_reduction", item)
 }
 
 fn refusal(item: &str) -> String {
-    reduced(item).err().expect("the model is refused")
+    read_reduced(item).err().expect("the model is refused")
 }
 
 #[test]
-fn what_has_index_one_stays() {
-    let analysis = reduced("fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, z + x] }");
+fn index_one_models_stay() {
+    let analysis = read_reduced("fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, z + x] }");
     assert!(analysis.is_ok_and(|analysis| analysis.reduction.is_none()));
 }
 
@@ -38,7 +38,7 @@ fn without_the_argument_the_error_names_it() {
     let item = "fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, x - 1.0] }";
     let error = read("", item).err().expect("it has index two");
     assert!(error.contains("or let `#[dae(index_reduction)]` do so"), "{error}");
-    let analysis = reduced(item).expect("its index can be reduced");
+    let analysis = read_reduced(item).expect("its index can be reduced");
     assert_eq!(analysis.reduction.map(|reduction| reduction.differentiated), Some(vec![(1, 1)]));
 }
 
@@ -51,7 +51,7 @@ fn a_control_that_would_jump() {
         "{error}"
     );
     // In the highest derivative it may be.
-    let velocity = reduced(
+    let velocity = read_reduced(
         "fn f(xdot: [f64; 2], x: [f64; 2], u: f64, z: f64) -> [f64; 3] {
             [xdot[0] - x[1] - u, xdot[1] - z, x[0] * x[0] + x[1] - 1.0]
         }",
@@ -94,7 +94,7 @@ fn a_constraint_that_is_hidden_in_a_combination() {
             && error.contains("replace one equation by a combination in which the unknowns cancel"),
         "{error}"
     );
-    let combined = reduced(&diodes("x[0] + x[1]")).expect("the combination shows it");
+    let combined = read_reduced(&diodes("x[0] + x[1]")).expect("the combination shows it");
     assert_eq!(combined.reduction.map(|reduction| reduction.differentiated), Some(vec![(3, 1)]));
 }
 
@@ -132,7 +132,7 @@ fn derivatives_that_are_not_explicit() {
         error.contains("`z[1]` must be differentiated once") && error.contains("make it a state"),
         "{error}"
     );
-    let state = reduced(&contact("xdot: [f64; 3], x: [f64; 3], z: f64", "[q, v, c], force"));
+    let state = read_reduced(&contact("xdot: [f64; 3], x: [f64; 3], z: f64", "[q, v, c], force"));
     let reduction = state.expect("its derivative follows").reduction.expect("it is reduced");
     assert_eq!(reduction.differentiated, [(2, 1), (3, 1)]);
 }
@@ -145,7 +145,7 @@ fn a_constraint_that_is_differentiated_four_times() {
         let [a, b, va, vb] = x;
         [xdot[0] - va, xdot[1] - vb, xdot[2] - 7.0 * (b - a), xdot[3] + 7.0 * (b - a) - z, a - t.sin()]
     }";
-    let reduction = reduced(spring).expect("its index can be reduced").reduction.expect("it is reduced");
+    let reduction = read_reduced(spring).expect("its index can be reduced").reduction.expect("it is reduced");
     assert_eq!(reduction.differentiated, [(4, 4)]);
     // The rate of one end from an equation that is not linear in it: no rule for its derivative.
     let error = refusal(&spring.replace("xdot[2] - 7.0 * (b - a)", "xdot[2].sinh() - 7.0 * (b - a)"));
@@ -223,7 +223,7 @@ fn the_aircraft_from_its_constraint() {
     let values = |analysis: &Analysis, point: &[f64]| {
         let jacobian = analysis.derivatives.jacobian.iter().map(|entry| entry.2);
         let nodes: Vec<_> = analysis.model.residual.iter().copied().chain(jacobian).collect();
-        analysis.model.graph.evaluate(&nodes, Point { variables: point, opaque: &[], seeds: &[] })
+        analysis.model.graph.evaluate(&nodes, EvaluationPoint { variables: point, opaque: &[], seeds: &[] })
     };
     for draw in 0..20 {
         let wave = |index: usize| (1.7 * (draw * 52 + index) as f64).sin();
@@ -278,12 +278,12 @@ fn the_squeezer_from_its_constraints() {
         assert!(lagrange.contains(differentiated));
         lagrange = lagrange.replace(differentiated, constraint);
     }
-    let reduced = reduced(&lagrange).expect("its index can be reduced");
+    let reduced = read_reduced(&lagrange).expect("its index can be reduced");
     let by_hand = read("", by_hand).expect("it has index one");
     let reduction = reduced.reduction.as_ref().expect("it was reduced");
     assert_eq!(reduction.differentiated, [(21, 2), (22, 2), (23, 2), (24, 2), (25, 2), (26, 2)]);
     let values = |analysis: &Analysis, point: &[f64]| {
-        let point = Point { variables: point, opaque: &[], seeds: &[] };
+        let point = EvaluationPoint { variables: point, opaque: &[], seeds: &[] };
         analysis.model.graph.evaluate(&analysis.model.residual, point)
     };
     for draw in 0..20 {

@@ -93,7 +93,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
         let Memory { point, f_point, .. } = &mut *self.memory;
         *residuals += 1;
         M::residual::<T>(point, f_point);
-        if not_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
+        if find_non_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
     }
 
     /// The estimated error of `(x, z)` from the defect at the point that is there.

@@ -23,7 +23,7 @@ use crate::adaptive::point::variable;
 use crate::adaptive::stages::{FilteredDefect, MOST, Stages, StepContext};
 use crate::adaptive::tolerances::{FEW, ORDER_REDUCTION_RATIO, mean, norm};
 use crate::error::Error;
-use crate::finite::not_finite;
+use crate::finite::find_non_finite;
 use crate::irk::dot;
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, axpy, dispatch, slot};
 use crate::memory::allocate;
@@ -209,7 +209,8 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
             convergence.iterations = iteration;
             if !increment.is_finite() {
                 // A value of the model that is not finite leaves no increment that is.
-                let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
+                let finite =
+                    self.memory.f.iter().all(|f| find_non_finite(f.as_ref().as_flattened()).is_none());
                 return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
             convergence.moved(self.sides(convergence.branches));

@@ -70,7 +70,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for S
         step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
+        self.go(step)?.solve_with_quadrature(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
@@ -78,7 +78,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for S
         step: &AcceptedStep<'_, M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
+        self.go(step)?.forward_with_quadrature(step.at.x, step.at.u, step.h, along)
     }
 
     fn hessian(
@@ -87,7 +87,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for S
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
+        self.go(step)?.hessian_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
     }
 
     fn adjoint(
@@ -96,7 +96,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for S
         lambda: &VectorX<M, T>,
         along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
+        self.go(step)?.adjoint_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
     }
 
     fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {

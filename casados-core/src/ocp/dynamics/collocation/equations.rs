@@ -3,7 +3,7 @@
 use crate::irk::{Coefficients, dot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorX, VectorZ};
 use crate::ocp::formulation::functions::dynamics::Interval;
-use crate::qp::{assign, larger};
+use crate::qp::{copy_common, nan_max};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -32,7 +32,7 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
     /// The start of an interval of so many steps.
     pub fn at(interval: &Interval<'_, T>, coefficients: &'a Coefficients<T, S>, steps: usize) -> Self {
         let (mut x, mut v) = (ArrayX::<M, T>::zeroed(), ArrayV::<M, T>::zeroed());
-        assign(x.as_mut(), interval.x);
+        copy_common(x.as_mut(), interval.x);
         let inputs = v.as_mut().get_mut(2 * M::Shape::NX + M::Shape::NZ..).unwrap_or_default();
         let p: VectorP<M, T> = interval.parameters();
         for (to, &from) in inputs.iter_mut().zip(interval.u.iter().chain(p.as_slice())) {
@@ -64,7 +64,7 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
                 for &f in f.as_ref() {
                     let size = (self.h * f).abs();
                     sum = sum + size;
-                    largest = larger(largest, size);
+                    largest = nan_max(largest, size);
                 }
             }
             if n == 0 {
@@ -77,7 +77,7 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
                 *x = *x + self.h * dot(&self.coefficients.b, k);
             }
         }
-        assign(end.x.as_mut_slice(), self.x.as_ref());
+        copy_common(end.x.as_mut_slice(), self.x.as_ref());
         (end, [sum, largest])
     }
 

@@ -32,7 +32,7 @@ use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntegralTerms, Interval, IntervalResult, Nodes, SecondOrder, Sink, StageAction, vector,
 };
 use crate::ocp::formulation::names::Names;
-use crate::qp::{assign, part, room};
+use crate::qp::{copy_common, part, try_reserve};
 use crate::result::Seeds;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -140,7 +140,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
         let count = nodes.len().saturating_mul(steps);
         for list in [&mut self.stages, &mut self.increments, &mut self.change, &mut self.best] {
             list.clear();
-            room(list, count)?;
+            try_reserve(list, count)?;
             list.resize(count, Zeroable::zeroed());
         }
         self.from.clear();
@@ -190,8 +190,8 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
             let change = self.change.get_mut(places.clone()).unwrap_or_default();
             change.copy_from_slice(self.increments.get(places.clone()).unwrap_or_default());
             let mut seeds = Seeds::<M, T, 1>::zeroed();
-            assign(seeds.x0.as_mut_slice(), step.x);
-            assign(seeds.u.as_mut_slice(), step.u);
+            copy_common(seeds.x0.as_mut_slice(), step.x);
+            copy_common(seeds.u.as_mut_slice(), step.u);
             step.free.spread(seeds.p.as_mut_slice(), step.w);
             let (x, u) = (vector(interval.x), vector(interval.u));
             at(k, self.at.begin(&interval))?;
@@ -385,5 +385,6 @@ fn hessian<'r, M: Dae, B, const S: usize, T: Real>(
     of: &Interval<'_, T>,
 ) -> Result<IntervalResult<'r, T>, Error> {
     let lambda = vector(of.multipliers);
-    irk.hessian_along(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None).map(IntervalResult::from)
+    irk.hessian_with_quadrature(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None)
+        .map(IntervalResult::from)
 }

@@ -170,14 +170,14 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let given = [&self.lower, &self.upper, &self.linear, &self.quadratic];
         for (to, from) in limits.into_iter().zip(given) {
-            crate::qp::assign(to, from.as_ref());
+            crate::qp::copy_common(to, from.as_ref());
         }
     }
     fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
         self.read::<S>(v, at);
         F::value::<T>(&self.v, &mut self.g);
         finite_outputs::<F, T>(&self.g, at.stage)?;
-        crate::qp::assign(values, self.g.as_ref());
+        crate::qp::copy_common(values, self.g.as_ref());
         Ok(())
     }
     fn linearise(
@@ -191,7 +191,7 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
         self.read::<S>(v, at);
         F::value_jacobian::<T>(&self.v, &mut self.g, &mut self.jacobian);
         finite_outputs::<F, T>(&self.g, at.stage)?;
-        crate::qp::assign(values, self.g.as_ref());
+        crate::qp::copy_common(values, self.g.as_ref());
         for ((row, variable), &value) in F::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
             if let Some(position) = Self::position::<S>(variable, at) {
                 crate::qp::element::set(columns, row * ld + position, value);

@@ -6,7 +6,7 @@ use crate::ocp::formulation::functions::cost::Show;
 use crate::ocp::formulation::functions::pattern::Origin;
 pub use crate::ocp::formulation::functions::result::{IntegralTerms, IntervalResult};
 use crate::ocp::formulation::names::Names;
-use crate::qp::larger;
+use crate::qp::nan_max;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use core::fmt;
@@ -295,7 +295,7 @@ pub trait SecondOrder<T: Real>: Dynamics<T> {
 
 /// Sum and largest of what is left of the equations of stages.
 pub(in crate::ocp) fn add_stages<T: Real>([sum, largest]: [T; 2], [more, other]: [T; 2]) -> [T; 2] {
-    [sum + more, larger(largest, other)]
+    [sum + more, nan_max(largest, other)]
 }
 
 /// A vector of these elements.

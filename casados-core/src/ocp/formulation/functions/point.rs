@@ -39,7 +39,7 @@ pub(in crate::ocp) fn finite_outputs<F: Function, T: Real>(
     y: &ArrayY<F, T>,
     stage: usize,
 ) -> Result<(), OcpError> {
-    match crate::finite::not_finite(y.as_ref()) {
+    match crate::finite::find_non_finite(y.as_ref()) {
         None => Ok(()),
         Some((output, value)) => {
             Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
@@ -59,7 +59,7 @@ pub(in crate::ocp) fn finite<F: Function, T: Real>(
     if value.is_finite() {
         return Ok(value);
     }
-    let (output, value) = crate::finite::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
+    let (output, value) = crate::finite::find_non_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
     Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::Ocp;
-use crate::qp::{QpView, Solution, StageDims, marked};
+use crate::qp::{QpView, Solution, StageDims, marked_indices};
 use crate::scalar::Real;
 
 impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -63,7 +63,7 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
     /// Makes shared controls of the iterate those of stage 0.
     pub(in crate::ocp) fn join_controls(&mut self) {
         let intervals = self.intervals();
-        for j in marked(self.qp.view().shared()) {
+        for j in marked_indices(self.qp.view().shared()) {
             let Some(value) = self.iterate.stage(0).and_then(|stage| stage.u.get(j).copied()) else { return };
             for k in 1..=intervals {
                 if let Some(u) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(j)) {
@@ -76,7 +76,7 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
     /// Makes periodic states of the last stage of the iterate those of the first one.
     pub(in crate::ocp) fn join_states(&mut self) {
         let last = self.intervals();
-        for i in marked(self.qp.view().periodic()) {
+        for i in marked_indices(self.qp.view().periodic()) {
             let Some(value) = self.iterate.stage(0).and_then(|stage| stage.x.get(i).copied()) else { return };
             if let Some(x) = self.iterate.stage_mut(last).and_then(|stage| stage.x.get_mut(i)) {
                 *x = value;

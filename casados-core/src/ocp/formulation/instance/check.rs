@@ -30,7 +30,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let np = P::Shape::NP;
         let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
-        if let Some((index, _)) = crate::finite::not_finite(p) {
+        if let Some((index, _)) = crate::finite::find_non_finite(p) {
             let stage = index.checked_div(np).unwrap_or(0);
             return Err(OcpError::Missing { part: Part::Parameters, stage });
         }
@@ -41,7 +41,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::InvalidValue`]
     pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
         // All numbers at once; names are looked for where one of these is not finite.
-        if crate::finite::not_finite(self.iterate.numbers()).is_some() {
+        if crate::finite::find_non_finite(self.iterate.all_numbers()).is_some() {
             self.name_not_finite()
         } else {
             Ok(())
@@ -93,7 +93,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Free parameters, or their multipliers, by name.
     fn check_free(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
-        let Some((index, value)) = crate::finite::not_finite(w) else { return Ok(()) };
+        let Some((index, value)) = crate::finite::find_non_finite(w) else { return Ok(()) };
         let part = if part == Part::Controls { Part::Parameters } else { part };
         Err(OcpError::InvalidValue { part, stage: 0, name: self.name_of_free(index), index, value })
     }

@@ -6,7 +6,7 @@ use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::point::read;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
-use crate::qp::{SolutionStage, StageDims, pad, part, part_mut};
+use crate::qp::{SolutionStage, StageDims, padded_len, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -100,7 +100,7 @@ const fn lengths<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
 
 /// Two matrices and a vector over `(x, w, u)`, or a gradient over `(x, w, u, z)`.
 const fn scratch<T>(n: usize, nz: usize) -> usize {
-    let (matrices, gradient) = ((2 * n + 1) * pad::<T>(n), n + nz);
+    let (matrices, gradient) = ((2 * n + 1) * padded_len::<T>(n), n + nz);
     if matrices < gradient { gradient } else { matrices }
 }
 

@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::data::{self, Layout};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{Qp, Solution, StageDims};
 #[cfg(feature = "alloc")]
-use crate::qp::{room, zeros};
+use crate::qp::{try_reserve, zeros};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -35,7 +35,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     {
         let layout = Layout::new(horizon.intervals(), H::STARTS);
         let mut dims = Vec::new();
-        room(&mut dims, layout.intervals.saturating_add(1))?;
+        try_reserve(&mut dims, layout.intervals.saturating_add(1))?;
         dims.resize(layout.intervals, data::stage::<Self, T>(layout, false));
         dims.push(data::stage::<Self, T>(layout, true));
         let qp = Qp::new(&dims)?;
@@ -135,7 +135,7 @@ pub trait Renewable<V>: AsRef<[V]> + Sized {
 impl<V: Copy + Default> Renewable<V> for Vec<V> {
     fn renew(first: &[V], length: usize) -> Result<Self, OcpError> {
         let mut list = Vec::new();
-        room(&mut list, length)?;
+        try_reserve(&mut list, length)?;
         list.extend_from_slice(first);
         list.resize(length, V::default());
         Ok(list)

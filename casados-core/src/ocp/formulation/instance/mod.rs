@@ -21,7 +21,7 @@ use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, s
 use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::set;
-use crate::qp::{Qp, Solution, SolutionStage, StageDims, assign, pad, part_mut};
+use crate::qp::{Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 #[cfg(feature = "alloc")]
@@ -186,8 +186,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             } else {
                 terminal.bounds(limits)
             }
-            assign(bounds.upper_linear, bounds.lower_linear);
-            assign(bounds.upper_quadratic, bounds.lower_quadratic);
+            copy_common(bounds.upper_linear, bounds.lower_linear);
+            copy_common(bounds.upper_quadratic, bounds.lower_quadratic);
         }
         for copy in 0..P::Terminal::STARTS {
             qp.share(copy);
@@ -265,8 +265,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if stage == last && !u.is_empty() && !known.linear.is_empty() { P::Shape::NU } else { own.len() };
         Labels::states::<P, T>(Part::States, stage).check_vector(x, known.own_states())?;
         Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, controls)?;
-        assign(place.x, x);
-        assign(own, u);
+        copy_common(place.x, x);
+        copy_common(own, u);
         for (state, &control) in (known.own_states()..).zip(known.linear) {
             if let Some(&value) = u.get(control as usize) {
                 set(place.x, state, value);
@@ -340,6 +340,6 @@ pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
     times: &'a [T],
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
-    let ld = [pad::<T>(inputs::<S>(free.count())), pad::<T>(S::NX)];
+    let ld = [padded_len::<T>(inputs::<S>(free.count())), padded_len::<T>(S::NX)];
     Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None, piece: None }
 }

@@ -10,8 +10,8 @@ use crate::ocp::formulation::instance::memory::Renewable;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{
-    Bounds, BoundsMut, Qp, Solution, SolutionStage, SolutionStageMut, StageDims, assign, marked, part,
-    part_mut, room,
+    Bounds, BoundsMut, Qp, Solution, SolutionStage, SolutionStageMut, StageDims, copy_common, marked_indices,
+    part, part_mut, try_reserve,
 };
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -35,7 +35,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
             ..Layout::new(intervals, free.count())
         };
         let mut dims: Vec<StageDims> = Vec::new();
-        room(&mut dims, intervals.saturating_add(1))?;
+        try_reserve(&mut dims, intervals.saturating_add(1))?;
         dims.resize(intervals, data::stage::<P, T>(layout, false));
         dims.push(data::stage::<P, T>(layout, true));
         let count = dims.len();
@@ -43,7 +43,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
         let length = Solution::<T, (), ()>::memory(&dims);
         let mut iterate = Solution::in_memory(D::renew(&dims, count)?, M::renew(&[], length)?)?;
         let mut data = M::renew(&[], data::length::<P, T>(layout))?;
-        let (variables, multipliers) = iterate.vectors();
+        let (variables, multipliers) = iterate.variables_and_costates();
         inner.allocate::<P>(layout, [variables.len(), multipliers.len()])?;
         self.move_qp(&mut qp, gap);
         for (k, stage) in self.iterate.stages().enumerate() {
@@ -58,7 +58,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
             (to.references, from.references),
             (to.arrival, from.arrival),
         ] {
-            assign(to, from);
+            copy_common(to, from);
         }
         let infinity = T::from_f64(f64::INFINITY);
         let [more, less] = [layout, old].map(path_rows::<P, T>);
@@ -66,7 +66,7 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
             to.fill(none);
             for k in 0..=intervals {
                 let rows = if k < intervals { less } else { P::Terminal::ROWS };
-                assign(part_mut(to, k * more, rows), part(from, k * less, rows));
+                copy_common(part_mut(to, k * more, rows), part(from, k * less, rows));
             }
             if old.inner == 0 {
                 copy_to_points::<P, T>(&inner, |from, row| {
@@ -108,10 +108,10 @@ impl<P: Formulation<T>, T: Real, D: Renewable<StageDims>, M: Renewable<T> + AsMu
             copy_bounds(&from.u_bounds(), to.u_bounds_mut(), gap_or_end);
             copy_bounds(&from.g_bounds(), to.g_bounds_mut(), usize::MAX);
         }
-        marked(view.periodic()).for_each(|i| {
+        marked_indices(view.periodic()).for_each(|i| {
             to.make_periodic(i);
         });
-        marked(view.shared()).map(|j| if j < gap_or_end { j } else { j + 1 }).for_each(|j| {
+        marked_indices(view.shared()).map(|j| if j < gap_or_end { j } else { j + 1 }).for_each(|j| {
             to.share(j);
         });
         if let Some(w) = gap {
@@ -132,8 +132,8 @@ fn copy_to_points<P: Formulation<T>, T: Real>(inner: &InnerPoints<T>, mut copy: 
 /// Copies a list to one with another element at `gap`.
 fn copy<T: Real>(from: &[T], to: &mut [T], gap: usize) {
     let (before, behind) = from.split_at(gap.min(from.len()));
-    assign(to, before);
-    assign(to.get_mut(gap.saturating_add(1)..).unwrap_or_default(), behind);
+    copy_common(to, before);
+    copy_common(to.get_mut(gap.saturating_add(1)..).unwrap_or_default(), behind);
 }
 
 fn copy_bounds<T: Real>(from: &Bounds<'_, T>, to: BoundsMut<'_, T>, gap: usize) {
@@ -161,6 +161,6 @@ fn copy_stage<T: Real>(from: &SolutionStage<'_, T>, to: SolutionStageMut<'_, T>,
         (from.g_lower, to.g_lower),
         (from.g_upper, to.g_upper),
     ] {
-        assign(to, from);
+        copy_common(to, from);
     }
 }

@@ -1,8 +1,8 @@
 //! How the barrier parameter changes.
 
 use crate::qp::element::set;
-use crate::qp::interior::Sides;
-use crate::qp::{Residuals, larger};
+use crate::qp::interior::Inequalities;
+use crate::qp::{Residuals, nan_max};
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.
@@ -105,7 +105,7 @@ fn begin(mu: f64, mean: f64) -> f64 {
 }
 
 /// The mean of the products of slacks and multipliers.
-pub(super) fn mean<T: Real>(sides: &Sides<'_, T>) -> f64 {
+pub(super) fn mean<T: Real>(sides: &Inequalities<'_, T>) -> f64 {
     let products = sides.slack.iter().zip(&*sides.multiplier).map(|(s, l)| s.to_f64() * l.to_f64());
     products.fold(0.0, |sum, product| sum + product) / sides.slack.len().max(1) as f64
 }
@@ -125,20 +125,20 @@ const THETA_MU: f64 = 1.5;
 /// `E_μ`: the largest residual of the conditions of the barrier problem.
 pub(super) fn error(residuals: &Residuals, farthest: f64) -> f64 {
     let Residuals { stationarity, dynamics, inequalities, .. } = *residuals;
-    [stationarity, dynamics, inequalities].into_iter().fold(farthest, larger)
+    [stationarity, dynamics, inequalities].into_iter().fold(farthest, nan_max)
 }
 
 /// The largest `|s λ − μ|`.
 pub(super) fn farthest<T: Real>(slacks: &[T], multipliers: &[T], mu: f64) -> f64 {
     let products = slacks.iter().zip(multipliers);
-    products.fold(0.0, |m, (&s, &l)| larger(m, (s.to_f64() * l.to_f64() - mu).abs()))
+    products.fold(0.0, |m, (&s, &l)| nan_max(m, (s.to_f64() * l.to_f64() - mu).abs()))
 }
 
 /// What is left of the sides, and of `s λ = μ`, in the barrier problem itself: there soft bounds
 /// are violated a little everywhere.
-pub(super) fn residuals<T: Real>(sides: &Sides<'_, T>, mu: f64) -> (f64, f64) {
+pub(super) fn residuals<T: Real>(sides: &Inequalities<'_, T>, mu: f64) -> (f64, f64) {
     let all = sides.residual.iter().chain(&*sides.equation_residual);
-    let largest = all.fold(0.0, |m, residual| larger(m, residual.abs().to_f64()));
+    let largest = all.fold(0.0, |m, residual| nan_max(m, residual.abs().to_f64()));
     (largest, farthest(sides.slack, sides.multiplier, mu))
 }
 
@@ -162,7 +162,7 @@ pub(super) fn fraction_to_boundary(mu: f64) -> f64 {
 /// A side gives way to its multiplier (`Sides::compliance`), and a state that dynamics alone
 /// determine does not move: that multiplier would go by steps as small as the distance. Others
 /// take over its force.
-pub(super) fn reset_small_slacks<T: Real>(sides: &mut Sides<'_, T>, mu: f64, small: f64) {
+pub(super) fn reset_small_slacks<T: Real>(sides: &mut Inequalities<'_, T>, mu: f64, small: f64) {
     let small = T::from_f64(small);
     for ((slack, multiplier), residual) in
         sides.slack.iter_mut().zip(&mut *sides.multiplier).zip(&mut *sides.residual)
@@ -180,7 +180,7 @@ const KAPPA_SIGMA: f64 = 1e10;
 
 /// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
 /// what its violation costs.
-pub(super) fn keep_near_centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
+pub(super) fn keep_near_centre<T: Real>(sides: &mut Inequalities<'_, T>, mu: f64) {
     let count = sides.counts.sides();
     for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
         let centre = mu / slack.to_f64();

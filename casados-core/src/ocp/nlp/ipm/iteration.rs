@@ -23,7 +23,7 @@ use crate::ocp::nlp::watch::Watch;
 use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{QpError, StageDims, Store, larger};
+use crate::qp::{QpError, StageDims, Store, nan_max};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -91,7 +91,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.store(&mut view);
         let objective = if state.lengths.alone { plain } else { plain + penalties };
         if P::LIFTED {
-            residuals.dynamics = larger(residuals.dynamics, of_stages);
+            residuals.dynamics = nan_max(residuals.dynamics, of_stages);
         }
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
@@ -105,7 +105,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
         state.judge(error, others, &self.options);
         state.gaps = barrier.0.dynamics;
-        state.violation = larger(state.gaps, barrier.0.inequalities);
+        state.violation = nan_max(state.gaps, barrier.0.inequalities);
         let is_alone = state.lengths.alone;
         if is_alone {
             state.phase.take(&iterate, view.dynamics, state.gaps, units);
@@ -114,7 +114,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
         let worst = elastic::worst(ocp, state, (work.penalties, work.units));
-        let size = larger(state.error, worst.map_or(0.0, |worst| worst.violation));
+        let size = nan_max(state.error, worst.map_or(0.0, |worst| worst.violation));
         let is_best = size < state.best_residual || state.best_residual.is_nan();
         if !is_alone && is_best || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);

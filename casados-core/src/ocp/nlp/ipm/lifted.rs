@@ -7,7 +7,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::Program;
-use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
+use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -50,7 +50,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let to = self.trial.view_mut();
         for place in Places::<T>::new(iterate.qp.dims) {
-            assign(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));
+            copy_common(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));
         }
         P::expand_stages(ocp, &self.trial)
     }

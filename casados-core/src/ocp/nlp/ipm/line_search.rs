@@ -12,7 +12,7 @@ use crate::ocp::nlp::filter::{
 };
 use crate::ocp::program::Program;
 use crate::qp::interior::Iterate;
-use crate::qp::{Places, Solution, StageDims, Store, assign, part, part_mut};
+use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `γ_α`
@@ -175,12 +175,12 @@ where
             gaps += ocp.stages[0].to_f64();
         }
         let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
-        let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
+        let slacks = part(self.work.slacks, 0, self.lengths.counts.pair_count());
         let mut violation =
             gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
         if let Some(coupling) = &mut iterate.coupling {
             coupling.evaluate(iterate.qp, self.work.rows);
-            violation += coupling.violation();
+            violation += coupling.residual_sum();
         }
         let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
         Some(Measure {
@@ -220,10 +220,10 @@ where
     ) -> Result<Option<f64>, OcpError> {
         {
             let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
-            assign(self.work.step, iterate.step);
-            assign(self.work.slack_step, iterate.sides.slack_step);
-            assign(self.work.multiplier_step, iterate.sides.multiplier_step);
-            assign(self.work.free_step, iterate.sides.free_step);
+            copy_common(self.work.step, iterate.step);
+            copy_common(self.work.slack_step, iterate.sides.slack_step);
+            copy_common(self.work.multiplier_step, iterate.sides.multiplier_step);
+            copy_common(self.work.free_step, iterate.sides.free_step);
         }
         let mut violation = expected.here.violation;
         let mut accepted = None;
@@ -256,10 +256,10 @@ where
         }
         if accepted.is_none() {
             let iterate: Iterate<'_, T> = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
-            assign(iterate.step, self.work.step);
-            assign(iterate.sides.slack_step, self.work.slack_step);
-            assign(iterate.sides.multiplier_step, self.work.multiplier_step);
-            assign(iterate.sides.free_step, self.work.free_step);
+            copy_common(iterate.step, self.work.step);
+            copy_common(iterate.sides.slack_step, self.work.slack_step);
+            copy_common(iterate.sides.multiplier_step, self.work.multiplier_step);
+            copy_common(iterate.sides.free_step, self.work.free_step);
         }
         Ok(accepted)
     }

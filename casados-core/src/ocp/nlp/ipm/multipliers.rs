@@ -11,7 +11,7 @@ use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::program::Program;
-use crate::qp::{StageDims, Store, assign};
+use crate::qp::{StageDims, Store, copy_common};
 use crate::scalar::Real;
 
 /// First multipliers that are more units are discarded.
@@ -38,8 +38,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut iterate =
             kkt_view_of_new_qp(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
         iterate.units = units.rows;
-        iterate.take_point(&view);
-        iterate.give_initial_state();
+        iterate.load_point(&view);
+        iterate.load_initial_state();
         evaluate_values(&mut iterate);
         let force = state.lengths.sizes.force;
         begin_sides(&mut iterate, &self.options, warm, state.mu, units, &view);
@@ -48,12 +48,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         iterate.store(&mut view);
         if warm {
-            assign(work.hessian_multipliers, iterate.sides.multiplier);
+            copy_common(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work, force).is_ok() {
             let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * force);
             let sides = scaling::of_sides(iterate.sides.rows, work.hessian_multipliers, rows);
             if scaling::of_gaps(iterate.qp.dims, work.pi, rows).chain(sides).all(is_small) {
-                assign(view.dynamics, work.pi);
+                copy_common(view.dynamics, work.pi);
             } else {
                 view.dynamics.fill(T::ZERO);
                 work.hessian_multipliers.fill(T::ZERO);
@@ -74,11 +74,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut view = solution.view_mut();
         let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let work = Work::new(ends, &state.capacity, self.work.as_mut());
-        assign(work.slacks, iterate.sides.multiplier);
-        assign(iterate.sides.multiplier, work.hessian_multipliers);
-        iterate.take_point(&view);
+        copy_common(work.slacks, iterate.sides.multiplier);
+        copy_common(iterate.sides.multiplier, work.hessian_multipliers);
+        iterate.load_point(&view);
         iterate.store(&mut view);
-        assign(iterate.sides.multiplier, work.slacks);
+        copy_common(iterate.sides.multiplier, work.slacks);
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use super::barrier;
 use super::kkt::newton::resolve;
 use super::line_search::longest;
 use crate::qp::QpError;
-use crate::qp::interior::{Iterate, Sides};
+use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
 
 /// Corrections one after the other, each for the changes of the step before. With the same factors
@@ -24,20 +24,20 @@ const NEAR: f64 = 0.3;
 const SHORT: f64 = 0.6;
 
 /// The lengths of the primal and of the dual step that keep `1 − τ` of slacks and multipliers.
-pub(super) fn lengths<T: Real>(sides: &Sides<'_, T>, tau: f64) -> (f64, f64) {
+pub(super) fn lengths<T: Real>(sides: &Inequalities<'_, T>, tau: f64) -> (f64, f64) {
     let primal = longest(sides.slack, sides.slack_step, tau);
     let dual = longest(sides.multiplier, sides.multiplier_step, tau);
     if needs_equal_steps(sides) { (primal.min(dual), primal.min(dual)) } else { (primal, dual) }
 }
 
 /// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
-pub(super) fn needs_equal_steps<T: Real>(sides: &Sides<'_, T>) -> bool {
+pub(super) fn needs_equal_steps<T: Real>(sides: &Inequalities<'_, T>) -> bool {
     sides.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }
 
 /// `μ` after the step without barrier that is there: the mean product, times the third power of
 /// what that step, as far as it may be gone, leaves of it.
-pub(super) fn probe<T: Real>(sides: &Sides<'_, T>, least: f64) -> f64 {
+pub(super) fn probe<T: Real>(sides: &Inequalities<'_, T>, least: f64) -> f64 {
     let (primal, dual) = lengths(sides, 1.0);
     let mean = barrier::mean(sides);
     let slacks = sides.slack.iter().zip(&*sides.slack_step);

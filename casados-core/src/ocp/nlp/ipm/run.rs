@@ -151,7 +151,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         push_inside(qp, lengths.fixed, push, work.units, &mut iterate.view_mut());
         ocp.join_controls();
         self.guess.copy_from(&ocp.iterate);
-        let stays = self.trial.vectors().0 == ocp.iterate.vectors().0;
+        let stays = self.trial.variables_and_costates().0 == ocp.iterate.variables_and_costates().0;
         let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);
         Ok((lengths, capacity, stays))

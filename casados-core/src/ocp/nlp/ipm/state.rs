@@ -9,7 +9,7 @@ use crate::ocp::nlp::filter::Filter;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::Residuals;
-use crate::qp::interior::{Iterate, Sides};
+use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
 
 /// So many iterations with nothing left but complementarity, each of which leaves this part of it,
@@ -146,7 +146,7 @@ impl<'c> State<'c> {
         options: &IpmOptions,
     ) {
         let force = self.lengths.sizes.force;
-        let Sides { slack, multiplier, .. } = &iterate.sides;
+        let Inequalities { slack, multiplier, .. } = &iterate.sides;
         let error =
             |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu * force) / products);
         let mean = barrier::mean(&iterate.sides) / force;

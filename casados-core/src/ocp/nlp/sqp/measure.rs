@@ -6,7 +6,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::nlp::filter::Measure;
 use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::qp::element::get;
-use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, assign, part, part_mut};
+use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, copy_common, part, part_mut};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -14,8 +14,8 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// change of `penalties`.
     pub(in crate::ocp) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
         let Parts { qp, iterate, scratch, .. } = P::split(self);
-        let (from, _) = iterate.vectors();
-        let (to, _) = solution.vectors();
+        let (from, _) = iterate.variables_and_costates();
+        let (to, _) = solution.variables_and_costates();
         let (mut slope, mut begin) = (T::ZERO, 0);
         let mut soft = -penalties;
         for (stage, point) in qp.view().stages().zip(solution.stages()) {
@@ -27,7 +27,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
                 *d = w - v;
             }
-            assign(gradient, part(view.gradient, 0, view.ld));
+            copy_common(gradient, part(view.gradient, 0, view.ld));
             add_symmetric(gradient, view.hessian, view.ld, v, view.n);
             slope = gradient.iter().zip(&*direction).fold(slope, |sum, (&g, &d)| sum + g * d);
             let x = |i: usize| point.x.get(i).copied().unwrap_or(T::ZERO);
@@ -46,7 +46,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
     pub(super) fn curvature(&mut self, solution: &Solution<T, D, M>) -> f64 {
         let Parts { qp, iterate, scratch, .. } = P::split(self);
-        let ((from, _), (to, _)) = (iterate.vectors(), solution.vectors());
+        let ((from, _), (to, _)) = (iterate.variables_and_costates(), solution.variables_and_costates());
         let (mut curvature, mut square, mut begin) = (T::ZERO, T::ZERO, 0);
         for stage in qp.view().stages() {
             let view = stage.arrays();
@@ -106,7 +106,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// The sum of the gaps between intervals at the iterate, from the QP that was written there.
     pub(super) fn gaps(&self) -> f64 {
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let (mut sum, mut begin) = (0.0, 0);
         let mut stages = self.iterate.stages().skip(1);
         for stage in self.qp.view().stages() {
@@ -126,7 +126,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// [`Ocp::measure`] at the iterate, from the QP that was written there.
     pub(in crate::ocp) fn measure_here(&self, weights: &Solution<T, D, M>) -> Measure {
         let mut sum = Measure { objective: self.objective.to_f64(), violation: 0.0 };
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         let mut stages = self.iterate.stages().peekable();
         let mut weights = weights.stages();

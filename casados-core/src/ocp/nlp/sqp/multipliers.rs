@@ -73,7 +73,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// `½ ε ‖v − v̄‖² + s ∇fᵀv` as the objective of the QP at the iterate `v̄`.
     fn flatten(&mut self, small: T, share: T) {
-        let (v, _) = self.iterate.vectors();
+        let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();

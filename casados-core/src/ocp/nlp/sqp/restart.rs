@@ -11,7 +11,7 @@ use crate::ocp::nlp::simulation::{
 use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
-use crate::qp::{QpSolver, Residuals, StageDims, larger};
+use crate::qp::{QpSolver, Residuals, StageDims, nan_max};
 use crate::scalar::Real;
 
 /// The regularisation of the first direction.
@@ -95,5 +95,5 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 /// The largest violation, of equations and of inequalities.
 pub(super) fn violation_of(residuals: &Residuals) -> f64 {
-    larger(residuals.dynamics, residuals.inequalities)
+    nan_max(residuals.dynamics, residuals.inequalities)
 }

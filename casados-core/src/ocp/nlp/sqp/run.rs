@@ -16,7 +16,7 @@ use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
-use crate::qp::room;
+use crate::qp::try_reserve;
 use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -129,7 +129,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         #[cfg(feature = "alloc")]
         {
             self.log.clear();
-            room(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
+            try_reserve(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
         }
         let mut outcome = Outcome::new();
         let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);

@@ -15,7 +15,7 @@ use crate::ocp::nlp::elastic::{self, Worst};
 use crate::ocp::program::Program;
 use crate::qp::interior::at;
 use crate::qp::{
-    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, pad, part, part_mut,
+    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, padded_len, part, part_mut,
 };
 use crate::scalar::Real;
 
@@ -37,7 +37,7 @@ pub(super) const fn memory<T>(dims: &[StageDims]) -> usize {
 
 /// The length of a padded vector.
 const fn padded<T>(n: usize) -> usize {
-    if n > usize::MAX / 2 { usize::MAX } else { pad::<T>(n) }
+    if n > usize::MAX / 2 { usize::MAX } else { padded_len::<T>(n) }
 }
 
 /// The power of two that is not above a positive number.

@@ -14,7 +14,7 @@ use super::column::Column;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
-use crate::qp::{QpView, marked, part, part_mut, zeros};
+use crate::qp::{QpView, marked_indices, part, part_mut, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -46,13 +46,13 @@ impl<T: Real> Border<T> {
         [nx, nu, n]: [usize; 3],
     ) -> Result<(), OcpError> {
         let free = if is_free { nx } else { 0 };
-        let same = |old: &[usize], marks: &[T]| marked(marks).eq(old.iter().copied());
+        let same = |old: &[usize], marks: &[T]| marked_indices(marks).eq(old.iter().copied());
         if free == self.free && same(&self.periodic, qp.periodic()) && same(&self.shared, qp.shared()) {
             return Ok(());
         }
         (self.nx, self.nu, self.free) = (nx, nu, free);
-        self.periodic = marked(qp.periodic()).collect();
-        self.shared = marked(qp.shared()).collect();
+        self.periodic = marked_indices(qp.periodic()).collect();
+        self.shared = marked_indices(qp.shared()).collect();
         self.rows = zeros(n * self.shared.len() * (nx + nu))?;
         self.matrix = zeros(self.len() * self.len())?;
         self.exchanged = zeros(self.len())?;

@@ -19,7 +19,7 @@ use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{QpError, part, part_mut, zeros};
 use crate::scalar::Real;
-use crate::structure::means;
+use crate::structure::name_matches;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -161,7 +161,7 @@ impl<T: Real> Covariance<T> {
 
     fn row(&self, (name, stage): (&str, usize)) -> Result<&[T], OcpError> {
         let [nx, nu, intervals] = self.dims;
-        let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
+        let position = |names: &[&str]| names.iter().position(|variable| name_matches(name, variable));
         let (index, part_of, stages, known) = match (position(self.names.x), position(self.names.u)) {
             (Some(i), _) => (i, Part::States, intervals + 1, self.names.x.get(i)),
             (None, Some(j)) => (nx + self.free.len() + j, Part::Controls, intervals, self.names.u.get(j)),

@@ -11,7 +11,7 @@ use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::{get, set};
-use crate::qp::{QpView, Solution, StageDims, assign, part, part_mut};
+use crate::qp::{QpView, Solution, StageDims, copy_common, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -22,11 +22,11 @@ impl<T: Real> SolutionFactors<T> {
         let mut column = core::mem::take(&mut self.column);
         for i in 0..given {
             solve::solve_start(self, i, &mut column);
-            assign(part_mut(&mut self.of_start, i * nx, nx), column.multipliers(0));
+            copy_common(part_mut(&mut self.of_start, i * nx, nx), column.multipliers(0));
         }
         for p in 0..np {
             solve::solve_parameter(self, p, &mut column);
-            assign(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
+            copy_common(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
             for q in 0..np {
                 let value = get(&self.problem.square, p * np + q) + self.change(q, &column);
                 set(&mut self.square, p * np + q, value);
@@ -92,7 +92,7 @@ impl<T: Real> SolutionFactors<T> {
                 if values.len() != expected {
                     return Err(OcpError::Length { part, stage, expected, found: values.len() });
                 }
-                if let Some((index, value)) = crate::finite::not_finite(values) {
+                if let Some((index, value)) = crate::finite::find_non_finite(values) {
                     return Err(OcpError::InvalidValue { part, stage, name: "seed", index, value });
                 }
             }

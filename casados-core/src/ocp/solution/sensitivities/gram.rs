@@ -9,7 +9,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::add;
-use crate::qp::{Bounds, assign, marked, part, zeros};
+use crate::qp::{Bounds, copy_common, marked_indices, part, zeros};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -102,14 +102,14 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             for (i, &x) in point.x.iter().enumerate() {
                 let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
                 if is_active(&stage.x_bounds(), i, x, multipliers) {
-                    assign(&mut row, unknowns.row(k, i));
+                    copy_common(&mut row, unknowns.row(k, i));
                     take(&mut row);
                 }
             }
             for (j, &u) in point.u.iter().enumerate() {
                 let multipliers = [get(point.u_lower, j), get(point.u_upper, j)];
                 if is_active(&stage.u_bounds(), j, u, multipliers) {
-                    assign(&mut row, unknowns.row(k, nx + j));
+                    copy_common(&mut row, unknowns.row(k, nx + j));
                     take(&mut row);
                 }
             }
@@ -124,8 +124,8 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 }
             }
         }
-        for i in marked(qp.periodic()) {
-            assign(&mut row, unknowns.row(0, i));
+        for i in marked_indices(qp.periodic()) {
+            copy_common(&mut row, unknowns.row(0, i));
             axpy(-T::ONE, unknowns.row(self.intervals(), i), &mut row);
             take(&mut row);
         }

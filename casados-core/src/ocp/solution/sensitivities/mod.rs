@@ -34,7 +34,7 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
-use crate::qp::{StageDims, assign, part_mut, zeros};
+use crate::qp::{StageDims, copy_common, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -141,8 +141,8 @@ impl<T: Real> Sensitivities<T> {
         for i in 0..factors.given() {
             solve::solve_start(factors, i, &mut column);
             for k in 0..=n {
-                assign(part_mut(x, (k * nx + i) * nx, nx), column.state(k));
-                assign(part_mut(u, (k * nx + i) * nu, nu), column.control(k));
+                copy_common(part_mut(x, (k * nx + i) * nx, nx), column.state(k));
+                copy_common(part_mut(u, (k * nx + i) * nu, nu), column.control(k));
             }
         }
         factors.column = column;
@@ -168,8 +168,8 @@ impl<T: Real> Sensitivities<T> {
         for p in 0..np {
             solve::solve_parameter(factors, p, &mut column);
             for k in 0..=n {
-                assign(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
-                assign(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
+                copy_common(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
+                copy_common(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
             }
         }
         factors.column = column;

@@ -11,7 +11,7 @@ use crate::ocp::formulation::functions::point::Cross;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{Node, inputs, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
+use crate::qp::{SolutionStage, StageDims, copy_common, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -110,8 +110,8 @@ impl<T: Real> Parameters<T> {
     pub(super) fn take(&mut self, k: usize, step: &IntervalResult<'_, T>) {
         let [nx, nu, np] = self.dims;
         let (size, nz) = (nx + nu, step.z.len());
-        assign(part_mut(&mut self.algebraic, k * nz * np, nz * np), step.dz[2]);
-        assign(part_mut(&mut self.ends, k * nx * np, nx * np), step.dp);
+        copy_common(part_mut(&mut self.algebraic, k * nz * np, nz * np), step.dz[2]);
+        copy_common(part_mut(&mut self.ends, k * nx * np, nx * np), step.dp);
         let columns = part_mut(&mut self.gradients, k * size * np, size * np);
         columns.fill(T::ZERO);
         let (slopes, square) = (&mut *self.slopes_of_value, &mut *self.square);

@@ -6,7 +6,9 @@ use super::factors::SolutionFactors;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
-use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut};
+use crate::qp::{
+    QpError, QpView, Solution, SolutionStage, Stage, StageDims, copy_common, marked_indices, part, part_mut,
+};
 use crate::scalar::Real;
 
 /// `∂V/∂x₀`: the derivative of the Lagrangian by the first state, without the multipliers that it
@@ -24,7 +26,7 @@ pub(super) fn gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]
     let (Some((stage, point)), Some(before)) = (stages.next_back(), iterate.stages().rev().nth(1)) else {
         return;
     };
-    for i in marked(qp.periodic()) {
+    for i in marked_indices(qp.periodic()) {
         let bounds = get(point.x_upper, i) - get(point.x_lower, i);
         add(result, i, slope_of(&stage, &point, i) + bounds - get(before.dynamics, i));
     }
@@ -69,7 +71,7 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let view = stage.arrays();
             for l in 0..nx {
                 let row = part_mut(&mut factors.dynamics, (k * nx + l) * size, size);
-                assign(row, part(view.matrix, l * view.ld, size));
+                copy_common(row, part(view.matrix, l * view.ld, size));
             }
             let next = part(&factors.costs_to_go, (k + 1) * nx * nx, nx * nx);
             let dynamics = part(&factors.dynamics, k * nx * size, nx * size);

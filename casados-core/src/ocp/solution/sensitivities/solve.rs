@@ -6,7 +6,7 @@ use super::factors::SolutionFactors;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{get, set};
-use crate::qp::{QpError, Solution, StageDims, Symmetric, assign, part, part_mut};
+use crate::qp::{QpError, Solution, StageDims, Symmetric, copy_common, part, part_mut};
 use crate::scalar::Real;
 
 impl<T: Real> Border<T> {
@@ -37,7 +37,7 @@ impl<T: Real> Border<T> {
             set(&mut column.border, unknown, T::ONE);
             pass(factors, &Zero, column);
             set(&mut column.border, unknown, T::ZERO);
-            assign(part_mut(&mut matrix, unknown * n, n), &column.residual);
+            copy_common(part_mut(&mut matrix, unknown * n, n), &column.residual);
         }
         let border = &mut factors.border;
         border.matrix = matrix;
@@ -68,7 +68,7 @@ struct OfParameter<'a, T>(&'a SolutionFactors<T>, usize);
 impl<T: Real> Right<T> for OfParameter<'_, T> {
     fn gradient(&self, k: usize, q: &mut [T]) {
         let [nx, nu, _] = self.0.dims;
-        assign(q, part(self.0.problem.gradient(k), self.1 * (nx + nu), q.len()));
+        copy_common(q, part(self.0.problem.gradient(k), self.1 * (nx + nu), q.len()));
     }
     fn end(&self, k: usize) -> &[T] {
         let [nx, _, _] = self.0.dims;
@@ -131,7 +131,7 @@ fn backward<T: Real, R: Right<T>>(factors: &SolutionFactors<T>, right: &R, colum
         q.fill(T::ZERO);
         if k < n {
             right.gradient(k, q);
-            assign(t, part(pi, (k + 1) * nx, nx));
+            copy_common(t, part(pi, (k + 1) * nx, nx));
             factors.cost_to_go(k + 1).zip(right.end(k)).for_each(|(column, &end)| axpy(end, column, t));
             factors.rows(k).zip(&*t).for_each(|(row, &t)| axpy(t, row, q));
             factors.border.push(k, given, q, residual);
@@ -151,7 +151,7 @@ fn backward<T: Real, R: Right<T>>(factors: &SolutionFactors<T>, right: &R, colum
 fn forward<T: Real, R: Right<T>>(factors: &SolutionFactors<T>, right: &R, column: &mut Column<T>) {
     let [nx, nu, _] = factors.dims;
     let Column { x, u, pi, start, border: given, residual, .. } = column;
-    assign(part_mut(x, 0, nx), factors.border.first(start, given));
+    copy_common(part_mut(x, 0, nx), factors.border.first(start, given));
     for k in 0..=factors.intervals {
         let (before, after) = x.split_at_mut_checked((k + 1) * nx).unwrap_or_default();
         let here = part(before, k * nx, nx);

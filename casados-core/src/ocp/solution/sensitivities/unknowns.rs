@@ -8,7 +8,7 @@ use crate::ocp::formulation::instance::data::Layout;
 use crate::ocp::formulation::instance::{HeapOcp, Initial};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::add;
-use crate::qp::{is_marked, marked, part, part_mut, zeros};
+use crate::qp::{is_marked, marked_indices, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -51,7 +51,7 @@ impl<T: Real> Unknowns<T> {
             None => ocp.name_of_free(j),
             Some(j) => known.u.get(j).copied().unwrap_or_default(),
         };
-        names.extend(marked(qp.shared()).map(|j| (name(j), 0)));
+        names.extend(marked_indices(qp.shared()).map(|j| (name(j), 0)));
         for k in 0..intervals {
             names.extend((free..nu).filter(|&j| !is_shared(j)).map(|j| (name(j), k)));
         }
@@ -68,7 +68,7 @@ impl<T: Real> Unknowns<T> {
             let place = all.place(intervals, nx + w) + first + w;
             add(&mut all.rows, place, T::ONE);
         }
-        let shared = marked(qp.shared()).count();
+        let shared = marked_indices(qp.shared()).count();
         let mut own = first + shared;
         for (k, stage) in qp.stages().enumerate().take(intervals) {
             let mut joint = first;

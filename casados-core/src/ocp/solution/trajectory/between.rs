@@ -8,7 +8,7 @@ use crate::ocp::formulation::instance::data::{Node, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
-use crate::qp::{SolutionStage, StageDims, assign, part, part_mut, zeros};
+use crate::qp::{SolutionStage, StageDims, copy_common, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -97,7 +97,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (layout, free) = (self.layout(), self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, path, .. } = self.problem.parts();
-        let (v, multipliers) = self.iterate.vectors();
+        let (v, multipliers) = self.iterate.variables_and_costates();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         // Piece by piece, where intervals are integrated so.
         let ends = if has_points { self.inner.parts() } else { &[T::ZERO, T::ONE] };
@@ -109,7 +109,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 here.map(|(index, &part)| (index, (part - from) / (to - from))).unzip();
             for k in 0..if piece > 0 { intervals } else { 0 } {
                 let start = self.inner.at::<P::Shape>(k, piece).x;
-                assign(part_mut(&mut starts, k * nodes.ld[0], nx), start);
+                copy_common(part_mut(&mut starts, k * nodes.ld[0], nx), start);
             }
             let nodes = Nodes { v: &starts, piece: has_points.then_some([from, to]), ..nodes };
             is_there &= dynamics.inside(&nodes, &along, &mut |point, step: &IntervalResult<'_, T>| {

@@ -155,7 +155,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (layout, free) = (self.layout(), self.free.view());
         let data = split::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, .. } = self.problem.parts();
-        let (v, multipliers) = self.iterate.vectors();
+        let (v, multipliers) = self.iterate.variables_and_costates();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         dynamics
             .simulate(&nodes, &mut |k, step| algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step))

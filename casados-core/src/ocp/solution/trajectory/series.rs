@@ -1,7 +1,7 @@
 //! One quantity over time.
 
 use crate::scalar::Real;
-use crate::structure::means;
+use crate::structure::name_matches;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -128,7 +128,7 @@ impl<T: Real> Series<T> {
     /// Whether a name means it; of `x.cart.position` also `cart.position`.
     pub(super) fn is_meant(&self, name: &str) -> bool {
         let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
-        means(name, &self.name) || field.is_some_and(|field| means(name, field))
+        name_matches(name, &self.name) || field.is_some_and(|field| name_matches(name, field))
     }
 
     /// `λ_upper − λ_lower` of every value: positive where the upper bound holds it back.

@@ -45,11 +45,11 @@ pub fn splat<T: Real, E: Packed<T>>(value: T) -> E {
 /// What tests of products share.
 #[cfg(test)]
 mod tests {
-    use crate::qp::layout::pad;
+    use crate::qp::layout::padded_len;
     use alloc::vec::Vec;
 
     /// What columns are padded to: registers, and an even number, which is enough without them.
-    pub const PADDINGS: [fn(usize) -> usize; 2] = [pad::<f64>, |n| n.next_multiple_of(2)];
+    pub const LEADING_DIMENSIONS: [fn(usize) -> usize; 2] = [padded_len::<f64>, |n| n.next_multiple_of(2)];
 
     /// Small integers, of which sums are exact, in columns of `rows` that are `ld` apart.
     pub fn integers(rows: usize, columns: usize, ld: usize, seed: usize) -> Vec<f64> {

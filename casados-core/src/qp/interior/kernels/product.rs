@@ -13,10 +13,10 @@ use core::ops::Range;
 /// Columns of tiles, which are even: what begins at an even column and is no longer than columns,
 /// whose length is even, does not end behind them. There are twice as many registers of AVX-512 as
 /// of AVX2.
-const WIDEST: usize = 8;
-const WIDE: usize = 6;
-const NARROW: usize = 4;
-const PAIR: usize = 2;
+const COLUMNS_AVX512: usize = 8;
+const COLUMNS_AVX2: usize = 6;
+const MIN_TILE_COLUMNS: usize = 4;
+const TWO_COLUMNS: usize = 2;
 /// A product writes up to one column more than it is asked for.
 pub const PADDING_COLUMNS: usize = 1;
 
@@ -37,7 +37,7 @@ impl<T> Source<'_, T> {
         if let Source::Matrix(matrix) = self { Source::Matrix(matrix.skip(columns)) } else { self }
     }
     #[inline(always)]
-    fn below(self, rows: usize) -> Self {
+    fn skip_rows(self, rows: usize) -> Self {
         if let Source::Matrix(matrix) = self { Source::Matrix(matrix.below(rows)) } else { self }
     }
 }
@@ -71,7 +71,7 @@ fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
 
 /// A tile of `target = source − X Yᵀ`.
 #[inline(always)]
-fn update<T: Real, E: Packed<T>, const R: usize, const C: usize>(
+fn write_tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
     target: &mut [T],
     target_ld: usize,
     source: Source<'_, T>,
@@ -118,12 +118,12 @@ fn strip<T: Real, E: Packed<T>, const C: usize>(
     let mut row = 0;
     while left > 0 {
         let target = target.get_mut(row..).unwrap_or_default();
-        let (source, x) = (source.below(row), x.below(row));
+        let (source, x) = (source.skip_rows(row), x.below(row));
         let done = left.min(2);
         if done == 2 {
-            update::<T, E, 2, C>(target, target_ld, source, x, y, depth);
+            write_tile::<T, E, 2, C>(target, target_ld, source, x, y, depth);
         } else {
-            update::<T, E, 1, C>(target, target_ld, source, x, y, depth);
+            write_tile::<T, E, 1, C>(target, target_ld, source, x, y, depth);
         }
         left -= done;
         row += done * E::LANES;
@@ -204,25 +204,25 @@ fn tiles<T: Real, E: Packed<T>>(
     while column < columns.end {
         let first = if part == Part::Lower { column / E::LANES * E::LANES } else { 0 };
         let target = target.get_mut(column * target_ld + first..).unwrap_or_default();
-        let source = source.skip(column).below(first);
+        let source = source.skip(column).skip_rows(first);
         let rows = rows.saturating_sub(first);
         let (x, y) = (x.below(first), y.below(column));
         column += match columns.end - column {
             0..=2 => {
-                strip::<T, E, PAIR>(target, target_ld, source, x, y, rows, depth);
-                PAIR
+                strip::<T, E, TWO_COLUMNS>(target, target_ld, source, x, y, rows, depth);
+                TWO_COLUMNS
             }
             3..=4 => {
-                strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
-                NARROW
+                strip::<T, E, MIN_TILE_COLUMNS>(target, target_ld, source, x, y, rows, depth);
+                MIN_TILE_COLUMNS
             }
             7.. if size_of::<E>() == 64 => {
-                strip::<T, E, WIDEST>(target, target_ld, source, x, y, rows, depth);
-                WIDEST
+                strip::<T, E, COLUMNS_AVX512>(target, target_ld, source, x, y, rows, depth);
+                COLUMNS_AVX512
             }
             _ => {
-                strip::<T, E, WIDE>(target, target_ld, source, x, y, rows, depth);
-                WIDE
+                strip::<T, E, COLUMNS_AVX2>(target, target_ld, source, x, y, rows, depth);
+                COLUMNS_AVX2
             }
         };
     }
@@ -283,7 +283,7 @@ fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{PADDINGS, integers};
+    use super::super::tests::{LEADING_DIMENSIONS, integers};
     use super::*;
     use crate::scalar::Registers;
 
@@ -314,7 +314,7 @@ mod tests {
     /// Every size around the edges of tiles, with memory that ends with the last column.
     #[test]
     fn products_of_all_sizes() {
-        for (padding, padded) in PADDINGS.into_iter().enumerate() {
+        for (padding, padded) in LEADING_DIMENSIONS.into_iter().enumerate() {
             for case in 0..13 * 13 * 5 * 2 {
                 let (rows, columns, depth) = (1 + case % 13, 1 + case / 13 % 13, case / 169 % 5);
                 let part = if case < 845 { Part::Full } else { Part::Lower };

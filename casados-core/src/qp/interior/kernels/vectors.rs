@@ -87,7 +87,7 @@ fn symmetric_rows<T: Real, E: Packed<T>, const R: usize>(
     for (factor, cell) in factors.iter_mut().zip(cells) {
         *factor = E::load(cell);
     }
-    let (index, zero) = (index::<T, E>(), E::from_f64(0.0));
+    let (index, zero) = (lane_indices::<T, E>(), E::from_f64(0.0));
     let mut sums = [zero; R];
     let mut data = h.get(begin * E::LANES..).unwrap_or_default();
     let columns = n.min((begin + R) * E::LANES);
@@ -158,7 +158,7 @@ const MAX_LANES: usize = 8;
 
 /// `0, 1, 2, …` in the lanes of a register.
 #[inline(always)]
-fn index<T: Real, E: Packed<T>>() -> E {
+fn lane_indices<T: Real, E: Packed<T>>() -> E {
     let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
     for lane in 0..E::LANES {
         E::set_lane(&mut index, lane, lane as f64);
@@ -200,7 +200,7 @@ fn mirror_register<T: Real, E: Packed<T>>(matrix: &mut [T], ld: usize, n: usize)
     let mut turned = [<E::Cell as bytemuck::Zeroable>::zeroed(); MAX_LANES];
     let (Some(from), Some(to)) = (own.get(..E::LANES), turned.get_mut(..E::LANES)) else { return };
     E::transpose(from, to);
-    let (index, one) = (index::<T, E>(), E::from_f64(1.0));
+    let (index, one) = (lane_indices::<T, E>(), E::from_f64(1.0));
     let (mut columns, mut column) = (matrix, E::from_f64(0.0));
     for (own, turned) in own.iter().zip(&turned).take(n) {
         let value = E::select(index.is_smaller(column), E::load(turned), *own);
@@ -238,7 +238,7 @@ pub fn add<T: Real, E: Packed<T>>(target: &mut [T], source: &[T]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{PADDINGS, integers};
+    use super::super::tests::{LEADING_DIMENSIONS, integers};
     use super::*;
     use alloc::vec::Vec;
 
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn symmetric_products_of_all_sizes() {
         for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {
-            let ld = PADDINGS[padding](n);
+            let ld = LEADING_DIMENSIONS[padding](n);
             let mut h = integers(n, n, ld, 1);
             let v = integers(n, 1, ld, 2);
             let before = integers(n, 1, ld, 3);

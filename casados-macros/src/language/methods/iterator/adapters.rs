@@ -1,14 +1,19 @@
 //! What adapters do for one element.
 
-use super::ends::End;
-use super::{Iter, holds, into_iter, known_option};
-use crate::language::evaluator::{At, Evaluator, error};
+use super::ends::IteratorEnd;
+use super::{Iter, holds, into_iter, option_content};
+use crate::language::evaluator::{Evaluator, TokenSpan, error};
 use crate::language::place::Place;
 use crate::language::value::Value;
 use syn::Result;
 
 /// Reads an iterator in a variable, and writes back what is left of it.
-pub fn by_ref(place: &Place, end: End, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
+pub fn by_ref(
+    place: &Place,
+    end: IteratorEnd,
+    evaluator: &mut Evaluator,
+    at: TokenSpan,
+) -> Result<Option<Value>> {
     let Value::Iterator(mut inner) = evaluator.read(place, at)? else {
         return Err(error(at, "this is no iterator any more"));
     };
@@ -22,20 +27,20 @@ pub fn successor(
     now: &mut Option<Box<Value>>,
     closure: &Value,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let Some(value) = now.take() else { return Ok(None) };
     let next = evaluator.call(closure, vec![(*value).clone()], at)?;
-    *now = known_option(next, at)?.map(Box::new);
+    *now = option_content(next, at)?.map(Box::new);
     Ok(Some(*value))
 }
 
 pub fn map(
     inner: &mut Iter,
     closure: &Value,
-    end: End,
+    end: IteratorEnd,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     match inner.pull(end, evaluator, at)? {
         None => Ok(None),
@@ -46,9 +51,9 @@ pub fn map(
 pub fn inspect(
     inner: &mut Iter,
     closure: &Value,
-    end: End,
+    end: IteratorEnd,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let value = inner.pull(end, evaluator, at)?;
     if let Some(value) = &value {
@@ -60,9 +65,9 @@ pub fn inspect(
 pub fn filter(
     inner: &mut Iter,
     closure: &Value,
-    end: End,
+    end: IteratorEnd,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     while let Some(value) = inner.pull(end, evaluator, at)? {
         if holds(evaluator, closure, value.clone(), "filter", at)? {
@@ -75,13 +80,13 @@ pub fn filter(
 pub fn filter_map(
     inner: &mut Iter,
     closure: &Value,
-    end: End,
+    end: IteratorEnd,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     while let Some(value) = inner.pull(end, evaluator, at)? {
         let value = evaluator.call(closure, vec![value], at)?;
-        if let Some(value) = known_option(value, at)? {
+        if let Some(value) = option_content(value, at)? {
             return Ok(Some(value));
         }
     }
@@ -92,7 +97,7 @@ pub fn take_while(
     inner: &mut Option<Box<Iter>>,
     closure: &Value,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let Some(open) = inner else { return Ok(None) };
     if let Some(value) = open.next(evaluator, at)?
@@ -108,7 +113,7 @@ pub fn skip_while(
     inner: &mut Iter,
     closure: &mut Option<Value>,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     while let Some(value) = inner.next(evaluator, at)? {
         match closure {
@@ -126,12 +131,12 @@ pub fn map_while(
     inner: &mut Option<Box<Iter>>,
     closure: &Value,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let Some(open) = inner else { return Ok(None) };
     let value = match open.next(evaluator, at)? {
         None => None,
-        Some(value) => known_option(evaluator.call(closure, vec![value], at)?, at)?,
+        Some(value) => option_content(evaluator.call(closure, vec![value], at)?, at)?,
     };
     if value.is_none() {
         *inner = None;
@@ -145,15 +150,20 @@ pub fn scan(
     closure: &Value,
     value: Value,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let place = Place::new(state.clone());
     let next = evaluator.call(closure, vec![Value::Reference(place.clone()), value], at)?;
     *state = evaluator.read(&place, at)?;
-    known_option(next, at)
+    option_content(next, at)
 }
 
-pub fn skip(inner: &mut Iter, left: &mut usize, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
+pub fn skip(
+    inner: &mut Iter,
+    left: &mut usize,
+    evaluator: &mut Evaluator,
+    at: TokenSpan,
+) -> Result<Option<Value>> {
     while *left > 0 {
         *left -= 1;
         if inner.next(evaluator, at)?.is_none() {
@@ -168,7 +178,7 @@ pub fn step_by(
     step: usize,
     begun: &mut bool,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     if std::mem::replace(begun, true) {
         for _ in 1..step {
@@ -186,7 +196,7 @@ pub fn last_of_steps(
     step: usize,
     begun: bool,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     let length = inner.length(evaluator, at)?;
     // The elements that come are those at `first`, `first + step`, ..
@@ -204,7 +214,7 @@ pub fn chain(
     first: &mut Option<Box<Iter>>,
     second: &mut Iter,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     if let Some(inner) = first {
         if let Some(value) = inner.next(evaluator, at)? {
@@ -216,7 +226,12 @@ pub fn chain(
 }
 
 /// The last pair: what one of them has more than the other is left out.
-pub fn last_of_both(a: &mut Iter, b: &mut Iter, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
+pub fn last_of_both(
+    a: &mut Iter,
+    b: &mut Iter,
+    evaluator: &mut Evaluator,
+    at: TokenSpan,
+) -> Result<Option<Value>> {
     let (left, right) = (a.length(evaluator, at)?, b.length(evaluator, at)?);
     for _ in right..left {
         a.next_back(evaluator, at)?;
@@ -235,9 +250,9 @@ pub fn last_of_both(a: &mut Iter, b: &mut Iter, evaluator: &mut Evaluator, at: A
 pub fn flatten(
     inner: &mut Iter,
     [near, far]: [&mut Option<Box<Iter>>; 2],
-    end: End,
+    end: IteratorEnd,
     evaluator: &mut Evaluator,
-    at: At,
+    at: TokenSpan,
 ) -> Result<Option<Value>> {
     loop {
         if let Some(open) = near {

@@ -1,31 +1,36 @@
 //! Pulling an element from the front or from the back.
 
-use super::{Iter, adapters, known_option};
-use crate::language::evaluator::{At, Evaluator, error};
+use super::{Iter, adapters, option_content};
+use crate::language::evaluator::{Evaluator, TokenSpan, error};
 use crate::language::place::Projection;
 use crate::language::value::{Integer, Value};
 use syn::Result;
 
 /// Where an element is pulled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum IteratorEnd {
     Front,
     Back,
 }
 
 impl Iter {
     /// The next element from one of both ends.
-    pub(super) fn pull(&mut self, end: End, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
+    pub(super) fn pull(
+        &mut self,
+        end: IteratorEnd,
+        evaluator: &mut Evaluator,
+        at: TokenSpan,
+    ) -> Result<Option<Value>> {
         match end {
-            End::Front => self.next(evaluator, at),
-            End::Back => self.next_back(evaluator, at),
+            IteratorEnd::Front => self.next(evaluator, at),
+            IteratorEnd::Back => self.next_back(evaluator, at),
         }
     }
 
     /// The next element from the front.
-    pub fn next(&mut self, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
-        const FRONT: End = End::Front;
-        evaluator.tick(1, at)?;
+    pub fn next(&mut self, evaluator: &mut Evaluator, at: TokenSpan) -> Result<Option<Value>> {
+        const FRONT: IteratorEnd = IteratorEnd::Front;
+        evaluator.count_steps(1, at)?;
         Ok(match self {
             Iter::Elements { array, front, back } if *front < *back => {
                 *front += 1;
@@ -42,7 +47,7 @@ impl Iter {
             Iter::Elements { .. } | Iter::Places { .. } | Iter::Range { .. } => None,
             Iter::ByRef(place) => adapters::by_ref(place, FRONT, evaluator, at)?,
             Iter::Repeat(value) => Some(value.clone()),
-            Iter::FromFn(closure) => known_option(evaluator.call(closure, Vec::new(), at)?, at)?,
+            Iter::FromFn(closure) => option_content(evaluator.call(closure, Vec::new(), at)?, at)?,
             Iter::Successors(now, closure) => adapters::successor(now, closure, evaluator, at)?,
             Iter::Zip(a, b) => match a.next(evaluator, at)? {
                 None => None,
@@ -90,9 +95,9 @@ impl Iter {
     }
 
     /// The next element from the back.
-    pub fn next_back(&mut self, evaluator: &mut Evaluator, at: At) -> Result<Option<Value>> {
-        const BACK: End = End::Back;
-        evaluator.tick(1, at)?;
+    pub fn next_back(&mut self, evaluator: &mut Evaluator, at: TokenSpan) -> Result<Option<Value>> {
+        const BACK: IteratorEnd = IteratorEnd::Back;
+        evaluator.count_steps(1, at)?;
         Ok(match self {
             Iter::Elements { array, front, back } if *front < *back => {
                 *back -= 1;

@@ -1,7 +1,7 @@
 //! How much memory Newton's equations take.
 
 use crate::ocp::assembly::units::{Sizes, Units};
-use crate::qp::interior::{Counts, Extent, Iterate, Penalties, Reading, count, is_first_fixed};
+use crate::qp::interior::{Counts, Extent, Iterate, PenaltyMode, Reading, count, is_initial_state_fixed};
 use crate::qp::{InteriorPointOptions, QpView};
 use crate::scalar::Real;
 
@@ -61,5 +61,5 @@ pub(in crate::ocp::nlp::ipm) const fn all_soft(counts: &Counts) -> Counts {
 /// How the constraints of a problem are read.
 pub(in crate::ocp::nlp::ipm) fn reading<T: Real>(qp: QpView<'_, T>) -> Reading<T> {
     let no_bound = T::from_f64(InteriorPointOptions::new::<T>().no_bound);
-    Reading { fixed: is_first_fixed(qp), penalties: Penalties::Given, no_bound }
+    Reading { fixed: is_initial_state_fixed(qp), penalties: PenaltyMode::Given, no_bound }
 }

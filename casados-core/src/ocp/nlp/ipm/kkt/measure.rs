@@ -6,13 +6,13 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::nlp::filter::Measure;
 use crate::ocp::program::{Parts, Program, intervals_end};
-use crate::qp::interior::{Iterate, Sides};
-use crate::qp::{Places, Solution, StageDims, add_symmetric, assign, part, part_mut};
+use crate::qp::interior::{Inequalities, Iterate};
+use crate::qp::{Places, Solution, StageDims, add_symmetric, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `Σ λ_e e + ½ q e²` of violations of soft sides, and `−Σ log` of slacks and violations.
 pub(in crate::ocp::nlp::ipm) fn penalties_and_barrier<T: Real>(
-    sides: &Sides<'_, T>,
+    sides: &Inequalities<'_, T>,
     slacks: &[T],
 ) -> (f64, f64) {
     let violations = slacks.get(sides.counts.sides()..).unwrap_or_default();
@@ -37,7 +37,7 @@ pub(in crate::ocp::nlp::ipm) fn here<T: Real>(
     let sides = &iterate.sides;
     let gaps = of_gaps(iterate.qp.dims, iterate.dynamics, units);
     let equations = of_sides(sides.equations, sides.equation_residual, units);
-    let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.violation());
+    let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.residual_sum());
     let violation = sum(gaps) + sum(of_sides(sides.rows, sides.residual, units)) + sum(equations) + coupling;
     let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
     Measure { objective: (objective + penalties + mu * barrier) / force, violation }
@@ -49,7 +49,7 @@ pub(in crate::ocp::nlp::ipm) fn slope<T: Real>(iterate: &Iterate<'_, T>, mu: f64
     for (place, stage) in Places::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
         let view = stage.arrays();
         let gradient = part_mut(scratch, 0, place.ld);
-        assign(gradient, part(view.gradient, 0, place.ld));
+        copy_common(gradient, part(view.gradient, 0, place.ld));
         add_symmetric(gradient, view.hessian, place.ld, part(iterate.v, place.row, place.ld), place.n);
         let step = part(iterate.step, place.row, place.n);
         slope = gradient.iter().zip(step).fold(slope, |sum, (&g, &d)| sum + g * d);
@@ -83,10 +83,10 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         let Parts { qp, given, .. } = P::split(self);
         let qp = qp.view();
         let mut values = ends.get(intervals_end(qp.dims)..).unwrap_or_default();
-        let ((v, _), [mut given_lower, mut given_upper]) = (at.vectors(), given);
+        let ((v, _), [mut given_lower, mut given_upper]) = (at.variables_and_costates(), given);
         for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
             let rows = part_mut(rows, place.row, place.rows);
-            assign(rows, part(v, place.v, place.n));
+            copy_common(rows, part(v, place.v, place.n));
             let bounds = stage.g_bounds();
             let [of_lower, of_upper, of_stage] =
                 [&mut given_lower, &mut given_upper, &mut values].map(|list| {
@@ -123,7 +123,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
 /// Violations of sides and equations whose rows have such values, with such slacks.
 pub(in crate::ocp::nlp::ipm) fn violations<T: Real>(
-    sides: &mut Sides<'_, T>,
+    sides: &mut Inequalities<'_, T>,
     rows: &[T],
     slacks: &[T],
     units: &[T],

@@ -6,8 +6,8 @@
 use super::lengths::{Lengths, reading};
 use super::work::Work;
 use crate::ocp::assembly::units::Sizes;
-use crate::qp::interior::{First, Iterate, Sides, at};
-use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, assign, take_mut};
+use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
+use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, copy_common, take_mut};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
 /// The iterate of Newton's method in its memory, whose contents stay as they were.
@@ -22,8 +22,8 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
-    let first = if lengths.fixed { First::Fixed } else { First::Free };
-    let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
+    let first = if lengths.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
+    let mut sides = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
     let Sizes { force, least } = lengths.sizes;
     sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, sides, &mut numbers);
@@ -59,8 +59,8 @@ pub(in crate::ocp::nlp::ipm) fn evaluate<T: Real>(
     iterate: &mut Iterate<'_, T>,
     at: &mut SolutionView<'_, T>,
 ) -> (Residuals, f64) {
-    iterate.take_point(at);
-    iterate.give_initial_state();
+    iterate.load_point(at);
+    iterate.load_initial_state();
     let mut found = Default::default();
     T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics, found: &mut found });
     found
@@ -79,9 +79,9 @@ impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, pi, found } = self;
-        iterate.evaluate_at::<E>(pi);
-        let penalties = iterate.sides.costs_of_violations().to_f64();
-        *found = (iterate.at_point::<E>().into(), penalties);
+        iterate.evaluate_with_costates::<E>(pi);
+        let penalties = iterate.sides.violation_cost().to_f64();
+        *found = (iterate.point_residuals::<E>().into(), penalties);
     }
 }
 
@@ -158,9 +158,9 @@ impl<T: Real> Registers<T> for Step<'_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, mu, corrected, factor, result } = self;
         if corrected {
-            iterate.sides.correct(mu);
+            iterate.sides.corrector_targets(mu);
         } else {
-            iterate.sides.aim(mu);
+            iterate.sides.centring_targets(mu);
         }
         iterate.sides.free_step.fill(T::ZERO);
         *result = iterate.newton::<E>(factor);
@@ -234,14 +234,14 @@ pub(in crate::ocp::nlp::ipm) fn dynamics_after<T: Real>(
     work: &mut Work<'_, T>,
     delta: T,
 ) {
-    assign(work.rows, iterate.v);
-    assign(work.slacks, iterate.sides.multiplier);
-    assign(work.free_step, iterate.sides.free);
+    copy_common(work.rows, iterate.v);
+    copy_common(work.slacks, iterate.sides.multiplier);
+    copy_common(work.free_step, iterate.sides.free);
     iterate.proximal = delta;
     T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
-    assign(iterate.v, work.rows);
-    assign(iterate.sides.multiplier, work.slacks);
-    assign(iterate.sides.free, work.free_step);
+    copy_common(iterate.v, work.rows);
+    copy_common(iterate.sides.multiplier, work.slacks);
+    copy_common(iterate.sides.free, work.free_step);
 }
 
 struct After<'r, 'a, 's, T> {
@@ -255,8 +255,8 @@ AfterCompiled: After<'r, 'a, 's, T>);
 impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        self.iterate.go_without_slacks();
-        self.iterate.controlled_costates::<E>(self.pi);
+        self.iterate.step_without_slacks();
+        self.iterate.closed_loop_costates::<E>(self.pi);
     }
 }
 
@@ -276,20 +276,20 @@ pub(in crate::ocp::nlp::ipm) fn least_squares<T: Real>(
     force: f64,
 ) -> Result<(), QpError> {
     let identity = T::from_f64(IDENTITY * force);
-    assign(work.slacks, iterate.sides.multiplier);
+    copy_common(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
     T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, identity, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
-    assign(work.hessian_multipliers, sides.multiplier_step);
+    copy_common(work.hessian_multipliers, sides.multiplier_step);
     sides.multiplier_step.fill(T::ZERO);
     general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
-    assign(work.rows, iterate.v);
+    copy_common(work.rows, iterate.v);
     iterate.proximal = identity;
     T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
-    assign(iterate.v, work.rows);
-    assign(iterate.sides.multiplier, work.slacks);
+    copy_common(iterate.v, work.rows);
+    copy_common(iterate.sides.multiplier, work.slacks);
     Ok(())
 }
 
@@ -338,7 +338,7 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, pi, identity, result } = self;
         pi.fill(T::ZERO);
-        iterate.evaluate_at::<E>(pi);
+        iterate.evaluate_with_costates::<E>(pi);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;
         let sides = &mut iterate.sides;

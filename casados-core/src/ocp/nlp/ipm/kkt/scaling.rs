@@ -3,8 +3,8 @@
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), equations (5) and (6).
 
 use crate::ocp::assembly::units::{Units, WIDE, of_tolerance};
-use crate::qp::interior::{Iterate, Sides, at};
-use crate::qp::{Places, Residuals, StageDims, larger, part};
+use crate::qp::interior::{Inequalities, Iterate, at};
+use crate::qp::{Places, Residuals, StageDims, nan_max, part};
 use crate::scalar::Real;
 
 /// Gaps of a state need not be less than this part of it times the tolerance.
@@ -69,17 +69,17 @@ pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
     let (all, count) = of_gaps(dims, pi, units)
         .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
     let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / S_MAX).max(1.0);
-    let pairs = sides.counts.pairs();
+    let pairs = sides.counts.pair_count();
     let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
     let (mut in_units, mut judged, wide) = (T::ZERO, T::ZERO, T::from_f64(WIDE));
     for (&g, &unit) in iterate.stationarity.iter().zip(units) {
-        in_units = larger(in_units, (g * unit).abs());
+        in_units = nan_max(in_units, (g * unit).abs());
         let unit = T::ONE.min(wide * unit).max(unit / wide);
-        judged = larger(judged, (g * unit).abs());
+        judged = nan_max(judged, (g * unit).abs());
     }
     let barrier = Residuals {
         stationarity: in_units.to_f64() / (force * s_d),
-        dynamics: larger(gaps(iterate, units), of_stages),
+        dynamics: nan_max(gaps(iterate, units), of_stages),
         inequalities: inequalities(sides, units, |unit| unit),
         complementarity: residuals.complementarity / (force * s_c),
     };
@@ -101,24 +101,24 @@ fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let coupling = iterate
         .coupling
         .as_ref()
-        .map_or(T::ZERO, |coupling| coupling.residual.iter().fold(T::ZERO, |m, gap| larger(m, gap.abs())));
+        .map_or(T::ZERO, |coupling| coupling.residual.iter().fold(T::ZERO, |m, gap| nan_max(m, gap.abs())));
     let mut largest = coupling;
     for place in Places::<T>::new(iterate.qp.dims) {
         let begin = place.row + place.rows;
         let next = part(iterate.v, begin, place.next).iter().zip(part(units, begin, place.next));
         for (&gap, (&x, &unit)) in part(iterate.dynamics, place.dynamics, place.next).iter().zip(next) {
-            largest = larger(largest, gap.abs() / unit.min(T::ONE).max(rounding * x.abs()));
+            largest = nan_max(largest, gap.abs() / unit.min(T::ONE).max(rounding * x.abs()));
         }
     }
     largest.to_f64()
 }
 
 /// The largest residual of sides and equations in the units of their rows.
-fn inequalities<T: Real>(sides: &Sides<'_, T>, units: &[T], of: impl Fn(f64) -> f64) -> f64 {
+fn inequalities<T: Real>(sides: &Inequalities<'_, T>, units: &[T], of: impl Fn(f64) -> f64) -> f64 {
     let equations = of_sides(sides.equations, sides.equation_residual, units);
     let sides = sides.rows.iter().zip(&*sides.scratch);
     sides
         .map(|(&row, &distance)| ((-distance).max(T::ZERO), at(units, row)))
         .chain(equations)
-        .fold(0.0, |m, (value, unit)| larger(m, value.abs().to_f64() / of(unit.to_f64())))
+        .fold(0.0, |m, (value, unit)| nan_max(m, value.abs().to_f64() / of(unit.to_f64())))
 }

@@ -79,7 +79,7 @@ pub(in crate::ocp::nlp::ipm) fn begin_sides<T: Real>(
         *multiplier = force / at(units, row);
     }
     if warm {
-        sides.take_multipliers(solution);
+        sides.load_multipliers(solution);
         for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
             *multiplier = (*multiplier).max(mu / slack);
         }

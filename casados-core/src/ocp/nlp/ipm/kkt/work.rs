@@ -35,13 +35,13 @@ pub(in crate::ocp::nlp::ipm) struct Work<'a, T> {
 impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
-        let (pairs, Extent { ld, end, .. }) = (counts.pairs(), Extent::of::<T>(dims));
+        let (pairs, Extent { ld, end, .. }) = (counts.pair_count(), Extent::of::<T>(dims));
         ends + 3 * end.row + 4 * pairs + counts.equations + end.dynamics + ld + elastic::memory(dims)
     }
 
     /// In memory of that length, whose contents stay.
     pub fn new(ends: usize, capacity: &Lengths, mut memory: &'a mut [T]) -> Self {
-        let (pairs, end) = (capacity.counts.pairs(), capacity.extent.end);
+        let (pairs, end) = (capacity.counts.pair_count(), capacity.extent.end);
         let rest = &mut memory;
         Self {
             ends: take_mut(rest, ends),

@@ -22,7 +22,7 @@ use crate::ocp::nlp::solver::Next;
 use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
-use crate::qp::interior::{Sides, at};
+use crate::qp::interior::{Inequalities, at};
 use crate::qp::{StageDims, Store};
 use crate::scalar::{Real, Scalar};
 
@@ -142,7 +142,7 @@ pub(in crate::ocp::nlp::ipm) fn check_convergence<
 /// ```text
 /// s − e = d,  μ / s + μ / e = linear
 /// ```
-pub(in crate::ocp::nlp::ipm) fn centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
+pub(in crate::ocp::nlp::ipm) fn centre<T: Real>(sides: &mut Inequalities<'_, T>, mu: f64) {
     let count = sides.counts.sides();
     for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
         *multiplier = T::from_f64(mu / slack.to_f64());

@@ -35,7 +35,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<'_>,
     ) -> bool {
-        let (v, _) = ocp.iterate.vectors();
+        let (v, _) = ocp.iterate.variables_and_costates();
         let diverges = v.iter().any(|v| v.abs().to_f64() > state.diverging_iterates);
         if !diverges || state.elastic.is_some() || state.lengths.alone {
             return false;
@@ -129,7 +129,7 @@ where
         if alpha == 0.0 {
             return tolerance;
         }
-        let points = [&ocp.iterate, &*self.trial].map(|point| point.vectors().0);
+        let points = [&ocp.iterate, &*self.trial].map(|point| point.variables_and_costates().0);
         let moved = Places::<T>::new(ocp.qp().dims).fold(0.0, |largest: f64, place| {
             let [from, to] = points.map(|v| part(v, place.v, place.n));
             let pairs = from.iter().zip(to).zip(part(self.work.units, place.row, place.n));
@@ -146,7 +146,7 @@ where
         let mut sum = 0.0;
         if let Some(coupling) = &mut iterate.coupling {
             coupling.evaluate(iterate.qp, rows);
-            sum += coupling.violation();
+            sum += coupling.residual_sum();
         }
         let (sides, infinity) = (&iterate.sides, T::from_f64(f64::INFINITY));
         let residual = |row: u32, bound: T| at(rows, row) - bound;

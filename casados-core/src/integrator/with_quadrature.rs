@@ -36,7 +36,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     pub fn solve(self, x0: &X<I>, u: &U<I>, h: I::Number) -> Result<&'a Nominal<I::Model, I::Number>, Error> {
-        self.integrator.solve_along(x0, u, h, Some(self.integrand))
+        self.integrator.solve_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Integrator::forward`]; the integral and its derivatives.
@@ -47,7 +47,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     where
         I::Memory: WithForward,
     {
-        self.integrator.forward_along(x0, u, h, Some(self.integrand))
+        self.integrator.forward_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
@@ -64,7 +64,7 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     where
         I::Memory: WithAdjoint<1>,
     {
-        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
+        self.integrator.adjoint_with_quadrature(x0, u, h, lambda, Some(self.integrand))
     }
 
     /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
@@ -81,6 +81,6 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     where
         I::Memory: WithHessian,
     {
-        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
+        self.integrator.hessian_with_quadrature(x0, u, h, lambda, Some(self.integrand))
     }
 }

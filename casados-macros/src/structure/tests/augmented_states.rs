@@ -1,7 +1,7 @@
 //! Models with linear controls and integrals: their equations, names and units, and mistakes.
 
 use super::super::{Analysis, analyse, analyse_function};
-use crate::graph::Point;
+use crate::graph::EvaluationPoint;
 use crate::language::{self, Extra, Form, Model};
 
 fn model(form: Form, attribute: &str, item: &str) -> Result<Model, String> {
@@ -12,7 +12,7 @@ fn model(form: Form, attribute: &str, item: &str) -> Result<Model, String> {
 }
 
 fn values(model: &Model, v: &[f64]) -> Vec<f64> {
-    model.graph.evaluate(&model.residual, Point { variables: v, opaque: &[], seeds: &[] })
+    model.graph.evaluate(&model.residual, EvaluationPoint { variables: v, opaque: &[], seeds: &[] })
 }
 
 /// One of two controls is linear: its rate is in its place, and it is a state behind those of the

@@ -3,13 +3,13 @@
 //! themselves.
 
 use super::chunk::computed;
-use super::schedule::{Step, Values};
+use super::schedule::{Statement, Values};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
 /// So many statements a function may come earlier than it would, to be computed with another: what
 /// waits for its use in the meantime takes registers.
-const REACH: usize = 500;
+const MAX_LOOKAHEAD: usize = 500;
 
 /// An elementary function that is worth being computed with others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,10 +23,10 @@ pub enum Function {
 }
 
 /// The function that a statement computes, and its values.
-fn function(graph: &Graph, step: Step) -> Option<(Function, Values)> {
+fn function(graph: &Graph, step: Statement) -> Option<(Function, Values)> {
     match step {
-        Step::SinCos(sin, cos) => Some((Function::SinCos, (sin, Some(cos)))),
-        Step::Compute(node) => {
+        Statement::SinCos(sin, cos) => Some((Function::SinCos, (sin, Some(cos)))),
+        Statement::Compute(node) => {
             let function = match graph.op(node) {
                 Op::Unary(Unary::Neg | Unary::Sqrt | Unary::Abs | Unary::Signum | Unary::Table(_), _) => {
                     return None;
@@ -39,20 +39,20 @@ fn function(graph: &Graph, step: Step) -> Option<(Function, Values)> {
             };
             Some((function, (node, None)))
         }
-        Step::Together(_) | Step::Store(_) => None,
+        Statement::Together(_) | Statement::Store(_) => None,
     }
 }
 
 /// The function that has these values.
 pub fn function_of(graph: &Graph, (node, other): Values) -> Option<Function> {
-    let step = other.map_or(Step::Compute(node), |cos| Step::SinCos(node, cos));
+    let step = other.map_or(Statement::Compute(node), |cos| Statement::SinCos(node, cos));
     function(graph, step).map(|(function, _)| function)
 }
 
 /// The same statements, elementary functions with the next one or the next three of their kind and
 /// level: what these wait for comes before all. The level of a value is the most elementary
 /// functions that are one within the other in it, so that none of a level waits for another.
-pub fn together(graph: &Graph, steps: &[Step]) -> Vec<Step> {
+pub fn group_simultaneous_calls(graph: &Graph, steps: &[Statement]) -> Vec<Statement> {
     let mut position = HashMap::new();
     let mut levels = vec![0u32; steps.len()];
     let mut waiting: HashMap<(Function, u32), VecDeque<usize>> = HashMap::new();
@@ -80,7 +80,7 @@ pub fn together(graph: &Graph, steps: &[Step]) -> Vec<Step> {
         while others.front().is_some_and(|&other| done[other]) {
             others.pop_front();
         }
-        let near = others.iter().take(3).take_while(|&&other| other - index < REACH).count();
+        let near = others.iter().take(3).take_while(|&&other| other - index < MAX_LOOKAHEAD).count();
         let partners: Vec<usize> = others.drain(..if near == 3 { 3 } else { near.min(1) }).collect();
         if partners.is_empty() {
             list.push(step);
@@ -102,13 +102,13 @@ pub fn together(graph: &Graph, steps: &[Step]) -> Vec<Step> {
             done[other] = true;
             *to = function(graph, steps[other]).map(|(_, values)| values);
         }
-        list.push(Step::Together(all));
+        list.push(Statement::Together(all));
     }
     list
 }
 
 /// What a statement that computes something reads.
-fn operands(graph: &Graph, step: Step) -> impl Iterator<Item = Node> {
+fn operands(graph: &Graph, step: Statement) -> impl Iterator<Item = Node> {
     computed(step).take(1).flat_map(|node| graph.op(node).operands())
 }
 
@@ -117,11 +117,11 @@ mod tests {
     use super::super::schedule::{schedule, tests::assert_complete};
     use super::*;
 
-    fn check(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
-        let steps = together(graph, &schedule(graph, outputs));
+    fn check(graph: &Graph, outputs: &[Node]) -> Vec<Statement> {
+        let steps = group_simultaneous_calls(graph, &schedule(graph, outputs));
         assert_complete(graph, outputs, &steps);
         for step in &steps {
-            if let Step::Together(values) = *step {
+            if let Statement::Together(values) = *step {
                 let functions: Vec<_> =
                     values.into_iter().flatten().map(|values| function_of(graph, values)).collect();
                 assert!(matches!(functions.len(), 2 | 4) && functions[0].is_some(), "{functions:?}");
@@ -131,12 +131,12 @@ mod tests {
         steps
     }
 
-    fn pair(a: Values, b: Values) -> Step {
-        Step::Together([Some(a), Some(b), None, None])
+    fn paired_step(a: Values, b: Values) -> Statement {
+        Statement::Together([Some(a), Some(b), None, None])
     }
 
     #[test]
-    fn functions_go_together_where_they_do_not_wait_for_each_other() {
+    fn independent_calls_are_grouped() {
         let mut g = Graph::default();
         let x = [0, 1, 2].map(|index| g.variable(index));
         let scaled = x.map(|x| g.binary(Binary::Mul, x, x));
@@ -144,26 +144,33 @@ mod tests {
         let outer = inner.map(|a| g.unary(Unary::Exp, a));
         let steps = check(&g, &outer);
         // The third has no other one left.
-        assert!(steps.contains(&pair((inner[0], None), (inner[1], None))), "{steps:?}");
-        assert!(steps.contains(&pair((outer[0], None), (outer[1], None))), "{steps:?}");
-        assert_eq!(steps.iter().filter(|step| matches!(step, Step::Together(_))).count(), 2, "{steps:?}");
+        assert!(steps.contains(&paired_step((inner[0], None), (inner[1], None))), "{steps:?}");
+        assert!(steps.contains(&paired_step((outer[0], None), (outer[1], None))), "{steps:?}");
+        assert_eq!(
+            steps.iter().filter(|step| matches!(step, Statement::Together(_))).count(),
+            2,
+            "{steps:?}"
+        );
         // A function of a function of the same kind waits for it.
-        assert!(!check(&g, &[outer[0]]).iter().any(|step| matches!(step, Step::Together(_))));
+        assert!(!check(&g, &[outer[0]]).iter().any(|step| matches!(step, Statement::Together(_))));
 
         let (s, c) = (x.map(|x| g.unary(Unary::Sin, x)), x.map(|x| g.unary(Unary::Cos, x)));
         let sums = [0, 1].map(|k| g.binary(Binary::Add, s[k], c[k]));
-        assert_eq!(check(&g, &sums)[0], pair((s[0], Some(c[0])), (s[1], Some(c[1]))));
+        assert_eq!(check(&g, &sums)[0], paired_step((s[0], Some(c[0])), (s[1], Some(c[1]))));
     }
 
     #[test]
-    fn four_go_together_and_what_is_left_in_pairs() {
+    fn groups_of_four_then_pairs() {
         let mut g = Graph::default();
         let x: [Node; 7] = std::array::from_fn(|index| g.variable(index as u32));
         let f = x.map(|x| g.unary(Unary::Ln, x));
-        let found: Vec<Step> =
-            check(&g, &f).into_iter().filter(|step| !matches!(step, Step::Store(_))).collect();
+        let found: Vec<Statement> =
+            check(&g, &f).into_iter().filter(|step| !matches!(step, Statement::Store(_))).collect();
         let values = [0, 1, 2, 3].map(|k| Some((f[k], None)));
-        assert_eq!(found, [Step::Together(values), pair((f[4], None), (f[5], None)), Step::Compute(f[6])]);
+        assert_eq!(
+            found,
+            [Statement::Together(values), paired_step((f[4], None), (f[5], None)), Statement::Compute(f[6])]
+        );
     }
 
     #[test]
@@ -175,6 +182,6 @@ mod tests {
         }
         let sum = g.binary(Binary::Add, nodes[0], nodes[1]);
         // Depth first the second chain begins where the first one ends, out of reach.
-        assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Step::Together(_))));
+        assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Statement::Together(_))));
     }
 }

@@ -33,11 +33,11 @@ pub(super) struct Set(Vec<u64>);
 impl Set {
     /// Whether a variable is in it.
     pub(super) fn contains(&self, variable: usize) -> bool {
-        bit(&self.0, variable)
+        has_bit(&self.0, variable)
     }
 }
 
-fn bit(words: &[u64], index: usize) -> bool {
+fn has_bit(words: &[u64], index: usize) -> bool {
     words.get(index / 64).is_some_and(|word| word >> (index % 64) & 1 == 1)
 }
 
@@ -67,16 +67,16 @@ impl Tape {
         TAPE.replace(Self::empty())
     }
 
-    pub(super) fn looked(&self) -> bool {
+    pub(super) fn depends_on_value(&self) -> bool {
         self.looked
     }
 
     /// Whether a number has a second derivative with respect to two variables.
     pub(super) fn interacts(&self, a: usize, b: usize) -> bool {
-        bit(self.pairs.get(a * self.words..).unwrap_or_default(), b)
+        has_bit(self.pairs.get(a * self.words..).unwrap_or_default(), b)
     }
 
-    fn set(&self, node: usize) -> Vec<u64> {
+    fn dependencies_of(&self, node: usize) -> Vec<u64> {
         let start = node * self.words;
         self.sets.get(start..start + self.words).unwrap_or_default().to_vec()
     }
@@ -87,13 +87,13 @@ impl Tape {
     }
 
     fn combine(&mut self, kind: Kind, a: usize, b: usize) -> usize {
-        let (x, y) = (self.set(a), self.set(b));
+        let (x, y) = (self.dependencies_of(a), self.dependencies_of(b));
         let union: Vec<u64> = x.iter().zip(&y).map(|(x, y)| x | y).collect();
         match kind {
             Kind::Linear => {}
-            Kind::Product => self.cross(&x, &y),
-            Kind::Quotient => self.cross(&union, &y),
-            Kind::General => self.cross(&union, &union),
+            Kind::Product => self.mark_interactions(&x, &y),
+            Kind::Quotient => self.mark_interactions(&union, &y),
+            Kind::General => self.mark_interactions(&union, &union),
         }
         if a == b || b == 0 {
             a
@@ -104,10 +104,10 @@ impl Tape {
         }
     }
 
-    fn cross(&mut self, x: &[u64], y: &[u64]) {
+    fn mark_interactions(&mut self, x: &[u64], y: &[u64]) {
         let variables = self.pairs.len() / self.words.max(1);
         for (x, y) in [(x, y), (y, x)] {
-            for variable in (0..variables).filter(|&variable| bit(x, variable)) {
+            for variable in (0..variables).filter(|&variable| has_bit(x, variable)) {
                 let row = self.pairs.iter_mut().skip(variable * self.words);
                 row.zip(y).for_each(|(pairs, y)| *pairs |= y);
             }
@@ -137,7 +137,7 @@ impl Tracked {
     }
 
     pub(super) fn dependencies(self) -> Set {
-        TAPE.with_borrow(|tape| Set(tape.set(self.node)))
+        TAPE.with_borrow(|tape| Set(tape.dependencies_of(self.node)))
     }
 
     const fn constant(value: f64) -> Self {
@@ -160,7 +160,7 @@ impl Tracked {
     }
 
     /// The value, for a decision.
-    fn look(&self) -> f64 {
+    fn decision_value(&self) -> f64 {
         if self.node != 0 {
             TAPE.with_borrow_mut(|tape| tape.looked = true);
         }
@@ -225,37 +225,37 @@ impl Neg for &Tracked {
 
 impl PartialEq for Tracked {
     fn eq(&self, other: &Self) -> bool {
-        self.look() == other.look()
+        self.decision_value() == other.decision_value()
     }
 }
 
 impl PartialOrd for Tracked {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.look().partial_cmp(&other.look())
+        self.decision_value().partial_cmp(&other.decision_value())
     }
 }
 
 impl PartialEq<f64> for Tracked {
     fn eq(&self, other: &f64) -> bool {
-        self.look() == *other
+        self.decision_value() == *other
     }
 }
 
 impl PartialOrd<f64> for Tracked {
     fn partial_cmp(&self, other: &f64) -> Option<Ordering> {
-        self.look().partial_cmp(other)
+        self.decision_value().partial_cmp(other)
     }
 }
 
 impl fmt::Display for Tracked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&self.look(), f)
+        fmt::Display::fmt(&self.decision_value(), f)
     }
 }
 
 impl fmt::Debug for Tracked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Debug::fmt(&self.look(), f)
+        fmt::Debug::fmt(&self.decision_value(), f)
     }
 }
 
@@ -270,7 +270,7 @@ impl Zero for Tracked {
         Self::constant(0.0)
     }
     fn is_zero(&self) -> bool {
-        self.look() == 0.0
+        self.decision_value() == 0.0
     }
 }
 
@@ -298,10 +298,10 @@ impl Signed for Tracked {
         self.function(self.value.signum())
     }
     fn is_positive(&self) -> bool {
-        self.look().is_sign_positive()
+        self.decision_value().is_sign_positive()
     }
     fn is_negative(&self) -> bool {
-        self.look().is_sign_negative()
+        self.decision_value().is_sign_negative()
     }
 }
 
@@ -340,7 +340,7 @@ impl DualStruct for Tracked {
     type Real = f64;
     type Inner = f64;
     fn re(&self) -> f64 {
-        self.look()
+        self.decision_value()
     }
     fn from_inner(inner: &f64) -> Self {
         Self::constant(*inner)

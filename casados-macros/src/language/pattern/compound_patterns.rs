@@ -1,7 +1,7 @@
 //! Patterns that have parts: tuples, slices, structs.
 
 use super::{Bindings, Subject, Truth};
-use crate::language::evaluator::{At, Evaluated, Evaluator, error};
+use crate::language::evaluator::{Evaluated, Evaluator, TokenSpan, error};
 use crate::language::place::Projection;
 use crate::language::types::Type;
 use crate::language::value::{Struct, Value};
@@ -13,13 +13,13 @@ impl Evaluator {
         &mut self,
         subject: &Subject,
         projection: Projection,
-        at: At,
+        at: TokenSpan,
     ) -> Evaluated<Subject> {
         Ok(match subject {
             Subject::Value(Value::Option(Some(value))) if projection == Projection::Some => {
                 Subject::Value((**value).clone())
             }
-            Subject::Value(value) => Subject::Value(self.part(value, projection, at)?),
+            Subject::Value(value) => Subject::Value(self.value_part(value, projection, at)?),
             Subject::Place(place, by_reference) => {
                 Subject::Place(self.project(place, projection, at)?, *by_reference)
             }
@@ -30,7 +30,7 @@ impl Evaluator {
     pub(super) fn match_parts(
         &mut self,
         patterns: &syn::punctuated::Punctuated<syn::Pat, syn::Token![,]>,
-        at: At,
+        at: TokenSpan,
         subject: Subject,
         bindings: &mut Bindings,
     ) -> Evaluated<Truth> {
@@ -38,7 +38,7 @@ impl Evaluator {
             Value::Tuple(parts) => parts.len(),
             Value::Struct(structure) => structure.fields.len(),
             other => {
-                return Err(error(at, format!("this pattern does not match {}", other.kind())).into());
+                return Err(error(at, format!("this pattern does not match {}", other.description())).into());
             }
         };
         let rest = patterns.iter().position(|pattern| matches!(pattern, syn::Pat::Rest(_)));
@@ -58,7 +58,7 @@ impl Evaluator {
             let part = self.subject_part(&subject, Projection::Field(index), at)?;
             truths.push(self.matches(pattern, part, bindings)?);
         }
-        Ok(self.all(truths))
+        Ok(self.all_truths(truths))
     }
 
     pub(super) fn match_slice(
@@ -78,7 +78,9 @@ impl Evaluator {
         let length = match self.subject_value(&subject, slice)? {
             Value::Array(elements) => elements.len(),
             other => {
-                return Err(error(slice, format!("this pattern does not match {}", other.kind())).into());
+                return Err(
+                    error(slice, format!("this pattern does not match {}", other.description())).into()
+                );
             }
         };
         let rest = slice.elems.iter().position(is_rest);
@@ -106,7 +108,7 @@ impl Evaluator {
             let part = self.subject_part(&subject, Projection::Index(part), slice)?;
             truths.push(self.matches(pattern, part, bindings)?);
         }
-        Ok(self.all(truths))
+        Ok(self.all_truths(truths))
     }
 
     pub(super) fn match_struct(
@@ -117,7 +119,7 @@ impl Evaluator {
     ) -> Evaluated<Truth> {
         let value = self.subject_value(&subject, pattern)?;
         let Value::Struct(structure) = &value else {
-            return Err(error(pattern, format!("this pattern does not match {}", value.kind())).into());
+            return Err(error(pattern, format!("this pattern does not match {}", value.description())).into());
         };
         if !is_variant(structure, &pattern.path) {
             return Ok(Truth::Known(false));
@@ -134,7 +136,7 @@ impl Evaluator {
             let part = self.subject_part(&subject, Projection::Field(index), pattern)?;
             truths.push(self.matches(&field.pat, part, bindings)?);
         }
-        Ok(self.all(truths))
+        Ok(self.all_truths(truths))
     }
 }
 

@@ -8,7 +8,7 @@ use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 
 /// Derivatives by `(x_n, u, p)` become derivatives by `(x₀, u, p)`: `D_i V_n`.
-pub(crate) struct Chained<'a, M: Dae, T: Real> {
+pub(crate) struct ChainRuleIntegrand<'a, M: Dae, T: Real> {
     pub inner: &'a mut dyn Integrand<M, T>,
     /// `V_n = dx_n/dw`; the identity if there is none.
     pub v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
@@ -16,9 +16,9 @@ pub(crate) struct Chained<'a, M: Dae, T: Real> {
     pub second: bool,
 }
 
-impl<M: Dae, T: Real> sealed::Sealed for Chained<'_, M, T> {}
+impl<M: Dae, T: Real> sealed::Sealed for ChainRuleIntegrand<'_, M, T> {}
 
-impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
+impl<M: Dae, T: Real> Integrand<M, T> for ChainRuleIntegrand<'_, M, T> {
     fn variables(&self) -> &'static [u32] {
         self.inner.variables()
     }
@@ -55,11 +55,11 @@ impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
 }
 
 /// Takes part in adjoints alone: all else was done on the way forth.
-pub(crate) struct Backwards<'a, M: Dae, T: Real>(pub &'a mut dyn Integrand<M, T>);
+pub(crate) struct AdjointOnlyIntegrand<'a, M: Dae, T: Real>(pub &'a mut dyn Integrand<M, T>);
 
-impl<M: Dae, T: Real> sealed::Sealed for Backwards<'_, M, T> {}
+impl<M: Dae, T: Real> sealed::Sealed for AdjointOnlyIntegrand<'_, M, T> {}
 
-impl<M: Dae, T: Real> Integrand<M, T> for Backwards<'_, M, T> {
+impl<M: Dae, T: Real> Integrand<M, T> for AdjointOnlyIntegrand<'_, M, T> {
     fn variables(&self) -> &'static [u32] {
         &[]
     }

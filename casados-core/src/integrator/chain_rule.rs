@@ -15,12 +15,12 @@ use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, entry};
 
 /// `dx/dw`, row by row.
-pub(crate) type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
+pub(crate) type StateSensitivities<M, T> = ArrayX<M, ArrayW<M, T>>;
 /// A symmetric matrix in full, row by row.
-pub(crate) type Square<M, T> = ArrayW<M, ArrayW<M, T>>;
+pub(crate) type FullHessian<M, T> = ArrayW<M, ArrayW<M, T>>;
 
 /// `dx/dw` where `x` is `x₀`.
-pub(crate) fn identity<M: Dae, T: Real>(v: &mut Rows<M, T>) {
+pub(crate) fn identity<M: Dae, T: Real>(v: &mut StateSensitivities<M, T>) {
     for (x, row) in v.as_mut().iter_mut().enumerate() {
         *row = ArrayW::<M, T>::from_fn(|w| if w == x { T::ONE } else { T::ZERO });
     }
@@ -29,7 +29,7 @@ pub(crate) fn identity<M: Dae, T: Real>(v: &mut Rows<M, T>) {
 /// A row of `(A, B_u, B_p)` times `D`.
 fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
     index: usize,
-    v: &Rows<M, T>,
+    v: &StateSensitivities<M, T>,
     (by_x, by_u, by_p): (&A, &B, &C),
 ) -> ArrayW<M, T> {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
@@ -45,24 +45,32 @@ fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
 }
 
 /// `V⁺`
-pub(crate) fn advance<M: Dae, T: Real>(part: &Forward<M, T>, now: &Rows<M, T>, next: &mut Rows<M, T>) {
+pub(crate) fn chain_states<M: Dae, T: Real>(
+    part: &Forward<M, T>,
+    now: &StateSensitivities<M, T>,
+    next: &mut StateSensitivities<M, T>,
+) {
     for (index, next) in next.as_mut().iter_mut().enumerate() {
         *next = row::<M, T, _, _, _>(index, now, (&part.dx_dx0, &part.dx_du, &part.dx_dp));
     }
 }
 
 /// The derivatives of the states at the end, from `V` there.
-pub(crate) fn states<M: Dae, T: Real>(v: &Rows<M, T>, result: &mut Forward<M, T>) {
+pub(crate) fn write_states<M: Dae, T: Real>(v: &StateSensitivities<M, T>, result: &mut Forward<M, T>) {
     for (index, row) in v.as_ref().iter().enumerate() {
-        result::split(row.as_ref(), index, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
+        result::write_row(row.as_ref(), index, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
     }
 }
 
 /// Those of the algebraic states at the end of the last part, which starts with `v`.
-pub(crate) fn algebraic<M: Dae, T: Real>(part: &Forward<M, T>, v: &Rows<M, T>, result: &mut Forward<M, T>) {
+pub(crate) fn write_algebraic<M: Dae, T: Real>(
+    part: &Forward<M, T>,
+    v: &StateSensitivities<M, T>,
+    result: &mut Forward<M, T>,
+) {
     for index in 0..M::Shape::NZ {
         let row = row::<M, T, _, _, _>(index, v, (&part.dz_dx0, &part.dz_du, &part.dz_dp));
-        result::split(row.as_ref(), index, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
+        result::write_row(row.as_ref(), index, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
     }
 }
 
@@ -70,7 +78,7 @@ pub(crate) fn algebraic<M: Dae, T: Real>(part: &Forward<M, T>, v: &Rows<M, T>, r
 pub(crate) fn add<M: Dae, T: Real>(
     h: impl Fn(usize, usize) -> T,
     v: &[T],
-    [product, sum]: [&mut Square<M, T>; 2],
+    [product, sum]: [&mut FullHessian<M, T>; 2],
 ) {
     let (nx, nw) = (M::Shape::NX, M::Shape::NW);
     let v = || v.chunks_exact(nw.max(1)).take(nx);
@@ -111,7 +119,7 @@ pub(crate) fn element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize)
 
 /// The blocks of a sum, to the last bit symmetric: of two elements that differ by rounding the
 /// lower one.
-pub(crate) fn split<M: Dae, T: Real>(sum: &Square<M, T>, result: &mut Hessian<M, T>) {
+pub(crate) fn write_blocks<M: Dae, T: Real>(sum: &FullHessian<M, T>, result: &mut Hessian<M, T>) {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let at = |r: usize, c: usize| if r >= c { sum[r][c] } else { sum[c][r] };
     fill(&mut result.h_xx, at);

@@ -9,7 +9,7 @@
 //! A function with the arguments of the model has the same variables: `u` is `c` there, and it may
 //! have the rates as an argument `du`, and the integrals as an argument `q`.
 
-use super::model::numbers;
+use super::model::count_in_words;
 use super::units::Units;
 use super::{Model, Variables};
 use crate::graph::{Binary, Node};
@@ -20,11 +20,11 @@ use syn::punctuated::Punctuated;
 use syn::{Error, Expr, FnArg, ItemFn, Pat, Result, Token};
 
 /// The variable that stands for rates that there are not.
-const NO_RATE: usize = u32::MAX as usize;
+const ABSENT_RATE: usize = u32::MAX as usize;
 
 /// What is said of a model.
 #[derive(Clone, Default)]
-pub struct Extension {
+pub struct AugmentedStates {
     /// Controls that are linear, by names as they are written.
     pub linear: Vec<(String, Span)>,
     /// Integrals.
@@ -84,7 +84,7 @@ pub fn names(span: Span, value: &Expr) -> Vec<(String, Span)> {
     }
 }
 
-impl Extension {
+impl AugmentedStates {
     /// Whether nothing is said.
     pub fn is_empty(&self) -> bool {
         self.linear.is_empty() && self.integrals.is_empty()
@@ -137,7 +137,7 @@ impl Extension {
 
     /// Gives a model, or a function of its variables, the states and the rates. Behind the time the
     /// variables of a function are its arguments `du` and `q`, of which there are so many.
-    pub fn apply(&self, model: &mut Model, rates: &[Node], [of_du, of_q]: [usize; 2]) -> Result<()> {
+    pub fn add_states(&self, model: &mut Model, rates: &[Node], [of_du, of_q]: [usize; 2]) -> Result<()> {
         if self.is_empty() {
             return Ok(());
         }
@@ -158,7 +158,7 @@ impl Extension {
             let place = linear.iter().position(|&other| other as usize == control);
             put(graph, of_u + control, place.map_or(after + control, |place| states + nx + place));
             if control < of_du {
-                let to = if place.is_some() { after + control } else { NO_RATE };
+                let to = if place.is_some() { after + control } else { ABSENT_RATE };
                 put(graph, of_u + nu + np + 1 + control, to);
             }
         }
@@ -167,7 +167,7 @@ impl Extension {
         let is_model = !rates.is_empty() || model.is_model;
         let rates = graph.substitute(rates, &by);
         model.residual = graph.substitute(&model.residual, &by);
-        let none = graph.variable(NO_RATE as u32);
+        let none = graph.variable(ABSENT_RATE as u32);
         if graph.reachable(&model.residual).contains(&none) {
             let message = "an element of `du` is the rate of a piecewise constant control: list this control in `linear = ..`";
             return Err(Error::new(model.name.span(), message));
@@ -217,12 +217,13 @@ impl Extension {
             return Err(Error::new(name.span(), message));
         }
         if of_du > 0 && of_du != controls {
-            let message = format!("`du` has {} and `u` has {}", numbers(of_du), numbers(controls));
+            let message =
+                format!("`du` has {} and `u` has {}", count_in_words(of_du), count_in_words(controls));
             return Err(Error::new(name.span(), message));
         }
         if of_q > 0 && of_q != self.integrals.len() {
             let message =
-                format!("`q` has {}, and there are {} integrals", numbers(of_q), self.integrals.len());
+                format!("`q` has {}, and there are {} integrals", count_in_words(of_q), self.integrals.len());
             return Err(Error::new(name.span(), message));
         }
         Ok(())
