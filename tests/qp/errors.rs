@@ -37,7 +37,7 @@ fn crossed_bounds() -> Test {
     assert_eq!(error_of(&qp)?, expected);
     assert_eq!(
         expected.to_string(),
-        "stage 1: element 0 of the bounds of the general constraints is from 2 to 1"
+        "stage 1: lower bound 2 exceeds upper bound 1 at element 0 of the bounds of the general constraints"
     );
     Ok(())
 }

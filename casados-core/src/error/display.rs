@@ -238,7 +238,7 @@ impl fmt::Display for Error {
             Error::NoResult => f.write_str("there is no result yet: no call has succeeded"),
             Error::NotProjected { equation, derivative, residual } => write!(
                 f,
-                "projection failed: derivative {derivative} of the constraint in equation {equation} is violated by \
+                "projection failed: derivative {derivative} of the constraint of equation {equation} is violated by \
                  {residual:e}. The state is too far from the constraints, or these are redundant there: take shorter \
                  steps"
             ),
