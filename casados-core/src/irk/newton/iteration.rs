@@ -182,24 +182,22 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 self.place_residual();
                 kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
-            let growth;
-            (status, growth) =
-                self.apply_increment(equations, y, &mut test, &policy, tolerances, take(&mut anew));
+            let next;
+            (status, next) = self.apply_increment(equations, y, &mut test, &policy, tolerances, anew);
             if !status.active {
                 return self.solved(&test, policy.shared);
             }
-            let rejected = grows_much(growth)
+            let rejected = grows_much(next)
                 && !(exact || policy.renew || early)
-                && self.is_rejected(y, growth, policy.factored);
+                && self.is_rejected(y, next, policy.factored);
             let stale = rejected && !policy.factored;
             if stale || iteration == newton.max_iterations {
                 (self.validity.factors, self.validity.shared) = (false, false);
                 return Solved { converged: test.converged, stale, exact: false, undetermined: None };
             }
             policy.after(&status, iteration, early);
-            if rejected {
-                (policy.renew, anew) = (true, true);
-            }
+            policy.renew |= rejected;
+            anew = rejected;
         }
     }
 
@@ -298,7 +296,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let floor = E::from_f64(rounding / tolerance);
         let Self { linear, points, increment, weights, sizes, .. } = self;
         let scales = &KinematicScales::<M, E, S> { jacobian: &linear.jacobian, points, a: &coefficients.a };
-        let [size, next, growth] = dispatch(Update::<M, E, S> {
+        let (size, next) = dispatch(Update::<M, E, S> {
             scales,
             x,
             y,
@@ -317,9 +315,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
             let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
-            return (test.take(IncrementKind::Again, again, again), growth);
+            return (test.take(IncrementKind::Again, again, again), next);
         }
-        (status, growth)
+        (status, next)
     }
 }
 
