@@ -1,6 +1,7 @@
 """docs/paper.md and its pictures, out of what was measured."""
 
 import platform
+import textwrap
 
 import casadi as ca
 import matplotlib
@@ -108,7 +109,8 @@ def peers(results):
     head = ["", *names, "functions: CasADi's / acados'", "objectives apart"]
     said = failures({stamp: run for stamp, run in runs.items()})
     words = PEERS.format(**{key: results["peers"][key] for key in ["machine", "date", "load", "version"]})
-    return "\n\n".join(filter(None, [words.strip(), table(head, rows), said]))
+    first, last = words.strip().rsplit("\n\n", 1)
+    return "\n\n".join(filter(None, [first, textwrap.fill(last, 100), table(head, rows), said]))
 
 
 def agreement(chains, setting):
