@@ -110,7 +110,7 @@ def peers(results, given):
     import chain
     import page
 
-    rounds, seconds = (2, 5.0) if given.quick else (5, 10.0)
+    rounds, seconds = (2, 5.0) if given.quick else (3, 6.0)
     part = results.all.setdefault("peers", {"runs": {}})
     path = pathlib.Path(os.environ["ACADOS_SOURCE_DIR"].split(":")[0], "lib", "git_commit_hash")
     version = path.read_text().strip()[:9] if path.exists() else "of an unknown version"

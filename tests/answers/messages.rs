@@ -2,7 +2,7 @@
 //! out.
 
 use crate::Test;
-use casados::ocp::{Formulation, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem};
+use casados::ocp::{Formulation, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError, Problem, Status};
 use casados::prelude::*;
 use nalgebra::{Vector1, vector};
 use std::fmt::Display;
@@ -129,4 +129,45 @@ fn of_integrators() -> Test {
          of their domains, or take shorter steps"
     );
     Ok(())
+}
+
+/// Terms are those of the field, and the way out is a call.
+#[test]
+fn of_the_terms_of_the_field() {
+    let limit = Status::MaxIterations.to_string();
+    assert!(limit.starts_with("not converged: the maximum number of iterations was reached"), "{limit}");
+    assert!(limit.contains("a larger `options.max_iterations`"), "{limit}");
+    assert_eq!(
+        OcpError::Coupled.to_string(),
+        "feedback gains are not defined for periodic states or shared controls: use `du/dx₀` of `Ocp::differentiate`"
+    );
+    assert_eq!(
+        casados::Error::DependsOnTime { function: "Guard" }.to_string(),
+        "Guard depends on the time, by which derivatives over events are not known: add the time as a state"
+    );
+}
+
+/// A bead on a wire that begins where `x[0]` is positive: position, velocity, tension.
+#[dae(index_reduction)]
+fn bead(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+    let along = x[0].max(0.0);
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] - z * x[1],
+        xdot[3] - z * along + 9.81,
+        along * along + along * x[1] - 1.0,
+    ]
+}
+
+/// Sample points need not be on the wire. Where `x[0]` is negative the constraint has no gradient,
+/// which is no fault of the mechanism: some have the full rank, and none is called singular.
+#[test]
+fn of_a_constraint_whose_gradient_vanishes_off_the_mechanism() {
+    let text = Bead::describe().to_string();
+    let rank = text.lines().find(|line| line.contains("sample points")).unwrap_or_default();
+    assert!(rank.contains("rank") && rank.contains("which need not satisfy the constraints"), "{text}");
+    assert!(!text.contains("singular") && !text.contains("lose rank"), "{text}");
+    let numbers: Vec<u32> = rank.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    assert!(matches!(numbers[..], [full, points] if 0 < full && full < points), "{rank}");
 }

@@ -38,7 +38,6 @@ def cargo(features):
 def build(name, features):
     """The library of some features, and the CPU seconds that this took."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    spent = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
     begin = spent()
     cargo(features)
     target = FOLDER / f"lib{name}.so"
@@ -132,9 +131,14 @@ def message(error):
     return (str(error).strip().splitlines() or [type(error).__name__])[-1]
 
 
+def spent():
+    """CPU seconds of this process and of those that it ran."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in [resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN])
+
+
 def race(makers, rounds, seconds):
-    """Makes runners and runs all of them by turns, each as often as its seconds allow: medians of
-    times; of what raises the message, in the place of its row."""
+    """Makes runners and runs all of them by turns, each as often as its CPU seconds allow: medians
+    of times; of what raises the message, in the place of its row."""
     runners, errors = {}, {}
 
     def attempt(name, action):
@@ -146,16 +150,16 @@ def race(makers, rounds, seconds):
 
     for name, make in makers.items():
         runners[name] = attempt(name, make)
-    results, spent = {name: [] for name in runners}, dict.fromkeys(runners, 0.0)
+    results, used = {name: [] for name in runners}, dict.fromkeys(runners, 0.0)
     for _ in range(rounds):
         for name, run in runners.items():
-            if spent[name] > seconds or name in errors:
+            if used[name] > seconds or name in errors:
                 continue
-            begin = time.perf_counter()
+            begin = spent()
             found = attempt(name, run)
             if name not in errors:
                 results[name].append(found)
-            spent[name] += time.perf_counter() - begin
+            used[name] += spent() - begin
     medians = {}
     for name, runs in results.items():
         if name in errors:

@@ -1,6 +1,7 @@
 """docs/paper.md and its pictures, out of what was measured."""
 
 import platform
+import textwrap
 
 import casadi as ca
 import matplotlib
@@ -108,7 +109,8 @@ def peers(results):
     head = ["", *names, "functions: CasADi's / acados'", "objectives apart"]
     said = failures({stamp: run for stamp, run in runs.items()})
     words = PEERS.format(**{key: results["peers"][key] for key in ["machine", "date", "load", "version"]})
-    return "\n\n".join(filter(None, [words.strip(), table(head, rows), said]))
+    first, last = words.strip().rsplit("\n\n", 1)
+    return "\n\n".join(filter(None, [first, textwrap.fill(last, 100), table(head, rows), said]))
 
 
 def agreement(chains, setting):
@@ -266,10 +268,13 @@ PEERS = """
 
 What the paper is about: acados' implicit integrator with its derivatives of first and second order,
 called from IPOPT through Python. CasADi's integrator of the same method ran by turns with it, and
-is what these rows have in common with the figures above. Numbers are as there: milliseconds of an
-iteration, of its functions, and iterations. `examples/casadi/paper.py --peers` writes this section,
-without a library of casados: acados {version}, {machine}, {date}, load average {load} of other
-programs. acados' own SQP is Gauss-Newton, with HPIPM after partial condensing.
+is what these rows have in common with the figures. Numbers are as there: milliseconds of an
+iteration, of its functions, and iterations. acados' own SQP is Gauss-Newton, with HPIPM after
+partial condensing. `examples/casadi/paper.py --peers` writes this section without a library of
+casados: medians of three runs, of one where it takes more than six seconds.
+
+acados {version}, {machine}, {date}. Other programs had a load average of {load}: CPU seconds of
+each program are more than on a quiet machine, so that ratios within a row are what holds.
 """
 
 GOALS = """

@@ -73,8 +73,9 @@ kernels! {
     }
 }
 
-/// `y ← y − Δ`; the size of the increment, that of the one that is expected next, and by how much
-/// that of an unknown is larger than its last one.
+/// `y ← y − Δ`; the size of the increment, and zero if the next one is expected to be below the
+/// tolerance: otherwise one, and by how much the increment of an unknown is larger than its last
+/// one. (Two numbers are returned in registers, three are not.)
 pub(in crate::irk) struct Update<'a, M: Plan, E: Lanes, const S: usize> {
     pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
@@ -94,9 +95,9 @@ pub(in crate::irk) struct Update<'a, M: Plan, E: Lanes, const S: usize> {
 
 impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Number = E;
-    type Output = [E; 3];
+    type Output = (E, E);
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> [E; 3] {
+    fn run<A: Arithmetic>(self) -> (E, E) {
         let Self {
             plan,
             scales,
@@ -112,14 +113,14 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             full,
             measure,
         } = self;
-        let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
+        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
         if measure {
             let (own_y, own) = (part_mut(plan, y.as_mut()), part_mut(plan, increment.as_mut()));
             for (y, increment) in own_y.iter_mut().zip(own) {
                 subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
             let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
-            return [measure.run::<A>(), infinite, zero];
+            return (measure.run::<A>(), one);
         }
         // Four unknowns side by side, and the rest one by one.
         let (y, last_y) = part_mut(plan, y.as_mut()).as_chunks_mut::<4>();
@@ -140,7 +141,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
         }
         let ([largest, excess, growth, sum], other) = (some.total(), others.total());
         let size = larger_strand([[largest, sum], [other[0], other[3]]]);
-        [size, E::select(E::le(excess.max(other[1]), zero), zero, infinite), growth.max(other[2])]
+        (size, E::select(E::le(excess.max(other[1]), zero), zero, one + growth.max(other[2])))
     }
 }
 

@@ -183,24 +183,22 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 self.place_residual();
                 kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
-            let growth;
-            (status, growth) =
-                self.apply_increment(equations, y, &mut test, &policy, tolerances, take(&mut anew));
+            let next;
+            (status, next) = self.apply_increment(equations, y, &mut test, &policy, tolerances, anew);
             if !status.active {
                 return self.solved(&test, policy.shared);
             }
-            let rejected = grows_much(growth)
+            let rejected = grows_much(next)
                 && !(exact || policy.renew || early)
-                && self.is_rejected(y, growth, policy.factored);
+                && self.is_rejected(y, next, policy.factored);
             let stale = rejected && !policy.factored;
             if stale || iteration == newton.max_iterations {
                 (self.validity.factors, self.validity.shared) = (false, false);
                 return Solved { converged: test.converged, stale, exact: false, undetermined: None };
             }
             policy.after(&status, iteration, early);
-            if rejected {
-                (policy.renew, anew) = (true, true);
-            }
+            policy.renew |= rejected;
+            anew = rejected;
         }
     }
 
@@ -303,7 +301,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let (plan, x, y) = (F::plan::<M>(), F::Plan::<M>::x(x), F::Plan::<M>::k_mut(y));
         let increment = F::Plan::<M>::k_mut(increment);
         let (weights, sizes) = (F::Plan::<M>::k_mut(weights), F::Plan::<M>::k_mut(sizes));
-        let [size, next, growth] = dispatch(Update {
+        let (size, next) = dispatch(Update {
             plan,
             scales,
             x,
@@ -323,9 +321,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
             let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
-            return (test.take(IncrementKind::Again, again, again), growth);
+            return (test.take(IncrementKind::Again, again, again), next);
         }
-        (status, growth)
+        (status, next)
     }
 }
 

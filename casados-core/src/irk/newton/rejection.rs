@@ -18,10 +18,11 @@ use crate::scalar::Lanes;
 /// An increment that grows by less than this part of its unknown may follow from those of others.
 const LITTLE_GROWTH: f64 = 1.0 / 1024.0;
 
-/// Whether the increments of an unknown grow, in any lane.
+/// Whether the increments of an unknown grow, in any lane, by what
+/// [`Update`](super::increment::Update) says of the `next` one.
 #[inline(always)]
-pub(super) fn grows_much<E: Lanes>(growth: E) -> bool {
-    E::any(E::lt(E::from_f64(LITTLE_GROWTH), growth))
+pub(super) fn grows_much<E: Lanes>(next: E) -> bool {
+    E::any(E::lt(E::from_f64(1.0 + LITTLE_GROWTH), next))
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -29,8 +30,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// whether there are any. Without factors of this step `y` is left where it is.
     #[cold]
     #[inline(never)]
-    pub(super) fn is_rejected(&mut self, y: &mut ArrayK<M, [E; S]>, growth: E, factored: bool) -> bool {
-        let grows = E::lt(E::from_f64(LITTLE_GROWTH), growth);
+    pub(super) fn is_rejected(&mut self, y: &mut ArrayK<M, [E; S]>, next: E, factored: bool) -> bool {
+        let grows = E::lt(E::from_f64(1.0 + LITTLE_GROWTH), next);
         let rejected = E::and(grows, E::not(self.is_satisfied()));
         if factored {
             for (y, increment) in y.as_mut().iter_mut().zip(self.increment.as_ref()) {
