@@ -178,12 +178,17 @@ impl fmt::Display for Error {
                     }
                 })
             }
-            Error::TooManySteps { t, steps, stiff } => {
+            Error::TooManySteps { t, steps, stiff, rounding } => {
                 write!(f, "t = {t} was reached after {steps} steps, and `max_steps` allows no more")?;
                 if stiff {
                     f.write_str("; the model is stiff, so that an implicit method takes fewer: Radau")?;
                 }
-                Ok(())
+                let Some(factor) = rounding else { return Ok(()) };
+                write!(
+                    f,
+                    "; the tolerances are below rounding errors of the model, which limited most steps: larger by a \
+                     factor of {factor:.1} they need about half of `max_steps`"
+                )
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
