@@ -183,6 +183,9 @@ pub enum Error {
         steps: usize,
         /// Whether the method is explicit and its stability limited most of them, not the error.
         stiff: bool,
+        /// The factor by which tolerances have to be larger, if the method is explicit and rounding
+        /// errors of the model limited most steps: then about half of `max_steps` suffice.
+        rounding: Option<f64>,
     },
     /// A time outside the interval of the last successful call.
     OutsideInterval {

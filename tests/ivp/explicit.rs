@@ -3,7 +3,9 @@
 //! The references are SciPy's `DOP853` with tolerances of 3e-14 from jump to jump, each located by
 //! Newton's method, on the smooth equations between them.
 
+use crate::models::ivp::vibrations::ExplicitBeam;
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Radau, ode};
+use core::f64::consts::PI;
 use nalgebra::{SVector, vector};
 
 const TOLERANCES: [f64; 7] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10];
@@ -62,7 +64,7 @@ macro_rules! stiff {
         let mut adaptive = Adaptive::<Lag, $method>::new(options).expect("valid");
         adaptive.set_parameters(&vector![$rate]).expect("finite");
         match adaptive.solve(&vector![0.0, 1.0], &SVector::zeros(), 1e4) {
-            Err(error @ Error::TooManySteps { stiff, .. }) => {
+            Err(error @ Error::TooManySteps { stiff, rounding: None, .. }) => {
                 assert_eq!(error.to_string().contains("Radau"), stiff);
                 stiff
             }
@@ -76,6 +78,52 @@ fn too_many_steps_of_stiff_models() {
     assert!(stiff!(DormandPrince5, 1e4) && stiff!(DormandPrince8, 1e4));
     assert!(!stiff!(DormandPrince5, 0.0) && !stiff!(DormandPrince8, 0.0));
     assert!(!stiff!(Radau, 0.0));
+}
+
+/// The elastic beam of forty pieces to `t = π`, whose equations multiply rounding errors by `n⁴`.
+/// SciPy's `DOP853` takes 6,894 steps (`benches/error_control/dop853.py`). Half as many more are
+/// allowed; if rounding errors counted like errors of the method, there would be over 100,000.
+#[test]
+fn rounding_errors_count_once() {
+    let options = AdaptiveOptions { rtol: 1e-12, atol: 1e-12, keep_steps: false, ..Default::default() };
+    let mut adaptive = Adaptive::<ExplicitBeam<80>, DormandPrince8>::new(options).expect("valid");
+    adaptive.solve(&SVector::zeros(), &SVector::zeros(), PI).expect("a solution");
+    let steps = adaptive.statistics().steps;
+    assert!(steps <= 6894 + 6894 / 2, "{steps}");
+}
+
+/// A mass swings by one around a point that is 10⁹ away.
+#[ode]
+fn far_away(x: [f64; 2]) -> [f64; 2] {
+    [x[1], 1e9 - x[0]]
+}
+
+/// The velocity has a rounding error of `h ε 10⁹ = 2e-7 h` in each step, above a tolerance of 1e-12
+/// in steps of 5e-6. The error says by which factor tolerances have to be larger, and with these
+/// the steps suffice.
+macro_rules! below_rounding {
+    ($method:ty) => {{
+        let solve = |tolerance| {
+            let options =
+                AdaptiveOptions { rtol: tolerance, atol: tolerance, max_steps: 20_000, ..Default::default() };
+            let mut adaptive = Adaptive::<FarAway, $method>::new(options)?;
+            adaptive.solve(&vector![1e9 + 1.0, 0.0], &SVector::zeros(), 300.0)?;
+            Ok(())
+        };
+        match solve(1e-12) {
+            Err(error @ Error::TooManySteps { stiff: false, rounding: Some(factor), .. }) => {
+                assert!(error.to_string().contains("rounding"));
+                solve(factor * 1e-12).unwrap_or_else(|error| panic!("{factor}: {error}"));
+            }
+            other => panic!("{other:?}"),
+        }
+    }};
+}
+
+#[test]
+fn tolerances_below_rounding() {
+    below_rounding!(DormandPrince5);
+    below_rounding!(DormandPrince8);
 }
 
 const FRICTION: [(f64, [f64; 2]); 3] = [

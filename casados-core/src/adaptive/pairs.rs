@@ -53,14 +53,20 @@ pub trait Pair<const S: usize>: Method<S> {
 pub struct GlobalErrorFactor {
     /// Once for so many steps of this length as the interval has,
     pub steps: f64,
-    /// but no more often than this.
-    pub most: f64,
+    /// but no more often than the first number; in long intervals, than up to the second one:
+    pub most: (f64, f64),
+    /// once for so many steps of a run with a tolerance of one, whatever the tolerance is. Over an
+    /// oscillation, errors of a step in tolerances add up to the same at every tolerance, since
+    /// the error is of one order more than the estimate.
+    pub unit_steps: f64,
 }
 
 impl GlobalErrorFactor {
-    /// In an interval of so many steps; once at least.
-    pub fn count(&self, steps: f64) -> f64 {
-        (steps / self.steps).min(self.most).max(1.0)
+    /// In an interval of so many steps, each `unit` times as long as with a tolerance of one; once
+    /// at least.
+    pub fn count(&self, steps: f64, unit: f64) -> f64 {
+        let most = (steps * unit / self.unit_steps).clamp(self.most.0, self.most.1);
+        (steps / self.steps).min(most).max(1.0)
     }
 }
 
@@ -82,7 +88,8 @@ impl Pair<6> for DormandPrince5 {
         -1.0 / 40.0,
     );
     const THIRD_ORDER: Option<[f64; 6]> = None;
-    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor = GlobalErrorFactor { steps: 180.0, most: 16.0 };
+    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor =
+        GlobalErrorFactor { steps: 180.0, most: (16.0, 16.0), unit_steps: 1.0 };
     const STABILITY_BOUND: f64 = 3.25;
     const CONTROL: Control =
         Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
@@ -126,7 +133,8 @@ impl Pair<12> for DormandPrince8 {
         coarse[11] -= 0.022058823529411766;
         Some(coarse)
     };
-    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor = GlobalErrorFactor { steps: 10.0, most: 40.0 };
+    const GLOBAL_ERROR_FACTOR: GlobalErrorFactor =
+        GlobalErrorFactor { steps: 10.0, most: (16.0, 40.0), unit_steps: 40.0 };
     const STABILITY_BOUND: f64 = 6.1;
     // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
     const CONTROL: Control = Control {
@@ -275,6 +283,19 @@ impl Pair<12> for DormandPrince8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Over more oscillations errors count more often, over as many with more steps as often.
+    #[test]
+    fn long_intervals_count_more_often() {
+        let factor = <DormandPrince8 as Pair<12>>::GLOBAL_ERROR_FACTOR;
+        let count = |steps: f64, tolerance: f64| factor.count(steps, f64::powf(tolerance, 0.125));
+        assert_eq!(count(5.0, 1e-8), 1.0);
+        assert_eq!(count(50.0, 1e-8), 5.0);
+        assert_eq!([count(1000.0, 1e-8), count(1000.0, 1e-4)], [16.0; 2]);
+        assert!((count(10_000.0, 1e-8) - 25.0).abs() < 1e-9);
+        assert!((count(1000.0, 1.0) - 25.0).abs() < 1e-9);
+        assert_eq!(count(1e6, 1e-8), 40.0);
+    }
 
     #[test]
     fn what_is_not_finite_is_no_error_of_zero() {

@@ -182,15 +182,19 @@ impl fmt::Display for Error {
                     }
                 })
             }
-            Error::TooManySteps { t, steps, stiff } => {
+            Error::TooManySteps { t, steps, stiff, rounding } => {
                 write!(f, "t = {t} was reached after {steps} steps, the maximum")?;
-                f.write_str(match stiff {
-                    true => {
-                        "; the model appears stiff: take an implicit method, `Adaptive<_, Radau>`; otherwise raise \
-                         `max_steps`"
-                    }
-                    false => ": raise `max_steps`",
-                })
+                if stiff {
+                    f.write_str("; the model appears stiff: take an implicit method, `Adaptive<_, Radau>`")?;
+                }
+                let Some(factor) = rounding else {
+                    return f.write_str(if stiff { "; otherwise raise `max_steps`" } else { ": raise `max_steps`" });
+                };
+                write!(
+                    f,
+                    "; the tolerances are below rounding errors of the model, which limited most steps: tolerances \
+                     larger by a factor of {factor:.1} need about half of `max_steps`"
+                )
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")

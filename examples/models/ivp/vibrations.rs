@@ -56,7 +56,7 @@ pub fn beam<const NX: usize, const NZ: usize, const NK: usize>(
 }
 
 /// The same with `u` found by elimination: x = [θ, θ̇].
-#[ode(N = [20])]
+#[ode(N = [20, 80])]
 pub fn explicit_beam<const N: usize>(x: [f64; N], t: f64) -> [f64; N] {
     let n = N / 2;
     let (n2, n4) = ((n * n) as f64, (n * n * n * n) as f64);

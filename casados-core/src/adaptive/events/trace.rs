@@ -99,7 +99,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let allowed = integrator.options.max_steps;
         let tried = statistics.steps + statistics.rejected + statistics.failed;
         if tried >= allowed {
-            return Err(Error::TooManySteps { t: start.to_f64(), steps: tried, stiff: false });
+            return Err(Error::TooManySteps {
+                t: start.to_f64(),
+                steps: tried,
+                stiff: false,
+                rounding: None,
+            });
         }
         let (parameters, mut found, mut begin) = (integrator.base.parameters, None, start);
         place_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
@@ -157,8 +162,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         core::mem::swap(&mut integrator.tape, &mut segment.tape);
         statistics.add(&integrator.statistics);
         match run {
-            Err(Error::TooManySteps { t, steps, stiff }) => {
-                Err(Error::TooManySteps { t, steps: steps + tried, stiff })
+            Err(Error::TooManySteps { t, steps, stiff, rounding }) => {
+                Err(Error::TooManySteps { t, steps: steps + tried, stiff, rounding })
             }
             run => run.map(|_| found),
         }

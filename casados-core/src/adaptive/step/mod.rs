@@ -169,7 +169,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 continue;
             }
             if state.tried >= self.options.max_steps {
-                return Err(Error::TooManySteps { t: state.t.to_f64(), steps: state.tried, stiff: false });
+                return Err(Error::TooManySteps {
+                    t: state.t.to_f64(),
+                    steps: state.tried,
+                    stiff: false,
+                    rounding: None,
+                });
             }
             self.check_step(state.t, state.h, state.refusal)?;
             state.tried += 1;

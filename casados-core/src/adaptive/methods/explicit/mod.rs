@@ -1,6 +1,7 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
 //! the difference to the other one decides about the step.
 
+mod rounding;
 mod stepper;
 
 use crate::adaptive::engine::{Engine, Kind};
@@ -19,7 +20,7 @@ use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;
 use crate::quadrature::OptionalIntegrand;
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Shape};
 use crate::tableau::{DormandPrince5, DormandPrince8};
 use alloc::boxed::Box;
@@ -27,6 +28,10 @@ use bytemuck::Zeroable;
 use core::any::Any;
 use core::marker::PhantomData;
 use stepper::{Stepper, Take};
+
+/// Where rounding errors limit the steps, their number is inversely proportional to the tolerance:
+/// tolerances that need `max_steps`, times this, need half as many.
+const TOLERANCE_MARGIN: f64 = 2.0;
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
@@ -157,6 +162,8 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     if length == T::ZERO {
         return Ok(x);
     }
+    let rtol = run.base.tolerances.rtol.as_ref().iter().map(|rtol| rtol.to_f64());
+    let unit = Scalar::powf(rtol.fold(0.0, f64::max), 1.0 / B::CONTROL.order);
     let mut t = span.start;
     let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
     let mut controller = PiController::new(B::CONTROL);
@@ -168,11 +175,12 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             h = span.end - t;
         }
         if tried >= run.options.max_steps {
-            return Err(Error::TooManySteps { t: t.to_f64(), steps: tried, stiff: step.is_stiff() });
+            return Err(too_many_steps(step, t, tried, (span.end - t) / h));
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let [error, of_derivatives] = attempt::<M, B, T, S>(step, run, &x, t, h, (length / h).to_f64());
+        let most = B::GLOBAL_ERROR_FACTOR.count((length / h).to_f64(), unit);
+        let [error, of_derivatives] = attempt::<M, B, T, S>(step, run, &x, t, h, most);
         if !(error + of_derivatives).is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -180,10 +188,9 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
-        let tried_step =
-            ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
-        let error = controller.error_of_difference::<T>(tried_step, error).max(of_derivatives);
-        let factor = controller.factor::<T>(tried_step, error);
+        let taken = ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
+        let error = controller.error_of_difference::<T>(taken, error).max(of_derivatives);
+        let factor = controller.factor::<T>(taken, error);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
@@ -199,9 +206,7 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             run.tape.push(t, h, 0, x.as_slice(), &[])?;
         }
         let end = if last { span.end } else { t + h };
-        let (start, size) = (t, h);
-        let mut evaluate =
-            |time: T, dense: &mut Dense<M, T>| step.interpolate(start, size, (time - start) / size, dense);
+        let mut evaluate = |time: T, dense: &mut Dense<M, T>| step.interpolate(t, h, (time - t) / h, dense);
         let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
         after(&mut accepted, &mut run.base.dense)?;
         if accepted.stop {
@@ -222,7 +227,14 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
 }
 
-/// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
+/// The error of a run whose steps do not suffice, with so many left at the present length.
+fn too_many_steps<M: Dae, T: Real>(step: &dyn Take<M, T>, t: T, steps: usize, left: T) -> Error {
+    let needed = 1.0 + left.to_f64() / steps as f64;
+    let rounding = step.is_below_rounding().then_some(TOLERANCE_MARGIN * needed);
+    Error::TooManySteps { t: t.to_f64(), steps, stiff: rounding.is_none() && step.is_stiff(), rounding }
+}
+
+/// Takes a step from `x`: its error relative to what is tolerated, which counts so often at most,
 /// and that of derivatives if they take part; NaN if there is none.
 fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
@@ -230,11 +242,11 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     x: &VectorX<M, T>,
     t: T,
     h: T,
-    steps: f64,
+    most: f64,
 ) -> [f64; 2] {
     let error = step.take(t, h).and_then(|()| {
         let (rtol, atol) = (run.base.tolerances.rtol.as_ref(), run.base.tolerances.atol.as_ref());
-        step.error(t, h, steps, rtol, atol)
+        step.error(t, h, most, rtol, atol)
     });
     let error = error.unwrap_or(f64::NAN);
     match &mut run.sensitivities {

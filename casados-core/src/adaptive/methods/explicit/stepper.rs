@@ -1,5 +1,6 @@
 //! One step of an explicit pair: its stages, the estimate of its error, and its polynomial.
 
+use super::rounding::RoundingErrors;
 use crate::adaptive::discontinuity::{BranchChange, Branches};
 use crate::adaptive::pairs::Pair;
 use crate::adaptive::tolerances::norm;
@@ -9,7 +10,7 @@ use crate::finite::check_output;
 use crate::memory::allocate;
 use crate::model::{ArrayX, Dae, Ode};
 use crate::result::Dense;
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use crate::shape::{Array, Matrix, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
@@ -51,12 +52,12 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated, where the interval has so many steps; the
+    /// The estimated error relative to what is tolerated, that counts so often at most; the
     /// derivative at the end is there if that is at most one.
     ///
     /// # Errors
     /// A value that is not finite.
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    fn error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// How the step that was taken changes the branches of the model, if it does.
     fn change(&self) -> Option<BranchChange>;
     /// The state at the end.
@@ -71,6 +72,8 @@ pub trait Take<M: Dae, T: Real> {
     /// Whether stability limited most of the steps since the start of the run, of those whose
     /// errors may count more than once.
     fn is_stiff(&self) -> bool;
+    /// Whether rounding errors limited most of the steps since the start of the run.
+    fn is_below_rounding(&self) -> bool;
     /// How often the model was evaluated since this was asked for last.
     fn count(&mut self) -> usize;
 }
@@ -82,6 +85,7 @@ pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
     change: Option<BranchChange>,
     /// Steps at the bound of stability less those that are not.
     at_bound: i64,
+    rounding: RoundingErrors,
     method: PhantomData<fn() -> B>,
 }
 
@@ -92,6 +96,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
             memory: allocate()?,
             change: None,
             at_bound: 0,
+            rounding: RoundingErrors::default(),
             method: PhantomData,
         })
     }
@@ -115,14 +120,13 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
-    /// How often an error counts in an interval of so many steps: once where the Jacobian takes it
+    /// How often an error counts that counts so often at most: once where the Jacobian takes it
     /// back, as where it is damped, and by [`Pair::GLOBAL_ERROR_FACTOR`] where it turns it or lets
     /// it grow. The last stage `Y` is at the end, as the step is; of the difference `d` of the two
     /// and `J d` the cosine is asked; and `h |J d|/|d|` is that of a step at the bound of
     /// stability, or not (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section
     /// IV.2).
-    fn global_error_factor(&mut self, steps: f64) -> f64 {
-        let count = B::GLOBAL_ERROR_FACTOR.count(steps);
+    fn global_error_factor(&mut self, count: f64) -> f64 {
         if count <= 1.0 {
             return 1.0;
         }
@@ -147,6 +151,28 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     }
 }
 
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+    /// Measures the rounding error of the difference in a step of this length, with the scales of
+    /// the step that was taken: see [`RoundingErrors`].
+    fn measure_rounding(&mut self, t: T, size: f64) {
+        let Self { scheme, memory, rounding, .. } = self;
+        let Memory { point, record, more: [slope, ..], difference, scale, .. } = &mut **memory;
+        for (to, x) in difference.as_mut().iter_mut().zip(record.x.as_ref()) {
+            *to = *x * T::from_f64(1.0 + 2.0 * T::EPSILON * rounding.sign());
+        }
+        // Next to the states there need be no value.
+        if Self::evaluate(scheme, point, difference.as_ref(), t, slope).is_err() {
+            return;
+        }
+        for (slope, start) in slope.as_mut().iter_mut().zip(record.k[0].as_ref()) {
+            *slope = *slope - *start;
+        }
+        let (stages, last) = B::DIFFERENCE;
+        let squares = stages.iter().fold(last * last, |sum, e| sum + e * e);
+        rounding.measured(Scalar::sqrt(squares) * norm(slope.as_ref(), scale.as_ref()), size);
+    }
+}
+
 /// `Σ_i e_i k_i`
 fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
     for (coefficient, stage) in coefficients.iter().zip(stages) {
@@ -161,7 +187,7 @@ fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
     fn go(&mut self, inputs: &[T], x: &[T]) {
-        self.at_bound = 0;
+        (self.at_bound, self.rounding) = (0, RoundingErrors::default());
         let Memory { point, record, .. } = &mut *self.memory;
         point.variables_mut().copy_from_slice(inputs);
         // An explicit model is evaluated at `ẋ = 0`.
@@ -197,7 +223,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Ok(())
     }
 
-    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+    fn error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
         let (stages, last) = B::DIFFERENCE;
         if last != 0.0 {
             self.arrive(t, h)?;
@@ -227,7 +253,17 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         if last == 0.0 {
             self.arrive(t, h)?;
         }
-        Ok(error * self.global_error_factor(steps))
+        let count = self.global_error_factor(most);
+        if count <= 1.0 {
+            return Ok(error);
+        }
+        let size = h.to_f64().abs();
+        if self.rounding.are_due() {
+            self.measure_rounding(t, size);
+        }
+        let rest = B::combined(self.rounding.removed_from(fine, size), coarse);
+        self.rounding.note(error, count * rest);
+        Ok(error + (count - 1.0) * rest)
     }
 
     fn change(&self) -> Option<BranchChange> {
@@ -285,6 +321,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
 
     fn is_stiff(&self) -> bool {
         self.at_bound > 0
+    }
+
+    fn is_below_rounding(&self) -> bool {
+        self.rounding.limit_steps()
     }
 
     fn count(&mut self) -> usize {

@@ -1,0 +1,106 @@
+//! Rounding errors in the estimate of an explicit pair.
+//!
+//! The model multiplies what is rounded off of a stage by its Jacobian. With the coefficients `e`
+//! of the difference of both methods and random signs `s_i` the rounding error of that difference
+//! is about
+//!
+//! ```text
+//! h ‖e‖₂ ‖f(x_i (1 + 2 ε s_i)) − f(x)‖
+//! ```
+//!
+//! Rounding errors of steps are independent: their sum over `n` steps is `√n` times one of them.
+//! So they count once, and the rest of the estimate by the global error factor.
+
+use crate::scalar::Scalar;
+
+/// After so many attempts the rounding error is measured again.
+const MEASURED_EVERY: usize = 20;
+/// Errors above this part of the tolerance limit the step size.
+const LIMITING: f64 = 0.1;
+
+/// The rounding errors of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct RoundingErrors {
+    /// The state of a shift register.
+    signs: u64,
+    /// The mean square of the rounding errors of steps of length one, relative to the tolerance.
+    square: Option<f64>,
+    attempts: usize,
+    /// Steps limited by rounding errors less those that are not.
+    limited: i64,
+}
+
+impl Default for RoundingErrors {
+    fn default() -> Self {
+        Self { signs: 0x9E37_79B9_7F4A_7C15, square: None, attempts: 0, limited: 0 }
+    }
+}
+
+impl RoundingErrors {
+    /// Whether they are to be measured before this attempt.
+    pub fn are_due(&mut self) -> bool {
+        let due = self.attempts.is_multiple_of(MEASURED_EVERY);
+        self.attempts += 1;
+        due
+    }
+
+    /// 1 or −1 (G. Marsaglia, Xorshift RNGs, J. Stat. Softw. 8 (2003)).
+    pub fn sign(&mut self) -> f64 {
+        self.signs ^= self.signs << 13;
+        self.signs ^= self.signs >> 7;
+        self.signs ^= self.signs << 17;
+        if self.signs >> 63 == 0 { 1.0 } else { -1.0 }
+    }
+
+    /// Takes a measured rounding error of a step of length `h` into the mean.
+    pub fn measured(&mut self, error: f64, h: f64) {
+        let square = (error / h) * (error / h);
+        if square.is_finite() {
+            self.square = Some(self.square.map_or(square, |before| 0.5 * (before + square)));
+        }
+    }
+
+    /// What a difference of the methods in a step of length `h` is without its rounding error:
+    /// variances add up.
+    pub fn removed_from(&self, difference: f64, h: f64) -> f64 {
+        let square = difference * difference - self.square.unwrap_or(0.0) * h * h;
+        // Written so that NaN stays.
+        if square < 0.0 { 0.0 } else { Scalar::sqrt(square) }
+    }
+
+    /// After an attempt with this estimate, and with what the rest counts without rounding errors.
+    pub fn note(&mut self, estimate: f64, counted: f64) {
+        let limits = estimate > LIMITING && counted < estimate;
+        self.limited += if limits { 1 } else { -1 };
+    }
+
+    /// Whether rounding errors limited most of the attempts.
+    pub fn limit_steps(&self) -> bool {
+        self.limited > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variances_add_up() {
+        let mut rounding = RoundingErrors::default();
+        assert_eq!(rounding.removed_from(5.0, 0.1), 5.0);
+        rounding.measured(0.3, 0.1);
+        assert!((rounding.removed_from(0.5, 0.1) - 0.4).abs() < 1e-15);
+        assert_eq!(rounding.removed_from(0.3, 0.2), 0.0);
+        assert!(rounding.removed_from(f64::NAN, 0.1).is_nan());
+        rounding.measured(f64::NAN, 0.1);
+        assert!((rounding.removed_from(0.5, 0.1) - 0.4).abs() < 1e-15);
+    }
+
+    #[test]
+    fn signs_are_fair() {
+        let mut rounding = RoundingErrors::default();
+        let sum: f64 = (0..10_000).map(|_| rounding.sign()).sum();
+        // Five standard deviations.
+        assert!(sum.abs() < 500.0, "{sum}");
+    }
+}
