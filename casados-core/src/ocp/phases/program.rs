@@ -66,10 +66,13 @@ macro_rules! programs {
         impl Program<$number> for Phases<'_, $number> {
             type Dynamics = PhaseDynamics;
 
-            fn linearise<C: Curvature<PhaseDynamics, $number>, D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+            fn linearise<C, D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
                 ocp: &mut Ocp<Self, $number, D, M>,
                 curvature: C,
-            ) -> Result<(), OcpError> {
+            ) -> Result<(), OcpError>
+            where
+                C: Curvature<PhaseDynamics, $number>,
+            {
                 write(ocp, Kind { exact: C::EXACT, convexification: curvature.convexification() })
             }
 
@@ -85,26 +88,7 @@ macro_rules! programs {
                 ends: &mut [$number],
             ) -> Result<$number, OcpError> {
                 let length = intervals_end(ocp.qp.dims());
-                let (mut ends, mut values) = ends.split_at_mut_checked(length).unwrap_or_default();
-                let (mut objective, mut stages) = (0.0, at.stages());
-                let Phases { phases, trials, start } = &mut ocp.problem;
-                let mut nexts = phases.iter().map(|phase| phase.size).collect::<Vec<_>>().into_iter();
-                let mut before = stages.next();
-                if let (Some(size), Some(decided)) = (nexts.next(), before) {
-                    let first = take_mut(&mut ends, size.nx + size.free);
-                    assign(first, start);
-                    transfer::begin(size, decided.u, first);
-                }
-                for (phase, trial) in phases.iter_mut().zip(trials) {
-                    let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
-                    objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
-                    write_ends(phase.size, trial, &mut ends, &mut values);
-                    if let (Some(next), Some(last)) = (nexts.next(), last) {
-                        phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
-                    }
-                    before = last;
-                }
-                Ok(objective)
+                ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())
             }
 
             fn split<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
@@ -250,6 +234,34 @@ fn write_link<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
+    /// The objective at some point; in `ends` the ends of all intervals, and constraints.
+    fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        at: &Solution<T, D, M>,
+        (mut ends, mut values): (&mut [T], &mut [T]),
+    ) -> Result<T, OcpError> {
+        let (mut objective, mut stages) = (T::ZERO, at.stages());
+        let mut nexts: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
+        let Phases { phases, trials, start } = self;
+        let mut nexts = nexts.drain(..);
+        let mut before = stages.next();
+        if let (Some(size), Some(decided)) = (nexts.next(), before) {
+            let first = take_mut(&mut ends, size.nx + size.free);
+            assign(first, start);
+            transfer::begin(size, decided.u, first);
+        }
+        for (phase, trial) in phases.iter_mut().zip(trials) {
+            let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
+            objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
+            write_ends(phase.size, trial, &mut ends, &mut values);
+            if let (Some(next), Some(last)) = (nexts.next(), last) {
+                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
+            }
+            before = last;
+        }
+        Ok(objective)
+    }
+
     /// The QPs of all phases as that of the whole, with the links between them.
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
