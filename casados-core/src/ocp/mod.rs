@@ -89,8 +89,6 @@ mod phases;
 mod program;
 mod solution;
 
-pub use assembly::convexify::Convexification;
-pub use assembly::curvature::{Curvature, Exact, GaussNewton};
 #[cfg(feature = "alloc")]
 pub use batch::{BatchOcp, BatchPrepared, BatchRealTime, Gradient, Gradients};
 #[cfg(feature = "alloc")]
@@ -129,6 +127,8 @@ pub use formulation::instance::HeapOcp;
 pub use formulation::instance::Ocp;
 pub use formulation::names::Names;
 pub use formulation::problem::{ExactFormulation, Formulation, Problem};
+pub use formulation::program::Program;
+pub use formulation::program::curvature::{Convexification, Curvature, Exact, GaussNewton};
 #[cfg(feature = "alloc")]
 pub use nlp::ipm::HeapIpm;
 pub use nlp::ipm::{Barrier, Ipm, IpmOptions};
@@ -144,7 +144,6 @@ pub use phases::{Continuous, Jump, Link, PhaseDynamics, Phases};
 #[cfg(feature = "alloc")]
 #[doc(hidden)]
 pub use phases::{PhaseDims, PhaseEnd};
-pub use program::Program;
 pub use solution::log::{Iteration, Log, Times};
 pub use solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]

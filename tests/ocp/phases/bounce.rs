@@ -112,8 +112,8 @@ fn multipliers_go_through_the_impact() -> Test {
     assert!(outcome.is_converged(), "{outcome}");
     drop(bounce);
     let [t1, t2] = durations(1)[..] else { return Err("two".into()) };
-    // u₂ = ½ λ (t₂ − t), u₁ = ½ λ (t₁ − t + 0.9 t₂), where λ is the multiplier of the place. Where it
-    // ends, a metre away, is ½ λ times the integral of the squares of what ½ λ is multiplied by.
+    // u₂ = ½ λ (t₂ − t), u₁ = ½ λ (t₁ − t + 0.9 t₂), where λ is the multiplier of the place: a
+    // metre is ½ λ times the integral of the squares of what ½ λ is multiplied by.
     let squares = (t2.powi(3) + (t1 + 0.9 * t2).powi(3) - (0.9 * t2).powi(3)) / 3.0;
     let lambda = 2.0 / squares;
     let (one, other) = (flights[0].solution()?, flights[1].solution()?);

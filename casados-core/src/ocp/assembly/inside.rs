@@ -8,7 +8,6 @@
 //! ```
 
 use crate::ocp::assembly::algebraic::{self, Extended};
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::assembly::pieces::Pieces;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free::Free;
@@ -21,6 +20,7 @@ use crate::ocp::formulation::instance::inside::memory::{PieceMemory, Place, Size
 use crate::ocp::formulation::instance::inside::{InnerPoints, check_pieces};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::element::get;
 use crate::qp::{Arrays, Solution, SolutionStage, StageDims, part, part_mut};
 use crate::scalar::Real;

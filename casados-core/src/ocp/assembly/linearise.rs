@@ -3,7 +3,6 @@
 use crate::linalg::dot;
 use crate::ocp::assembly::algebraic::{self, Extended};
 use crate::ocp::assembly::convexify::convexify;
-use crate::ocp::assembly::curvature::Curvature;
 #[cfg(feature = "alloc")]
 use crate::ocp::assembly::inside::{Costs, Rows};
 use crate::ocp::assembly::start::link_start;
@@ -18,6 +17,7 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{Arrays, StageDims, add_symmetric, copy_common, padded_len, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;

@@ -2,8 +2,8 @@
 //! conditions of optimality.
 
 pub(in crate::ocp) mod algebraic;
+mod ask;
 pub(in crate::ocp) mod convexify;
-pub(in crate::ocp) mod curvature;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod inside;
 pub(in crate::ocp) mod kkt;

@@ -2,8 +2,6 @@
 //! solution.
 
 use crate::ocp::assembly::algebraic;
-#[cfg(feature = "casadi")]
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::assembly::inside::{Costs, Rows};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
@@ -14,6 +12,8 @@ use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::problem::{Formulation, Problem};
+#[cfg(feature = "casadi")]
+use crate::ocp::formulation::program::curvature::Curvature;
 #[cfg(feature = "casadi")]
 use crate::qp::Arrays;
 use crate::qp::{StageDims, part, part_mut};

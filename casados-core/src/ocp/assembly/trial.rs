@@ -15,7 +15,7 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nod
 use crate::ocp::formulation::instance::data::{Layout, Node, path_rows, split};
 use crate::ocp::formulation::instance::{Ocp, nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::ocp::program::{Parts, Program, intervals_end};
+use crate::ocp::formulation::program::{Parts, Program, intervals_end};
 use crate::qp::{Arrays, Solution, StageDims, copy_common, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;

@@ -6,7 +6,7 @@
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), section 3.8.
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_initial_state_fixed};
 use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, copy_common, is_marked, part, part_mut};

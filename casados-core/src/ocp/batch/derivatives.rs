@@ -2,10 +2,10 @@
 
 use super::gradients::Gradients;
 use super::{BatchOcp, Worker, refill};
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::solution::outcome::Outcome;
 use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};

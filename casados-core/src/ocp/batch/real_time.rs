@@ -1,11 +1,11 @@
 //! Real-time iterations of many plants.
 
 use super::refill;
-use crate::ocp::assembly::curvature::{Curvature, GaussNewton};
 use crate::ocp::feedback::real_time::HeapRealTime;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::{Curvature, GaussNewton};
 use crate::qp::{HeapInteriorPoint, copy_common, each, part, threads, try_reserve, try_resize};
 use crate::scalar::Real;
 use crate::shape::Shape;

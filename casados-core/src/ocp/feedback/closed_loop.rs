@@ -2,7 +2,6 @@
 
 use crate::integrator::Integrator;
 use crate::model::VectorP;
-use crate::ocp::assembly::curvature::Curvature;
 pub use crate::ocp::feedback::closed_record::ClosedLoop;
 use crate::ocp::feedback::closed_record::Recorder;
 use crate::ocp::feedback::real_time::HeapRealTime;
@@ -10,6 +9,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::vector;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::ocp_solver::OcpSolver;
 use crate::ocp::nlp::watch::Watch;
 use crate::qp::{QpSolver, copy_common, each, threads, try_reserve, zeros};

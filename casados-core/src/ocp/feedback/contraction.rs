@@ -150,8 +150,8 @@ type Reductions<P, T, D, M> =
     fn(&mut Ocp<P, T, D, M>, &Solution<T, D, M>, &mut Solution<T, D, M>, &mut [T]) -> [f64; 3];
 
 /// How many numbers a monitor takes for a problem: weights, and ends of intervals.
-pub(in crate::ocp) const fn memory<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> [usize; 2] {
-    [Solution::<T, (), ()>::memory(dims), crate::ocp::program::ends(dims)]
+pub(in crate::ocp) const fn memory<T: Real>(dims: &[StageDims]) -> [usize; 2] {
+    [Solution::<T, (), ()>::memory(dims), crate::ocp::formulation::program::ends(dims)]
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Monitor<P, T, D, M> {

@@ -2,9 +2,9 @@
 
 use super::contraction::{Contraction, Convergence};
 use super::real_time::{RealTime, Step};
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{QpSolver, QpStatistics, StageDims};
 use crate::scalar::Real;
 

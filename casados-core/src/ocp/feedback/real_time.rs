@@ -8,10 +8,6 @@
 //! feedback(x)  solve the QP with x_0 = x: its first control is applied, its solution is the next plan
 //! ```
 
-use crate::ocp::assembly::convexify::Convexification;
-#[cfg(feature = "alloc")]
-use crate::ocp::assembly::curvature::Exact;
-use crate::ocp::assembly::curvature::{Curvature, GaussNewton};
 use crate::ocp::feedback::contraction::{self, ContractionTest, Convergence, Monitor};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::error::Part;
@@ -21,6 +17,10 @@ use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Convexification;
+#[cfg(feature = "alloc")]
+use crate::ocp::formulation::program::curvature::Exact;
+use crate::ocp::formulation::program::curvature::{Curvature, GaussNewton};
 use crate::ocp::nlp::inertia::InertiaCorrection;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
@@ -197,7 +197,7 @@ impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
     /// [`OcpError::OutOfMemory`]
     pub fn monitored(self) -> Result<Self, OcpError> {
         let dims = self.ocp.qp().dims();
-        let [_, ends] = contraction::memory::<P, T>(dims);
+        let [_, ends] = contraction::memory::<T>(dims);
         let monitor = Monitor::new(HeapSolution::new(dims)?, crate::qp::zeros(ends)?);
         Ok(Self { monitor: Some(monitor), ..self })
     }
@@ -232,7 +232,7 @@ impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims],
     /// How many numbers [`RealTime::monitored_in`] takes.
     #[must_use]
     pub const fn memory_of_monitor(dims: &[StageDims]) -> usize {
-        let [weights, ends] = contraction::memory::<P, T>(dims);
+        let [weights, ends] = contraction::memory::<T>(dims);
         weights.saturating_add(ends)
     }
 
@@ -247,7 +247,7 @@ impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims],
         if found < expected {
             return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
         }
-        let [weights, _] = contraction::memory::<P, T>(dims);
+        let [weights, _] = contraction::memory::<T>(dims);
         let (weights, ends) = memory.split_at_mut_checked(weights).unwrap_or_default();
         let monitor = Monitor::new(Solution::in_memory(dims, weights)?, ends);
         Ok(Self { monitor: Some(monitor), ..self })

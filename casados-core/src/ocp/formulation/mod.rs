@@ -26,4 +26,5 @@ pub(in crate::ocp) mod limit;
 pub(in crate::ocp) mod names;
 pub(in crate::ocp) mod print;
 pub(in crate::ocp) mod problem;
+pub(in crate::ocp) mod program;
 pub(in crate::ocp) mod soften;

@@ -4,7 +4,6 @@ use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
 use crate::ocp::formulation::functions::fits::{HasArgumentsOf, IsConstraint, IsCost};
-use crate::ocp::program::Program;
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -142,11 +141,11 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     message = "`{Self}` is not a problem of optimal control with numbers `{T}`",
     note = "costs and constraints are functions with the arguments of the model (unused ones with an underscore), and have its dimensions"
 )]
-pub trait Formulation<T: Real>:
-    Program<T, Dynamics: Dynamics<T, Shape = <Self as Formulation<T>>::Shape>>
-{
+pub trait Formulation<T: Real> {
     /// Dimensions.
     type Shape: Shape;
+    /// What happens between two nodes.
+    type Dynamics: Dynamics<T, Shape = Self::Shape>;
     /// The cost of the stages but the last.
     type StageCost: Cost<Self::Shape, T>;
     /// The cost of the last stage.
@@ -209,6 +208,7 @@ where
     H: Constraints<D::Shape, T>,
 {
     type Shape = D::Shape;
+    type Dynamics = D;
     type StageCost = L;
     type TerminalCost = E;
     type Path = G;

@@ -1,7 +1,7 @@
 //! Bounds that contradict each other before anything is evaluated: those of variables that are one.
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{Bounds, QpField, Side, StageDims, marked_indices};
 use crate::scalar::Real;

@@ -3,7 +3,7 @@
 
 use crate::linalg::dot;
 use crate::ocp::formulation::instance::{Initial, Ocp};
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::{Bounds, Places, Solution, StageDims, part};
 use crate::scalar::Real;
 

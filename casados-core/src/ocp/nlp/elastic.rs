@@ -2,7 +2,7 @@
 //! solution.
 
 use crate::ocp::formulation::instance::{Initial, Ocp};
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 pub(in crate::ocp) use crate::qp::Violation as Worst;
 use crate::qp::{StageDims, largest_violation, padded_len};
 use crate::scalar::Real;

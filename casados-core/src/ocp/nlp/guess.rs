@@ -2,7 +2,7 @@
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::{Bounds, Solution, StageDims};
 use crate::scalar::Real;
 

@@ -3,7 +3,7 @@
 //! Program. 106, 2006, section 3.1).
 
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::{QpError, StageDims};
 use crate::scalar::Real;
 

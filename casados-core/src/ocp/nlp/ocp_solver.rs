@@ -1,11 +1,11 @@
 //! What solves problems, whatever the method.
 
-use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::{Curvature, Exact};
 use crate::ocp::nlp::ipm::HeapIpm;
 use crate::ocp::nlp::sqp::HeapSqp;
-use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Outcome;
 use crate::qp::QpSolver;
 use crate::scalar::Real;

@@ -30,7 +30,7 @@ use crate::ocp::formulation::functions::dynamics::SecondOrder;
 use crate::ocp::formulation::instance::inside::InnerPoints;
 use crate::ocp::formulation::instance::{HeapOcp, Initial, Ocp};
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::program::ends;
+use crate::ocp::formulation::program::ends;
 use crate::qp::{
     HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, try_reserve, zeros,
 };

@@ -1,15 +1,14 @@
 //! A phase, whatever its problem is.
 
 use super::link::{PhaseDims, PhaseEnd};
-use crate::ocp::assembly::convexify::Convexification;
-use crate::ocp::assembly::curvature::{Exact, GaussNewton};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
 use crate::ocp::formulation::instance::{HeapOcp, Initial};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::program::Parts;
-use crate::ocp::solution::outcome::Outcome;
+use crate::ocp::formulation::program::curvature::Convexification;
+use crate::ocp::formulation::program::curvature::{Exact, GaussNewton};
+use crate::ocp::formulation::program::{Parts, Program};
 use crate::qp::{
     HeapSolution, QpError, QpField, QpView, Side, SolutionStage, copy_common, marked_indices, part,
 };
@@ -73,7 +72,7 @@ pub(super) trait Phase<T: Real> {
     fn end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
     fn derivative(&self, error: &QpError) -> Option<OcpError>;
-    fn complete(&mut self, outcome: &mut Outcome);
+    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>);
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
@@ -148,7 +147,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         &mut self.iterate
     }
     fn given(&mut self) -> [&[T]; 2] {
-        let Parts { given, .. } = P::split(self);
+        let Parts { given, .. } = <P as Program<T>>::split(self);
         given
     }
     fn linearise(&mut self, Kind { exact, convexification }: Kind) -> Result<T, OcpError> {
@@ -179,7 +178,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn derivative(&self, error: &QpError) -> Option<OcpError> {
         self.derivative(error)
     }
-    fn complete(&mut self, outcome: &mut Outcome) {
-        self.complete(outcome);
+    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>) {
+        self.convexity_and_violation(asks)
     }
 }

@@ -4,14 +4,14 @@ use super::link::{Link, PhaseEnd};
 use super::phase::{Kind, Size};
 use super::{Joined, Phases, Trial, transfer};
 use crate::linalg::dot;
-use crate::ocp::assembly::convexify::{Convexification, convexify};
-use crate::ocp::assembly::curvature::{Curvature, Exact, GaussNewton};
+use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
 use crate::ocp::formulation::functions::point::Terms;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::{Parts, Program, intervals_end};
-use crate::ocp::solution::outcome::Outcome;
+use crate::ocp::formulation::program::curvature::Convexification;
+use crate::ocp::formulation::program::curvature::{Curvature, Exact, GaussNewton};
+use crate::ocp::formulation::program::{Parts, Program, intervals_end};
 use crate::qp::{
     Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, check,
     copy_common, part, part_mut, take_mut,
@@ -59,108 +59,98 @@ curvatures! {
     f32, GaussNewton, false;
 }
 
-impl<T: Real> Program<T> for Phases<'_, T> {
-    type Dynamics = PhaseDynamics;
+/// Of these numbers alone: whoever had numbers of one's own could make a formulation of phases, and
+/// every formulation is a program.
+macro_rules! programs {
+    ($($number:ty),*) => {$(
+        impl Program<$number> for Phases<'_, $number> {
+            type Dynamics = PhaseDynamics;
 
-    fn linearise<C: Curvature<PhaseDynamics, T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &mut Ocp<Self, T, D, M>,
-        curvature: C,
-    ) -> Result<(), OcpError> {
-        write(ocp, Kind { exact: C::EXACT, convexification: curvature.convexification() })
-    }
-
-    fn slopes<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Result<(), OcpError> {
-        write(ocp, Kind { exact: false, convexification: Convexification::None })
-    }
-
-    fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &mut Ocp<Self, T, D, M>,
-        at: &Solution<T, D, M>,
-        ends: &mut [T],
-    ) -> Result<T, OcpError> {
-        let length = intervals_end(ocp.qp.dims());
-        let (mut ends, mut values) = ends.split_at_mut_checked(length).unwrap_or_default();
-        let (mut objective, mut stages) = (T::ZERO, at.stages());
-        let Phases { phases, trials, start } = &mut ocp.problem;
-        let mut nexts = phases.iter().map(|phase| phase.size).collect::<Vec<_>>().into_iter();
-        let mut before = stages.next();
-        if let (Some(size), Some(decided)) = (nexts.next(), before) {
-            let first = take_mut(&mut ends, size.nx + size.free);
-            copy_common(first, start);
-            transfer::begin(size, decided.u, first);
-        }
-        for (phase, trial) in phases.iter_mut().zip(trials) {
-            let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
-            objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
-            write_ends(phase.size, trial, &mut ends, &mut values);
-            if let (Some(next), Some(last)) = (nexts.next(), last) {
-                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
-            }
-            before = last;
-        }
-        Ok(objective)
-    }
-
-    fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Parts<'_, T, D, M> {
-        let Ocp { qp, iterate, data, .. } = ocp;
-        let rows = qp.dims().iter().map(|stage| stage.ng).sum();
-        let (lower, rest) = data.as_mut().split_at_mut_checked(rows).unwrap_or_default();
-        let (upper, scratch) = rest.split_at_mut_checked(rows).unwrap_or_default();
-        Parts { qp, iterate, given: [lower, upper], scratch }
-    }
-
-    fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
-        let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
-        core::iter::once(0..1).chain(phases)
-    }
-
-    fn name<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &Ocp<Self, T, D, M>,
-        place: (QpField, usize, usize),
-        side: Side,
-    ) -> ConstraintName {
-        ocp.problem.name_of_row(place, side)
-    }
-
-    fn derivative<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &Ocp<Self, T, D, M>,
-        error: &QpError,
-    ) -> Option<OcpError> {
-        ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
-            // What no phase has is of a link.
-            let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
-            let (_, phase) = ocp.problem.at(stage)?;
-            let function = phase.link.as_ref()?.name();
-            let stage = stage - phase.first;
-            Some(OcpError::NonFiniteFunction { function, stage, output: 0, value })
-        })
-    }
-
-    fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-        ocp: &mut Ocp<Self, T, D, M>,
-        outcome: &mut Outcome,
-    ) {
-        let Ocp { problem, iterate, .. } = ocp;
-        problem.load(iterate.stages());
-        outcome.is_convex = true;
-        let mut worst = None;
-        for (index, phase) in problem.phases.iter_mut().enumerate() {
-            let mut own = Outcome { violated: None, ..outcome.clone() };
-            phase.problem.complete(&mut own);
-            outcome.is_convex &= own.is_convex && phase.link.as_ref().is_none_or(|link| link.is_linear());
-            if let Some((name, violation)) = own.violated
-                && worst.is_none_or(|(_, largest)| violation > largest)
+            fn linearise<C, D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+                curvature: C,
+            ) -> Result<(), OcpError>
+            where
+                C: Curvature<PhaseDynamics, $number>,
             {
-                worst = Some((ConstraintName { phase: Some(index), ..name }, violation));
+                write(ocp, Kind { exact: C::EXACT, convexification: curvature.convexification() })
+            }
+
+            fn slopes<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+            ) -> Result<(), OcpError> {
+                write(ocp, Kind { exact: false, convexification: Convexification::None })
+            }
+
+            fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+                at: &Solution<$number, D, M>,
+                ends: &mut [$number],
+            ) -> Result<$number, OcpError> {
+                let length = intervals_end(ocp.qp.dims());
+                ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())
+            }
+
+            fn split<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+            ) -> Parts<'_, $number, D, M> {
+                let Ocp { qp, iterate, data, .. } = ocp;
+                let rows = qp.dims().iter().map(|stage| stage.ng).sum();
+                let (lower, rest) = data.as_mut().split_at_mut_checked(rows).unwrap_or_default();
+                let (upper, scratch) = rest.split_at_mut_checked(rows).unwrap_or_default();
+                Parts { qp, iterate, given: [lower, upper], scratch }
+            }
+
+            fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
+                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
+                core::iter::once(0..1).chain(phases)
+            }
+
+            fn name<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &Ocp<Self, $number, D, M>,
+                place: (QpField, usize, usize),
+                side: Side,
+            ) -> ConstraintName {
+                ocp.problem.name_of_row(place, side)
+            }
+
+            fn derivative<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &Ocp<Self, $number, D, M>,
+                error: &QpError,
+            ) -> Option<OcpError> {
+                ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
+                    // What no phase has is of a link.
+                    let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
+                    let (_, phase) = ocp.problem.at(stage)?;
+                    let function = phase.link.as_ref()?.name();
+                    let stage = stage - phase.first;
+                    Some(OcpError::NonFiniteFunction { function, stage, output: 0, value })
+                })
+            }
+
+            fn complete<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+                asks: bool,
+            ) -> (bool, Option<(ConstraintName, f64)>) {
+                let Ocp { problem, iterate, .. } = ocp;
+                problem.load(iterate.stages());
+                let (mut is_convex, mut worst) = (true, None);
+                for (index, phase) in problem.phases.iter_mut().enumerate() {
+                    let (of_phase, violated) = phase.problem.complete(asks);
+                    is_convex &= of_phase && phase.link.as_ref().is_none_or(|link| link.is_linear());
+                    if let Some((name, violation)) = violated
+                        && worst.is_none_or(|(_, largest)| violation > largest)
+                    {
+                        worst = Some((ConstraintName { phase: Some(index), ..name }, violation));
+                    }
+                }
+                (is_convex, worst)
             }
         }
-        outcome.violated = worst;
-    }
+    )*};
 }
+
+programs!(f64, f32);
 
 /// Writes the QP at the iterate, and the objective.
 fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
@@ -232,7 +222,7 @@ fn write_link<T: Real>(
     if exact {
         // The gradient of what is quadratic is `∇f − H v`: with another `H`.
         add_symmetric(gradient, hessian, ld, v, n);
-        let mut terms = Terms { free: end.free, gradient: &mut [], hessian: &mut **hessian, ld };
+        let mut terms = Terms { free: end.free, gradient: &mut [], hessian, ld };
         link.curve(end, part(pi, 0, next.given), &mut terms);
         convexify(convexification, hessian, ld, own, scratch);
         let product = part_mut(scratch, 0, ld);
@@ -244,6 +234,34 @@ fn write_link<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
+    /// The objective at some point; in `ends` the ends of all intervals, and constraints.
+    fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        at: &Solution<T, D, M>,
+        (mut ends, mut values): (&mut [T], &mut [T]),
+    ) -> Result<T, OcpError> {
+        let (mut objective, mut stages) = (T::ZERO, at.stages());
+        let mut nexts: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
+        let Phases { phases, trials, start } = self;
+        let mut nexts = nexts.drain(..);
+        let mut before = stages.next();
+        if let (Some(size), Some(decided)) = (nexts.next(), before) {
+            let first = take_mut(&mut ends, size.nx + size.free);
+            copy_common(first, start);
+            transfer::begin(size, decided.u, first);
+        }
+        for (phase, trial) in phases.iter_mut().zip(trials) {
+            let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
+            objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
+            write_ends(phase.size, trial, &mut ends, &mut values);
+            if let (Some(next), Some(last)) = (nexts.next(), last) {
+                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
+            }
+            before = last;
+        }
+        Ok(objective)
+    }
+
     /// The QPs of all phases as that of the whole, with the links between them.
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,

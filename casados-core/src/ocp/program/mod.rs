@@ -1,222 +1,99 @@
-//! What solvers ask of a problem: the QP at its iterate, values at other points, and names.
-//!
-//! One horizon answers by its functions (`single`), phases by the horizons that they consist of.
+//! A problem on one horizon as a program.
 
-mod single;
-
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
-use crate::ocp::formulation::functions::dynamics::StageAction;
-use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::solution::outcome::Outcome;
-use crate::qp::{Qp, QpError, QpField, Residuals, Side, Solution, StageDims, nan_max};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, StageAction};
+use crate::ocp::formulation::instance::data::{Data, split};
+use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::{Curvature, Slopes};
+use crate::ocp::formulation::program::{Parts, Program};
+use crate::qp::{QpError, QpField, Side, Solution, StageDims};
 use crate::scalar::Real;
 use core::ops::Range;
 
-/// What [`Sqp`](crate::ocp::Sqp) and [`Ipm`](crate::ocp::Ipm) solve: a nonlinear program whose QP
-/// has the stages of optimal control.
-///
-/// A [`Problem`](crate::ocp::Problem) is one, and so are `Phases` of several of them. Whoever is
-/// generic over problems asks for [`Formulation`](crate::ocp::Formulation), of which every one is a
-/// program.
-///
-/// ```
-/// use casados::ocp::{HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem, Program};
-/// use casados::prelude::*;
-///
-/// /// How many variables a program has.
-/// fn variables<P: Program<f64>>(ocp: &HeapOcp<P>) -> usize {
-///     ocp.qp().dims().iter().map(|stage| stage.nx + stage.nu).sum()
-/// }
-///
-/// #[function]
-/// fn push(x: f64, u: f64) -> f64 { x + u }
-/// let ocp = Problem::new(Map::<Push, f64>::new()).on(Horizon::uniform(10, 0.1))?;
-/// assert_eq!(variables(&ocp), 10 * 2 + 1);
-/// # Ok::<(), OcpError>(())
-/// ```
-pub trait Program<T: Real>: Sized {
-    /// What a [`Curvature`] is of.
-    type Dynamics;
-    /// Whether stages of intervals are variables.
-    #[doc(hidden)]
-    const LIFTED: bool = false;
+impl<P: Formulation<T>, T: Real> Program<T> for P {
+    type Dynamics = P::Dynamics;
+    const LIFTED: bool = P::Dynamics::LIFTED;
 
-    /// Writes the QP at the iterate, and its objective.
-    #[doc(hidden)]
-    fn linearise<C: Curvature<Self::Dynamics, T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn linearise<C: Curvature<P::Dynamics, T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         curvature: C,
-    ) -> Result<(), OcpError>;
+    ) -> Result<(), OcpError> {
+        ocp.linearise_with_observer(curvature, &mut |_, _| {})
+    }
 
-    /// The same with first derivatives, where the Hessian does not matter.
-    #[doc(hidden)]
     fn slopes<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Result<(), OcpError>;
+    ) -> Result<(), OcpError> {
+        ocp.linearise(Slopes)
+    }
 
-    /// The objective at some point, without penalties; in `ends` the ends of all intervals, then
-    /// the constraints of all stages.
-    #[doc(hidden)]
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         at: &Solution<T, D, M>,
         ends: &mut [T],
-    ) -> Result<T, OcpError>;
+    ) -> Result<T, OcpError> {
+        ocp.evaluate_functions(at, ends)
+    }
 
-    /// The parts of a problem that are there for each of its kind.
-    #[doc(hidden)]
     fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Parts<'_, T, D, M>;
+    ) -> Parts<'_, T, D, M> {
+        let layout = ocp.layout();
+        let Ocp { qp, iterate, data, .. } = ocp;
+        let Data { lower, upper, scratch, .. } = split::<P, T>(data.as_mut(), layout);
+        Parts { qp, iterate, given: [lower, upper], scratch }
+    }
 
-    /// Ranges of stages whose variables are the same, of so many stages.
-    #[doc(hidden)]
-    fn spans(&self, stages: usize) -> impl Iterator<Item = Range<usize>>;
+    fn spans(&self, stages: usize) -> impl Iterator<Item = Range<usize>> {
+        core::iter::once(0..stages)
+    }
 
-    /// A constraint of the QP by its name.
-    #[doc(hidden)]
     fn name<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &Ocp<Self, T, D, M>,
-        place: (QpField, usize, usize),
+        (field, stage, index): (QpField, usize, usize),
         side: Side,
-    ) -> ConstraintName;
+    ) -> ConstraintName {
+        ocp.name_of_row(field, stage, index, side)
+    }
 
-    /// The derivative that makes a QP one without values.
-    #[doc(hidden)]
     fn derivative<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &Ocp<Self, T, D, M>,
         error: &QpError,
-    ) -> Option<OcpError>;
+    ) -> Option<OcpError> {
+        ocp.derivative_without_value(error)
+    }
 
-    /// Completes the outcome of a run.
-    #[doc(hidden)]
     fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-        outcome: &mut Outcome,
-    );
+        asks: bool,
+    ) -> (bool, Option<(ConstraintName, f64)>) {
+        ocp.convexity_and_violation(asks)
+    }
 
-    /// Stages that are variables begin anew, at the iterate.
-    #[doc(hidden)]
     fn begin_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> Result<(), OcpError> {
-        let _ = ocp;
-        Ok(())
+        let layout = ocp.layout();
+        let data = split::<P, T>(ocp.data.as_mut(), layout);
+        let (v, multipliers) = ocp.iterate.variables_and_costates();
+        let p = (&*data.p, ocp.free.view());
+        ocp.problem.parts().dynamics.begin_stages(&nodes::<P::Shape, T>(v, multipliers, &[], p, data.times))
     }
 
-    /// Their step, of one of states and controls.
-    #[doc(hidden)]
     fn expand_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         step: &Solution<T, D, M>,
     ) -> Result<(), OcpError> {
-        let _ = (ocp, step);
-        Ok(())
+        let layout = ocp.layout();
+        let data = split::<P, T>(ocp.data.as_mut(), layout);
+        let (v, multipliers) = ocp.iterate.variables_and_costates();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, ocp.free.view()), data.times);
+        let (step, _) = step.variables_and_costates();
+        ocp.problem.parts().dynamics.expand_stages(&nodes, &Nodes { v: step, ..nodes })
     }
 
-    /// What happens to them.
-    #[doc(hidden)]
     fn move_stages(&mut self, action: StageAction<T>) {
-        let _ = action;
-    }
-}
-
-/// What there is of a problem, whatever it is.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Parts<'a, T, D, M> {
-    pub(in crate::ocp) qp: &'a mut Qp<T, D, M>,
-    pub(in crate::ocp) iterate: &'a Solution<T, D, M>,
-    /// Lower and upper bounds of the constraints of all stages, as they were given.
-    pub(in crate::ocp) given: [&'a [T]; 2],
-    /// Room for three vectors over the variables of a stage.
-    pub(in crate::ocp) scratch: &'a mut [T],
-}
-
-/// How many numbers the ends of all intervals are.
-pub(in crate::ocp) const fn intervals_end(dims: &[StageDims]) -> usize {
-    let (mut length, mut rest) = (0_usize, dims);
-    while let Some((_, others)) = rest.split_first() {
-        if let Some(next) = others.first() {
-            length = length.saturating_add(next.nx);
-        }
-        rest = others;
-    }
-    length
-}
-
-/// How many numbers the ends of all intervals and the constraints of all stages are.
-pub(in crate::ocp) const fn ends(dims: &[StageDims]) -> usize {
-    let (mut length, mut rest) = (intervals_end(dims), dims);
-    while let Some((first, others)) = rest.split_first() {
-        length = length.saturating_add(first.ng);
-        rest = others;
-    }
-    length
-}
-
-impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
-    /// programming.
-    ///
-    /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
-        P::linearise(self, curvature)
-    }
-
-    /// The objective at some point, without penalties; and what is left of its dynamics and
-    /// constraints in `ends`: `φ` of every interval, then `g` of every stage.
-    ///
-    /// # Errors
-    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
-        P::evaluate(self, at, ends)
-    }
-
-    /// How many numbers `φ` of every interval and `g` of every stage are.
-    pub(crate) fn ends(&self) -> usize {
-        ends(self.qp.dims())
-    }
-
-    /// How well the iterate satisfies the conditions of optimality of the problem, and the
-    /// objective with penalties of soft bounds; after [`Ocp::linearise`].
-    #[must_use]
-    pub fn residuals(&mut self) -> (Residuals, f64) {
-        let Parts { qp, iterate, scratch, .. } = P::split(self);
-        let (mut residuals, penalties) = crate::ocp::assembly::kkt::residuals(qp.view(), iterate, scratch);
-        if P::LIFTED {
-            let [_, stages] = self.stages;
-            residuals.dynamics = nan_max(residuals.dynamics, stages.to_f64());
-        }
-        (residuals, self.objective.to_f64() + penalties)
-    }
-
-    /// A constraint of the QP by its name in the problem.
-    #[must_use]
-    pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
-        P::name(self, (field, stage, index), side)
-    }
-
-    /// The constraint that makes a QP infeasible.
-    #[must_use]
-    pub fn infeasible(&self, error: &QpError) -> Option<ConstraintName> {
-        match *error {
-            QpError::Infeasible { field, stage, index, side, .. } => {
-                Some(self.name(field, stage, index, side))
-            }
-            _ => None,
-        }
-    }
-
-    /// The derivative that makes a QP one without values.
-    pub(in crate::ocp) fn derivative(&self, error: &QpError) -> Option<OcpError> {
-        P::derivative(self, error)
-    }
-
-    /// Completes the outcome of a run.
-    pub(in crate::ocp) fn complete(&mut self, outcome: &mut Outcome) {
-        P::complete(self, outcome);
+        self.parts().dynamics.move_stages(action);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::solution::log::{Iteration, Times};
 use crate::qp::{QpError, Residuals, StageDims, Violation};
 use crate::scalar::Real;
@@ -207,7 +207,6 @@ impl Outcome {
 
 impl Status {
     /// Whether it says itself which constraint is violated.
-    #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn names_a_constraint(&self) -> bool {
         matches!(self, Self::Infeasible { .. } | Self::InfeasibleQp { .. })
     }
@@ -283,6 +282,16 @@ impl fmt::Display for Outcome {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Completes the outcome of a run.
+    pub(in crate::ocp) fn complete(&mut self, outcome: &mut Outcome) {
+        let asks = !outcome.is_solved() && !outcome.status.names_a_constraint();
+        let (is_convex, violated) = P::complete(self, asks);
+        outcome.is_convex = is_convex;
+        if asks {
+            outcome.violated = violated;
+        }
+    }
+
     /// The status of a run whose violations cannot be made smaller.
     pub(in crate::ocp) fn status_of_worst(&self, worst: &Violation) -> Status {
         let Violation { field, stage, index, side, violation } = *worst;

@@ -1,24 +1,28 @@
 //! What an outcome says beyond its status: whether the problem is known to be convex, and of a run
 //! that ends without a solution the bound that its iterate violates most.
 
+use crate::ocp::formulation::error::ConstraintName;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::pattern::{Entry, Origin};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::ocp::solution::outcome::Outcome;
 use crate::qp::StageDims;
 use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Completes the outcome of a run.
-    pub(in crate::ocp) fn complete_outcome(&mut self, outcome: &mut Outcome) {
-        outcome.is_convex = self.is_convex();
+    /// Whether the problem is known to be convex, and the bound that is violated most, if somebody
+    /// `asks` for it.
+    pub(in crate::ocp) fn convexity_and_violation(
+        &mut self,
+        asks: bool,
+    ) -> (bool, Option<(ConstraintName, f64)>) {
         #[cfg(feature = "alloc")]
-        if !outcome.is_solved() && !outcome.status.names_a_constraint() {
-            outcome.violated = self.most_violated();
-        }
+        let violated = if asks { self.most_violated() } else { None };
+        #[cfg(not(feature = "alloc"))]
+        let violated = None.filter(|_| asks);
+        (self.is_convex(), violated)
     }
 
     /// Whether dynamics and constraints are known to be linear, and costs to be convex.

@@ -1,10 +1,10 @@
 //! What may be a mistake in a problem before it is solved.
 
 use crate::linalg::dot;
-use crate::ocp::assembly::curvature::Slopes;
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::instance::{HeapOcp, Initial};
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Slopes;
 use crate::qp::element::get;
 use crate::qp::{Bounds, Places, QpField, Side, part};
 use crate::scalar::Real;

@@ -4,7 +4,7 @@ use super::Ipm;
 use super::IpmOptions;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::solution::log::Log;
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;

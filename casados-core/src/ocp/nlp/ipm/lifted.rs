@@ -6,7 +6,7 @@ use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
 use crate::scalar::Real;
 

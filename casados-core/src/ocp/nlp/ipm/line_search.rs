@@ -7,10 +7,10 @@ use super::kkt::work::Work;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, GAMMA_PHI, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides,
 };
-use crate::ocp::program::Program;
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};

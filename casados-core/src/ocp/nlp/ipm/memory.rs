@@ -5,7 +5,7 @@ use super::IpmOptions;
 use super::kkt::lengths::all_soft;
 use super::kkt::work::Work;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::program::{Program, ends};
+use crate::ocp::formulation::program::{Program, ends};
 use crate::qp::interior::{Counts, Iterate};
 use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
@@ -31,7 +31,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         if solution == usize::MAX {
             return (usize::MAX, usize::MAX);
         }
-        let [numbers, work, indices] = lengths::<P, T>(dims, bounds, equations);
+        let [numbers, work, indices] = lengths::<T>(dims, bounds, equations);
         (solution.saturating_mul(3).saturating_add(numbers).saturating_add(work), indices)
     }
 
@@ -54,7 +54,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
             }
         }
         let length = Solution::<T, (), ()>::memory(dims);
-        let [_, work, _] = lengths::<P, T>(dims, bounds, equations);
+        let [_, work, _] = lengths::<T>(dims, bounds, equations);
         let (trial, rest) = numbers.split_at_mut_checked(length).unwrap_or_default();
         let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         let (guess, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
@@ -75,7 +75,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
 }
 
 /// Numbers of Newton's equations, numbers beside them, and indices.
-const fn lengths<P: Program<T>, T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
+const fn lengths<T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
     let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
     let work = Work::<T>::length(dims, ends(dims), &counts);
     [Iterate::<T>::memory(dims, &counts) + equations, work, counts.indices()]

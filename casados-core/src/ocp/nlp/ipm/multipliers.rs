@@ -10,7 +10,7 @@ use super::restoration::phase;
 use super::state::State;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
 use crate::qp::{StageDims, Store, copy_common};
 use crate::scalar::Real;
 

@@ -4,12 +4,12 @@
 use super::Sqp;
 use super::scaled::{Way, penalties_end, penalties_mut};
 use super::state::State;
-use crate::ocp::assembly::convexify::Convexification;
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::Convexification;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::elastic::Worst;
-use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;

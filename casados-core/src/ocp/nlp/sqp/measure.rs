@@ -3,8 +3,8 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::{Parts, Program, intervals_end};
 use crate::ocp::nlp::filter::Measure;
-use crate::ocp::program::{Parts, Program, intervals_end};
 use crate::qp::element::get;
 use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, copy_common, part, part_mut};
 use crate::scalar::Real;

@@ -26,10 +26,10 @@ mod state;
 
 pub use options::{Globalisation, SqpOptions};
 
-use crate::ocp::assembly::curvature::{Exact, GaussNewton};
 use crate::ocp::formulation::error::{OcpError, Part};
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::{Exact, GaussNewton};
 use crate::ocp::nlp::elastic;
-use crate::ocp::program::Program;
 #[cfg(feature = "alloc")]
 use crate::ocp::solution::log::{Iteration, Log};
 #[cfg(feature = "alloc")]
@@ -214,7 +214,7 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
     pub const fn memory<P: Program<T>>(dims: &[StageDims]) -> usize {
         Solution::<T, (), ()>::memory(dims)
             .saturating_mul(4)
-            .saturating_add(crate::ocp::program::ends(dims))
+            .saturating_add(crate::ocp::formulation::program::ends(dims))
             .saturating_add(elastic::memory(dims))
             .saturating_add(scaled::memory::<T>(dims))
     }

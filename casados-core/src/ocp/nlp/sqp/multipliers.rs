@@ -11,10 +11,10 @@
 use super::Sqp;
 use super::scaled::{Way, penalties_mut};
 use super::state::State;
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::program::Program;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric, part};
 use crate::scalar::Real;
 

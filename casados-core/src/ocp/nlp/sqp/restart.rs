@@ -2,13 +2,13 @@
 
 use super::Sqp;
 use super::state::State;
-use crate::ocp::assembly::convexify::Convexification;
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::Convexification;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
-use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpSolver, Residuals, StageDims, nan_max};

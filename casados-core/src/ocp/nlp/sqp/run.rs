@@ -6,13 +6,13 @@ use super::options::Globalisation;
 use super::restart::violation_of;
 use super::scaled::Way;
 use super::state::{Attempt, State, Taken};
-use crate::ocp::assembly::convexify::Convexification;
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::Convexification;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::solver::{self, Method, Next};
 use crate::ocp::nlp::watch::Watch;
-use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]

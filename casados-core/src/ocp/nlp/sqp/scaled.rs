@@ -11,8 +11,8 @@ use super::Sqp;
 use super::state::State;
 use crate::ocp::assembly::units::{Sizes, Units, WIDE, of_tolerance};
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic::{self, Worst};
-use crate::ocp::program::Program;
 use crate::qp::interior::at;
 use crate::qp::{
     Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, padded_len, part, part_mut,

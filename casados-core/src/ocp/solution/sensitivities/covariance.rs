@@ -11,12 +11,12 @@
 use super::get;
 use super::unknowns::Unknowns;
 use crate::linalg::{axpy, dot};
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{QpError, part, part_mut, zeros};
 use crate::scalar::Real;
 use crate::structure::name_matches;

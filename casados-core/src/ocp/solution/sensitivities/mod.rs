@@ -28,12 +28,12 @@ pub use answers::{SolutionAdjoint, ValueHessian};
 pub use covariance::{Covariance, Unidentifiable};
 pub use factors::SolutionFactors;
 
-use crate::ocp::assembly::curvature::Curvature;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::{Initial, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{StageDims, copy_common, part_mut, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;

@@ -3,11 +3,11 @@
 use super::elastic;
 use super::phase;
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::solver::Next;
-use crate::ocp::program::Program;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};

@@ -1,12 +1,12 @@
 //! Penalties where no step makes progress, and what they tell of a problem without a solution.
 
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic::Worst;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
 use crate::ocp::nlp::ipm::kkt::regularisation::Regularisation;
 use crate::ocp::nlp::ipm::state::State;
-use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::StageDims;
 use crate::scalar::Real;

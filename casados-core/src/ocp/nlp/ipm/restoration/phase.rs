@@ -12,6 +12,7 @@
 
 use super::elastic::{self, soften};
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::ocp::nlp::ipm::kkt::lengths::Lengths;
@@ -19,7 +20,6 @@ use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
 use crate::ocp::nlp::ipm::violations::{MAX_RESTORATION_PHASES, SMALL_VIOLATION};
 use crate::ocp::nlp::solver::Next;
-use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::element::set;
 use crate::qp::interior::{Inequalities, at};

@@ -1,8 +1,9 @@
 //! A second attempt, from a simulation with the controls of the guess.
 
 use super::phase::exit;
-use crate::ocp::assembly::curvature::{Curvature, Exact};
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::formulation::program::curvature::{Curvature, Exact};
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::state::State;
@@ -10,7 +11,6 @@ use crate::ocp::nlp::ipm::violations::Phase;
 use crate::ocp::nlp::simulation::{
     MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
 };
-use crate::ocp::program::Program;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
 use crate::scalar::Real;

@@ -11,12 +11,12 @@
 //! those that follow from the controls of a point on the ray.
 
 use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
 use crate::ocp::nlp::ipm::kkt::newton::kkt_view;
 use crate::ocp::nlp::ipm::kkt::work::Work;
 use crate::ocp::nlp::ipm::line_search::LineSearch;
 use crate::ocp::nlp::ipm::state::State;
-use crate::ocp::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::at;
 use crate::qp::{Places, StageDims, Store, part};

@@ -1,9 +1,38 @@
 //! What the Hessian of the QP is.
 
-use crate::ocp::assembly::convexify::Convexification;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, SecondOrder, Sink};
 use crate::scalar::Real;
+
+/// What is done with the Hessian of a stage that is not positive definite.
+///
+/// ```
+/// use casados::ocp::{Convexification, Exact, GaussNewton};
+///
+/// assert_eq!(Exact::default().convexification, Convexification::Reduced);
+/// assert_eq!(GaussNewton::default().convexification, Convexification::Project);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Convexification {
+    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and
+    /// bounds leave, a multiple of the identity is added to all of them, as little as it takes (A.
+    /// Wächter, L. T. Biegler, "On the implementation of an interior-point filter line-search
+    /// algorithm for large-scale nonlinear programming", Math. Program. 106, 2006, section 3.1).
+    /// Near a solution with second-order sufficient conditions nothing is added, and convergence is
+    /// quadratic. This is what [`Sqp`](crate::ocp::Sqp) does; a QP without it is that of `None`.
+    Reduced,
+    /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP
+    /// says if it is not.
+    None,
+    /// Eigenvalues that are too small become a small positive number.
+    #[default]
+    Project,
+    /// Eigenvalues get the sign plus.
+    Mirror,
+    /// A multiple of the identity is added, as large as it takes (Levenberg and Marquardt).
+    LevenbergMarquardt,
+}
 
 /// What the Hessian of the QP is: [`Exact`], [`GaussNewton`].
 ///
