@@ -93,6 +93,35 @@ fn identities_of_sensitivities() -> Test {
     Ok(())
 }
 
+/// A batch takes its intervals one after the other: each has the bits of a single call, and one
+/// that fails does so alone.
+#[test]
+fn batches_are_single_calls() -> Test {
+    let mut irk = Irk::<Chain<9>, Gauss<2>, f64, Shared>::new(options(2))?;
+    let mut batch = casados::batch::Integrator::<Irk<Chain<9>, Gauss<2>, f64, Shared>>::new(options(2))?;
+    let (u, lambda) = (vector![-1.0, 1.0, 1.0], SVector::from_fn(|i, _| 1.0 - 0.1 * i as f64));
+    let mut x0: Vec<_> = (0..9).map(|k| stretched::<9>() * (1.0 + 0.01 * k as f64)).collect();
+    let intervals = Intervals { x0: &x0, u: &[u], h: &[0.2], ..Default::default() };
+    let mut found = vec![casados::result::Hessian::default(); x0.len()];
+    batch.hessian(&intervals, &[lambda], &mut found)?;
+    for (x0, found) in x0.iter().zip(&found) {
+        let expected = irk.hessian(x0, &u, 0.2, &lambda)?;
+        assert_eq!((found.x, found.dx_dx0, found.h_xx), (expected.x, expected.dx_dx0, expected.h_xx));
+    }
+    assert_eq!(batch.statistics().groups, 0);
+    x0[4][0] = f64::NAN;
+    let intervals = Intervals { x0: &x0, u: &[u], h: &[0.2], ..Default::default() };
+    let mut found = vec![casados::result::Forward::default(); x0.len()];
+    assert!(matches!(batch.forward(&intervals, &mut found), Err(BatchError::Intervals { .. })));
+    for (k, (x0, found)) in x0.iter().zip(&found).enumerate() {
+        match irk.forward(x0, &u, 0.2) {
+            Ok(expected) => assert_eq!(found.dx_dx0, expected.dx_dx0),
+            Err(_) => assert!(k == 4 && batch.status(4).is_err()),
+        }
+    }
+    Ok(())
+}
+
 /// A root that is lost for `p = (0, ·)`, and a logarithm.
 #[dae]
 fn fragile(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1], p: [f64; 2]) -> [f64; 2] {

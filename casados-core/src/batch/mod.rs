@@ -56,6 +56,8 @@ use crate::tableau::{
 ///
 /// `Batch<Model, Custom<S>>` takes implicit tableaux of one's own, and explicit ones as if they
 /// were implicit; `batch::Integrator<Erk<Model, Custom<S>>>` takes explicit ones as they are.
+/// `batch::Integrator<Irk<Model, Gauss<2>, f64, Shared>>` takes the kernels that all models share
+/// ([`Shared`](crate::memory::Shared)), one interval after the other.
 ///
 /// It is an [`Integrator`], whose page has all that it can do:
 ///

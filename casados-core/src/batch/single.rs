@@ -4,7 +4,7 @@ use super::intervals::Interval;
 use super::lanes::{MOST_LANES, Verdict, pack};
 use crate::error::Error;
 use crate::integrator::Integrator;
-use crate::memory::Heap;
+use crate::memory::{WithAdjoint, WithForward, WithHessian};
 use crate::model::Dae;
 use crate::options::Options;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
@@ -37,7 +37,9 @@ use core::any::Any;
 /// assert_eq!(steps(&batch), 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait Single: Integrator<Memory = Heap> + Clone + Send + Sync {
+pub trait Single:
+    Integrator<Memory: WithForward + WithAdjoint<1> + WithHessian> + Clone + Send + Sync
+{
     /// The method.
     type Method;
     /// The tableau of a method.
@@ -171,6 +173,54 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
     fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<I::Model, E>>;
     fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<I::Model, E>>;
     fn hessian(&mut self) -> Verdict<'_, E, Hessian<I::Model, E>>;
+}
+
+/// The group of integrators that take one interval after the other ([`Single::TOGETHER`]): nobody
+/// asks it for anything.
+pub struct NoGroup;
+
+impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
+    fn new(_: &Options, _: &I::Tableau) -> Self {
+        Self
+    }
+
+    fn place(
+        &mut self,
+        _: &[&Interval<'_, I::Model, I::Number>],
+        _: Option<[&[I::Number]; 2]>,
+        _: Option<&[&[I::Stages]; MOST_LANES]>,
+        _: bool,
+    ) -> Result<(), Error> {
+        Err(Error::NoResult)
+    }
+
+    fn stages(&mut self, _: usize, _: &mut [I::Stages]) -> Result<(), Error> {
+        Err(Error::NoResult)
+    }
+
+    fn work(&self) -> Statistics {
+        Statistics::default()
+    }
+
+    fn solve(&mut self) -> Verdict<'_, E, Nominal<I::Model, E>> {
+        Err(Error::NoResult)
+    }
+
+    fn forward(&mut self) -> Verdict<'_, E, Forward<I::Model, E>> {
+        Err(Error::NoResult)
+    }
+
+    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<I::Model, E>> {
+        Err(Error::NoResult)
+    }
+
+    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<I::Model, E>> {
+        Err(Error::NoResult)
+    }
+
+    fn hessian(&mut self) -> Verdict<'_, E, Hessian<I::Model, E>> {
+        Err(Error::NoResult)
+    }
 }
 
 /// Numbers of each interval, in the lanes of registers.

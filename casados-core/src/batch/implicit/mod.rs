@@ -4,83 +4,100 @@ mod group;
 
 use self::group::Group;
 use super::intervals::{Interval, vector};
-use super::single::{Single, Standard};
+use super::single::{NoGroup, Single, Standard};
 use crate::error::Error;
 use crate::irk::{Arguments, Integrator};
-use crate::memory::Heap;
+use crate::memory::{Heap, Shared};
 use crate::model::{ArrayK, Dae};
 use crate::options::{Newton, Options};
 use crate::result::{Forward, ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real};
 use crate::tableau::{Method, Tableau};
 
-impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap> {
-    type Method = B;
-    type Tableau = Tableau<S>;
-    type Stages = ArrayK<M, [T; S]>;
-    type Group<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>> = Group<M, E, S>;
+/// Integrators of a memory, with the groups that it has.
+macro_rules! single {
+    ([$M:ident, $S:ident] $memory:ty { type Group<$E:ident> = $group:ty; const TOGETHER = $together:expr; }) => {
+        impl<$M: Dae, B, const $S: usize, T: Real> Single for Integrator<M, B, S, T, $memory> {
+            type Method = B;
+            type Tableau = Tableau<S>;
+            type Stages = ArrayK<M, [T; S]>;
+            type Group<$E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>> = $group;
 
-    const ITERATES: bool = true;
-    // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-    const TOGETHER: bool = M::STRUCTURE.elimination.has_plan();
+            const ITERATES: bool = true;
+            const TOGETHER: bool = $together;
 
-    fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
-        Self::build(*options, *tableau)
-    }
+            fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
+                Self::build(*options, *tableau)
+            }
 
-    /// Factors, where Newton's method takes those of the shared Jacobian or not, and right-hand
-    /// sides.
-    fn working_set<E: Lanes>(options: &Options, columns: usize) -> usize {
-        let Newton { fixed_iterations, jacobian, .. } = &options.newton;
-        let shared =
-            S > 2 && fixed_iterations.is_none() && jacobian.is_adaptive() && !M::STRUCTURE.linear_in_state;
-        // Derivatives take the factors of each stage in any case.
-        let factors = if shared && columns == 0 {
-            size_of::<M::Factors<[E::Demoted; S]>>()
-        } else {
-            size_of::<M::Factors<[[E; S]; S]>>()
-        };
-        factors + size_of::<ArrayK<M, [E; S]>>() * columns.max(1)
-    }
+            /// Factors, where Newton's method takes those of the shared Jacobian or not, and
+            /// right-hand sides.
+            fn working_set<E: Lanes>(options: &Options, columns: usize) -> usize {
+                let Newton { fixed_iterations, jacobian, .. } = &options.newton;
+                let shared = S > 2
+                    && fixed_iterations.is_none()
+                    && jacobian.is_adaptive()
+                    && !M::STRUCTURE.linear_in_state;
+                // Derivatives take the factors of each stage in any case.
+                let factors = if shared && columns == 0 {
+                    size_of::<M::Factors<[E::Demoted; S]>>()
+                } else {
+                    size_of::<M::Factors<[[E; S]; S]>>()
+                };
+                factors + size_of::<ArrayK<M, [E; S]>>() * columns.max(1)
+            }
 
-    fn give(&mut self, [xdot, z]: [&[T]; 2]) -> Result<(), Error> {
-        self.set_start(&vector(xdot), &vector(z))
-    }
+            fn give(&mut self, [xdot, z]: [&[T]; 2]) -> Result<(), Error> {
+                self.set_start(&vector(xdot), &vector(z))
+            }
 
-    fn start(&mut self, stages: Option<&[ArrayK<M, [T; S]>]>, solved: bool) -> Result<(), Error> {
-        match stages {
-            Some(stages) if solved => self.set_solution(stages),
-            Some(stages) => self.run.set_stages_of_steps(stages),
-            None => {
-                self.reset();
-                Ok(())
+            fn start(&mut self, stages: Option<&[ArrayK<M, [T; S]>]>, solved: bool) -> Result<(), Error> {
+                match stages {
+                    Some(stages) if solved => self.set_solution(stages),
+                    Some(stages) => self.run.set_stages_of_steps(stages),
+                    None => {
+                        self.reset();
+                        Ok(())
+                    }
+                }
+            }
+
+            fn stages(&mut self, to: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
+                self.copy_stages(to)
+            }
+
+            fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {
+                Self::forward_to(self, &Arguments { x0: at.x0, u: &vector(at.u), h: at.h }, to)
+            }
+
+            fn forward_adjoint_to(
+                &mut self,
+                at: &Interval<'_, M, T>,
+                to: &mut ForwardAdjoint<M, T>,
+            ) -> Result<(), Error> {
+                let of = Arguments { x0: at.x0, u: &vector(at.u), h: at.h };
+                Self::forward_adjoint_to(self, &of, at.lambda, to)
+            }
+
+            fn hessian_to(&mut self, at: &Interval<'_, M, T>, to: &mut Hessian<M, T>) -> Result<(), Error> {
+                let of = Arguments { x0: at.x0, u: &vector(at.u), h: at.h };
+                Self::hessian_to(self, &of, at.lambda, at.nu, None, Some(to))
             }
         }
-    }
 
-    fn stages(&mut self, to: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        self.copy_stages(to)
-    }
-
-    fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {
-        Self::forward_to(self, &Arguments { x0: at.x0, u: &vector(at.u), h: at.h }, to)
-    }
-
-    fn forward_adjoint_to(
-        &mut self,
-        at: &Interval<'_, M, T>,
-        to: &mut ForwardAdjoint<M, T>,
-    ) -> Result<(), Error> {
-        let of = Arguments { x0: at.x0, u: &vector(at.u), h: at.h };
-        Self::forward_adjoint_to(self, &of, at.lambda, to)
-    }
-
-    fn hessian_to(&mut self, at: &Interval<'_, M, T>, to: &mut Hessian<M, T>) -> Result<(), Error> {
-        let of = Arguments { x0: at.x0, u: &vector(at.u), h: at.h };
-        Self::hessian_to(self, &of, at.lambda, at.nu, None, Some(to))
-    }
+        impl<$M: Dae, B: Method<$S>, const $S: usize, T: Real> Standard for Integrator<M, B, S, T, $memory> {
+            const TABLEAU: Tableau<S> = B::TABLEAU;
+        }
+    };
 }
 
-impl<M: Dae, B: Method<S>, const S: usize, T: Real> Standard for Integrator<M, B, S, T, Heap> {
-    const TABLEAU: Tableau<S> = B::TABLEAU;
-}
+// Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
+single!([M, S] Heap {
+    type Group<E> = Group<M, E, S>;
+    const TOGETHER = M::STRUCTURE.elimination.has_plan();
+});
+// A group would have kernels of its own to compile.
+single!([M, S] Shared {
+    type Group<E> = NoGroup;
+    const TOGETHER = false;
+});
