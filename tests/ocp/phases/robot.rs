@@ -54,9 +54,7 @@ fn second(n: usize) -> Phase<impl ExactFormulation<f64>> {
 }
 
 #[test]
-fn cost_is_as_published() -> Test {
-    // What PSOPT 5 prints for 30 nodes of Legendre's polynomials in each phase.
-    const PUBLISHED: f64 = 1.0426;
+fn cost_is_at_most_that_of_full_force_at_the_corner() -> Test {
     // Full force from 0.025 s before the corner to as long behind it, and along the path elsewhere:
     // `½ ∫` of rates 10 s from zero on, and of angles 5 s², twice for each of two joints. It has a
     // node at each switch, so that the best stairs cost no more.
@@ -74,8 +72,6 @@ fn cost_is_as_published() -> Test {
         assert!(outcome.is_converged(), "{outcome}");
         kkt::check(&mut robot)?;
         assert!(outcome.objective <= corner * (1.0 + 1e-6), "{} {corner}", outcome.objective);
-        // Polynomials do not switch: theirs is above, by less than a tenth of a per cent.
-        assert!((outcome.objective - PUBLISHED).abs() < 1.5e-3, "{}", outcome.objective);
         objectives.push(outcome.objective);
         drop(robot);
         // It is symmetric: the second joint takes up in reversed time what the first one gives.
