@@ -1,9 +1,9 @@
 //! Two-point boundary value problems: no control, no cost, and layers. Solutions grow by up to e¹⁰⁰
 //! along the horizon, so that the QP of all stages is solved by a sparse factorisation with pivots.
 //!
-//! `Gauss<4>` has order eight, with steps below half the width of the layers: errors are below 1e-10.
-//! Gaps up to the solver's tolerance, 1e-8, are multiplied by the condition of the boundary value
-//! problem, about one.
+//! `Gauss<4>` has order eight, with steps below half the width of the layers: errors are below
+//! 1e-10. Gaps up to the solver's tolerance, 1e-8, are multiplied by the condition of the boundary
+//! value problem, about one.
 
 use crate::Test;
 use casados::ocp::{HeapSqp, Horizon, Problem};
