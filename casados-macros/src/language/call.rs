@@ -41,7 +41,7 @@ impl Evaluator {
         at: TokenSpan,
     ) -> Result<Value> {
         let result = self.deeper(at, |evaluator| evaluator.call_value(function, arguments, expected, at));
-        self.into_value(result, at)
+        self.require_value(result, at)
     }
 
     fn call_value(

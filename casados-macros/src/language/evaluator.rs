@@ -163,7 +163,7 @@ impl Evaluator {
     }
 
     /// The result of something that cannot be left by `break`, `continue` or `return`.
-    pub(super) fn into_value(&mut self, result: Evaluated, at: TokenSpan) -> Result<Value> {
+    pub(super) fn require_value(&mut self, result: Evaluated, at: TokenSpan) -> Result<Value> {
         match result {
             Ok(value) => Ok(value),
             Err(Flow::Error(error)) => Err(error),

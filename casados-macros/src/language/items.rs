@@ -306,7 +306,7 @@ impl Evaluator {
         let saved = std::mem::replace(&mut self.scope, scope.clone());
         let value = self.expression(expression, &ty);
         self.scope = saved;
-        let value = self.into_value(value, expression)?;
+        let value = self.require_value(value, expression)?;
         self.coerce(value, &ty, expression)
     }
 }

@@ -249,7 +249,7 @@ impl Evaluator {
                 self.deeper(at, |evaluator| {
                     Ok(evaluator.constant_expression(&constant.expression, &constant.ty, &scope)?)
                 })
-                .or_else(|flow| self.into_value(Err(flow), at))
+                .or_else(|flow| self.require_value(Err(flow), at))
             };
             return value.map(PathMeaning::Value);
         }

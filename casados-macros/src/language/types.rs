@@ -229,7 +229,7 @@ impl Evaluator {
         let saved = std::mem::replace(&mut self.scope, scope.clone());
         let value = self.expression(length, &Type::Integer(IntegerType::Usize));
         self.scope = saved;
-        match self.into_value(value, length)? {
+        match self.require_value(value, length)? {
             Value::Uninitialised => Ok(None),
             value => self.usize(&value, length).map(Some),
         }
@@ -273,7 +273,7 @@ impl Evaluator {
                     let saved = std::mem::replace(&mut self.scope, scope.clone());
                     let value = self.expression(expression, &Type::Unknown);
                     self.scope = saved;
-                    match self.into_value(value, expression)? {
+                    match self.require_value(value, expression)? {
                         Value::Integer(integer) => generics.push(Generic::Const(integer)),
                         Value::Bool(value) => {
                             let value = i128::from(value);

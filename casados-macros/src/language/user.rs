@@ -273,7 +273,7 @@ impl Evaluator {
             let result = self.deeper(at, |evaluator| {
                 evaluator.call_function(&function, Arguments::Values(values), &Type::Unknown, at)
             });
-            return self.into_value(result, at).map(Some);
+            return self.require_value(result, at).map(Some);
         }
         Ok(None)
     }
