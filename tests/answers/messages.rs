@@ -136,14 +136,15 @@ fn of_integrators() -> Test {
 fn of_the_terms_of_the_field() {
     let limit = Status::MaxIterations.to_string();
     assert!(limit.starts_with("not converged: the maximum number of iterations was reached"), "{limit}");
-    assert!(limit.contains("a larger `options.max_iterations`"), "{limit}");
+    assert!(limit.contains("Raise `options.max_iterations`"), "{limit}");
     assert_eq!(
         OcpError::Coupled.to_string(),
         "feedback gains are not defined for periodic states or shared controls: use `du/dx₀` of `Ocp::differentiate`"
     );
     assert_eq!(
         casados::Error::DependsOnTime { function: "Guard" }.to_string(),
-        "Guard depends on the time, by which derivatives over events are not known: add the time as a state"
+        "Guard depends on the time: second derivatives across events, and first ones across events of algebraic \
+         states, need an autonomous model. Add the time as a state, `ẋ = 1`"
     );
 }
 

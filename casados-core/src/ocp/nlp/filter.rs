@@ -21,11 +21,6 @@ impl Measure {
         self.objective.is_finite() && self.violation.is_finite()
     }
 
-    /// No violation where there is no more than rounding errors.
-    pub fn without_rounding(self, rounding: f64) -> Self {
-        Self { violation: if self.violation <= rounding { 0.0 } else { self.violation }, ..self }
-    }
-
     /// Both in a unit of forces.
     pub fn over(self, force: f64) -> Self {
         Self { objective: self.objective / force, violation: self.violation / force }

@@ -173,7 +173,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
         let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
-        let here = here.without_rounding(rounding);
         let expected = FilterModel {
             here,
             slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,

@@ -35,7 +35,7 @@ pub(super) struct FilterModel {
     pub mu: f64,
     /// `δ_w`
     pub delta: f64,
-    /// Violations up to this one are rounding errors, and none.
+    /// Violations up to this one are rounding errors.
     pub rounding: f64,
 }
 
@@ -60,12 +60,22 @@ impl FilterModel {
         (ALPHA_MIN_FRAC * least).max(1e-14)
     }
 
+    /// Whether neither the violation nor the barrier function changes by more than rounding errors:
+    /// the step changes multipliers.
+    fn is_rounding(&self, there: &Measure, noise: f64) -> bool {
+        self.here.violation <= self.rounding
+            && there.violation <= self.rounding
+            && (there.objective - self.here.objective).abs() <= noise
+    }
+
     /// Whether a point after a step of this length is good enough; the filter grows where the
     /// barrier function does not decide.
     pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
         // What rounding leaves of a difference of barrier functions.
         let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
-        let there = &there.without_rounding(self.rounding);
+        if self.is_rounding(there, noise) {
+            return true;
+        }
         if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {
             return false;
         }
