@@ -11,7 +11,7 @@ use casados::prelude::*;
 /// Two joints, angles and rates, and the square of the distance from the path, integrated: along
 /// the first axis.
 #[ode]
-mod robot {
+mod path {
     #[ode]
     fn first_axis(x: [f64; 5], u: [f64; 2], t: f64) -> [f64; 5] {
         let d = [x[0] - 0.5 * t, x[1], x[2] - 0.5, x[3]];
