@@ -354,9 +354,11 @@ fn explicit_pairs() {
     // Errors that nothing takes back count once for ten steps of the interval.
     assert!(work[2].steps < 380, "{work:?}");
     // Twelve stages for each step, the one that is the next step's first included, which most that
-    // are refused do without, and few to start.
+    // are refused do without, and few to start. Rounding errors are measured by one evaluation in
+    // twenty attempts.
     let AdaptiveStatistics { steps, rejected, residuals, .. } = work[2];
-    assert!(residuals <= 12 * (steps + rejected) + 4, "{work:?}");
+    let measured = (steps + rejected) / 20 + 1;
+    assert!(residuals <= 12 * (steps + rejected) + measured + 4, "{work:?}");
     assert!(residuals >= 12 * steps + 11 * rejected, "{work:?}");
 }
 
