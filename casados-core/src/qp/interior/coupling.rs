@@ -18,7 +18,7 @@ use crate::scalar::Real;
 pub struct CouplingSupport;
 #[cfg(not(feature = "alloc"))]
 #[derive(Clone, Copy)]
-pub enum Exists {}
+pub enum CouplingSupport {}
 
 #[cfg(feature = "alloc")]
 const EXISTS: Option<CouplingSupport> = Some(CouplingSupport);
