@@ -101,10 +101,16 @@ pub(super) fn decide<T: Real>(
     for (to, x, u) in
         [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
     {
-        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
-        copy_common(states, x.get(size.states()).unwrap_or_default());
-        copy_common(parameters, u);
+        gather_decided(size, x, u, to);
     }
+}
+
+/// Of a vector over the first states and controls of a phase the elements that are decided where it
+/// begins: states that are free there, then free parameters.
+fn gather_decided<T: Real>(size: Size, x: &[T], u: &[T], to: &mut [T]) {
+    let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
+    copy_common(states, x.get(size.states()).unwrap_or_default());
+    copy_common(parameters, part(u, 0, size.free));
 }
 
 /// Six vectors of bounds and penalties.
@@ -163,9 +169,7 @@ pub(super) fn bounds<T: Real>(
 pub(super) fn decided_bounds<T: Real>(size: Size, first: &Stage<'_, T>, to: &mut StageMut<'_, T>) {
     let of_first = lists(&first.x_bounds()).into_iter().zip(lists(&first.u_bounds()));
     for (to, (x, u)) in lists_mut(to.u_bounds_mut()).into_iter().zip(of_first) {
-        let (states, parameters) = to.split_at_mut_checked(size.states().len()).unwrap_or_default();
-        copy_common(states, x.get(size.states()).unwrap_or_default());
-        copy_common(parameters, part(u, 0, size.free));
+        gather_decided(size, x, u, to);
     }
 }
 

@@ -13,10 +13,10 @@
 
 use crate::scalar::Scalar;
 
-/// After so many attempts the rounding error is measured again.
-const MEASURED_EVERY: usize = 20;
+/// Attempted steps between two measurements of the rounding error.
+const ATTEMPTS_PER_MEASUREMENT: usize = 20;
 /// Errors above this part of the tolerance limit the step size.
-const LIMITING: f64 = 0.1;
+const LIMITING_ERROR: f64 = 0.1;
 
 /// The rounding errors of a run.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +39,7 @@ impl Default for RoundingErrors {
 impl RoundingErrors {
     /// Whether they are to be measured before this attempt.
     pub fn are_due(&mut self) -> bool {
-        let due = self.attempts.is_multiple_of(MEASURED_EVERY);
+        let due = self.attempts.is_multiple_of(ATTEMPTS_PER_MEASUREMENT);
         self.attempts += 1;
         due
     }
@@ -60,17 +60,17 @@ impl RoundingErrors {
         }
     }
 
-    /// What a difference of the methods in a step of length `h` is without its rounding error:
-    /// variances add up.
-    pub fn removed_from(&self, difference: f64, h: f64) -> f64 {
+    /// The truncation error in a difference of the methods over a step of length `h`:
+    /// `√(d² − rounding²)`, since variances add up.
+    pub fn truncation_error(&self, difference: f64, h: f64) -> f64 {
         let square = difference * difference - self.square.unwrap_or(0.0) * h * h;
         // Written so that NaN stays.
         if square < 0.0 { 0.0 } else { Scalar::sqrt(square) }
     }
 
-    /// After an attempt with this estimate, and with what the rest counts without rounding errors.
-    pub fn note(&mut self, estimate: f64, counted: f64) {
-        let limits = estimate > LIMITING && counted < estimate;
+    /// Counts an attempt with this error estimate, of which so much is truncation error.
+    pub fn count_attempt(&mut self, estimate: f64, truncation: f64) {
+        let limits = estimate > LIMITING_ERROR && truncation < estimate;
         self.limited += if limits { 1 } else { -1 };
     }
 
@@ -87,13 +87,13 @@ mod tests {
     #[test]
     fn variances_add_up() {
         let mut rounding = RoundingErrors::default();
-        assert_eq!(rounding.removed_from(5.0, 0.1), 5.0);
+        assert_eq!(rounding.truncation_error(5.0, 0.1), 5.0);
         rounding.measured(0.3, 0.1);
-        assert!((rounding.removed_from(0.5, 0.1) - 0.4).abs() < 1e-15);
-        assert_eq!(rounding.removed_from(0.3, 0.2), 0.0);
-        assert!(rounding.removed_from(f64::NAN, 0.1).is_nan());
+        assert!((rounding.truncation_error(0.5, 0.1) - 0.4).abs() < 1e-15);
+        assert_eq!(rounding.truncation_error(0.3, 0.2), 0.0);
+        assert!(rounding.truncation_error(f64::NAN, 0.1).is_nan());
         rounding.measured(f64::NAN, 0.1);
-        assert!((rounding.removed_from(0.5, 0.1) - 0.4).abs() < 1e-15);
+        assert!((rounding.truncation_error(0.5, 0.1) - 0.4).abs() < 1e-15);
     }
 
     #[test]

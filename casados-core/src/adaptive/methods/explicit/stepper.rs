@@ -261,9 +261,9 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         if self.rounding.are_due() {
             self.measure_rounding(t, size);
         }
-        let rest = B::combined(self.rounding.removed_from(fine, size), coarse);
-        self.rounding.note(error, count * rest);
-        Ok(error + (count - 1.0) * rest)
+        let truncation = B::combined(self.rounding.truncation_error(fine, size), coarse);
+        self.rounding.count_attempt(error, count * truncation);
+        Ok(error + (count - 1.0) * truncation)
     }
 
     fn change(&self) -> Option<BranchChange> {
