@@ -5,7 +5,7 @@
 //! 4 stages with 4 steps.
 
 use casados::prelude::Start;
-use casados_benches::calls::{open, options};
+use casados_benches::calls::{open_calls, options};
 use casados_benches::case::{Case, Family, Mode};
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::time::Duration;
@@ -21,10 +21,11 @@ fn cases() -> Vec<Case> {
 
 fn integrators(c: &mut Criterion) {
     for case in cases() {
-        let mut integrator = open(&case, options(&case, 0.0, Start::Zero)).expect("the case is compiled in");
+        let mut integrator =
+            open_calls(&case, options(&case, 0.0, Start::Zero)).expect("the case is compiled in");
         let mut group = c.benchmark_group(&case.name);
-        for mode in Mode::ALL {
-            group.bench_function(mode.name(), |b| b.iter(|| integrator.call(mode, 0)));
+        for mode in Mode::ALL_MODES {
+            group.bench_function(mode.name(), |b| b.iter(|| integrator.call_input(mode, 0)));
         }
         group.finish();
     }

@@ -26,7 +26,7 @@ fn deviation(x: [f64; 2], u: f64, _p: [f64; 2]) -> [f64; 3] {
     [x[0], x[1], u]
 }
 
-const MEANS: [f64; 2] = [9.81, 0.5];
+const MEAN_PARAMETERS: [f64; 2] = [9.81, 0.5];
 const SAMPLES: usize = 60;
 
 /// Numbers between −1 and 1 (splitmix64: Steele, Lea, Flood, OOPSLA 2014).
@@ -42,12 +42,12 @@ impl Numbers {
 }
 
 /// As many loops, each begun with a plan of zeros: results depend on the number of the loop alone.
-fn loops(count: usize) -> Result<Vec<Result<ClosedLoop, OcpError>>, OcpError> {
+fn run_loops(count: usize) -> Result<Vec<Result<ClosedLoop, OcpError>>, OcpError> {
     let make = || {
         let mut ocp = Problem::new(Erk::<Pendulum, Rk4>::new(Options::default())?)
             .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.1, 0.01]))
             .on(Horizon::uniform(20, 0.05))?;
-        ocp.fix_initial_state(&[0.0; 2])?.set_parameters(.., &MEANS)?.bound("u", .., -6.0, 6.0)?;
+        ocp.fix_initial_state(&[0.0; 2])?.set_parameters(.., &MEAN_PARAMETERS)?.bound("u", .., -6.0, 6.0)?;
         ocp.bound("x[1]", 1.., -1.5, 1.5)?.soften("x[1]", 1.., 10.0, 10.0)?;
         let plant = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
         Ok((HeapRealTime::new(ocp)?, plant))
@@ -56,7 +56,10 @@ fn loops(count: usize) -> Result<Vec<Result<ClosedLoop, OcpError>>, OcpError> {
         controller.reset();
         controller.ocp_mut().guess(&[0.0; 2], &[0.0])?;
         let mut random = Numbers(index as u64);
-        let p = vector![MEANS[0] * (1.0 + 0.3 * random.next()), MEANS[1] * (1.0 + random.next())];
+        let p = vector![
+            MEAN_PARAMETERS[0] * (1.0 + 0.3 * random.next()),
+            MEAN_PARAMETERS[1] * (1.0 + random.next())
+        ];
         let x0 = [0.4 * random.next(), 0.5 * random.next()];
         let pushes = |_: Sample<f64>, x: &mut [f64]| x[1] += 0.05 * random.next();
         closed_loop(controller, plant(erk, &p), pushes, &x0, SAMPLES)
@@ -68,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let count = arguments.next().map_or(Ok(10_000), |count| count.parse())?;
     let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "plots".into()));
     let begin = std::time::Instant::now();
-    let runs = loops(count)?.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let runs = run_loops(count)?.into_iter().collect::<Result<Vec<_>, _>>()?;
     let seconds = begin.elapsed().as_secs_f64();
     let costs: Vec<f64> = runs.iter().map(ClosedLoop::cost).collect();
     let far = |run: &&ClosedLoop| !run.trajectory.violations(0.1).is_empty();
@@ -94,8 +97,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Loops stay upright, whatever the plant, and are what they are whoever else runs.
 #[test]
-fn loops_stay_upright() -> Result<(), Box<dyn Error>> {
-    let (all, some) = (loops(60)?, loops(20)?);
+fn upright_loops() -> Result<(), Box<dyn Error>> {
+    let (all, some) = (run_loops(60)?, run_loops(20)?);
     for (run, other) in all.iter().zip(&some) {
         let (Ok(run), Ok(other)) = (run, other) else { return Err("a loop has no end".into()) };
         assert_eq!(run.costs, other.costs);

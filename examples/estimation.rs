@@ -47,12 +47,12 @@ type Estimation =
 /// Standard deviations of both instruments.
 const NOISE: [f64; 2] = [0.01, 0.02];
 /// What is known before: a mean with standard deviations.
-const MEAN: [f64; NX] = [1.0, 0.0, -2.0, -3.0, 0.0];
-const BEFORE: [f64; NX] = [2.0, 0.2, 2.0, 2.0, 2.0];
+const PRIOR_MEAN: [f64; NX] = [1.0, 0.0, -2.0, -3.0, 0.0];
+const PRIOR_DEVIATIONS: [f64; NX] = [2.0, 0.2, 2.0, 2.0, 2.0];
 /// Repetitions with other noise.
 const REPETITIONS: usize = 400;
 
-fn truth() -> Vector {
+fn true_parameters() -> Vector {
     Vector::from([1.3, 0.0, 0.15_f64.ln(), 0.06_f64.ln(), 0.8_f64.ln()])
 }
 
@@ -92,8 +92,8 @@ fn problem() -> Result<Estimation, Box<dyn Error>> {
         .stage_cost(cost())
         .terminal_cost(cost())
         .on(Horizon::nodes(&times()))?;
-    let weight = Matrix::from_diagonal(&Vector::from(BEFORE.map(|s| 1.0 / (s * s))));
-    ocp.set_arrival_cost(&MEAN, weight.as_slice())?;
+    let weight = Matrix::from_diagonal(&Vector::from(PRIOR_DEVIATIONS.map(|s| 1.0 / (s * s))));
+    ocp.set_arrival_cost(&PRIOR_MEAN, weight.as_slice())?;
     Ok(ocp)
 }
 
@@ -104,7 +104,7 @@ fn estimate(ocp: &mut Estimation, samples: &[[f64; 4]]) -> Result<(Vector, Matri
     }
     // Where the mean from before leads to is a guess without gaps.
     ocp.free_initial_state();
-    for (k, x) in simulate(MEAN.into())?.iter().enumerate() {
+    for (k, x) in simulate(PRIOR_MEAN.into())?.iter().enumerate() {
         ocp.guess_stage(k, x.as_slice(), &[])?;
     }
     let mut sqp = HeapSqp::new(ocp)?;
@@ -125,8 +125,8 @@ fn information(ocp: &mut Estimation, x0: &Vector) -> Result<Matrix, OcpError> {
 
 /// The direction about which least was learned: by how much its variance is smaller than before,
 /// and what it is made of. A factor of one means that the data say nothing.
-fn least_known(information: &Matrix) -> (f64, Vector) {
-    let before = Matrix::from_diagonal(&Vector::from(BEFORE));
+fn least_identifiable_direction(information: &Matrix) -> (f64, Vector) {
+    let before = Matrix::from_diagonal(&Vector::from(PRIOR_DEVIATIONS));
     let eigen = SymmetricEigen::new(before * information * before);
     let least = eigen.eigenvalues.imin();
     let direction = before * eigen.eigenvectors.column(least);
@@ -134,7 +134,7 @@ fn least_known(information: &Matrix) -> (f64, Vector) {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let states = simulate(truth())?;
+    let states = simulate(true_parameters())?;
     let mut ocp = problem()?;
     let mut noise = Noise(7);
     for laboratory in [false, true] {
@@ -144,10 +144,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         let (x0, information) = estimate(&mut ocp, &measure(&states, laboratory, &mut noise))?;
         let covariance = information.try_inverse().ok_or("the information is singular")?;
-        let (factor, direction) = least_known(&information);
+        let (factor, direction) = least_identifiable_direction(&information);
         println!("            truth   estimate   standard deviation");
         for i in 0..NX {
-            println!("{:6} {:10.4} {:10.4} {:12.4}", NAMES[i], truth()[i], x0[i], covariance[(i, i)].sqrt());
+            println!(
+                "{:6} {:10.4} {:10.4} {:12.4}",
+                NAMES[i],
+                true_parameters()[i],
+                x0[i],
+                covariance[(i, i)].sqrt()
+            );
         }
         if factor < 10.0 {
             let parts = (0..NX).filter(|&i| direction[i].abs() > 0.05);
@@ -162,16 +168,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             return Err(format!("what is learned is not what was expected: {factor}").into());
         }
     }
-    spread(&mut ocp, &states, &mut noise)
+    compare_spread(&mut ocp, &states, &mut noise)
 }
 
 /// Standard deviations that are predicted, beside the spread of estimates with other noise.
-fn spread(ocp: &mut Estimation, states: &[Vector], noise: &mut Noise) -> Result<(), Box<dyn Error>> {
+fn compare_spread(ocp: &mut Estimation, states: &[Vector], noise: &mut Noise) -> Result<(), Box<dyn Error>> {
     let (mut sum, mut squares, mut predicted) = (Vector::zeros(), Vector::zeros(), Vector::zeros());
     for _ in 0..REPETITIONS {
         let (x0, information) = estimate(ocp, &measure(states, true, noise))?;
         let covariance = information.try_inverse().ok_or("the information is singular")?;
-        let error = x0 - truth();
+        let error = x0 - true_parameters();
         sum += error;
         squares += error.component_mul(&error);
         predicted += covariance.diagonal().map(f64::sqrt) / REPETITIONS as f64;
@@ -194,10 +200,10 @@ struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.equally()).sum::<f64>() - 6.0
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
     /// Between 0 and 1 (SplitMix: Steele, Lea and Flood, 2014).
-    fn equally(&mut self) -> f64 {
+    fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

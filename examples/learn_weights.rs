@@ -28,14 +28,14 @@ fn price(x: [f64; 2], u: f64, p: [f64; 2]) -> f64 {
 
 const DEMONSTRATIONS: usize = 64;
 /// What the demonstrator pays, and what the learner begins with.
-const TRUTH: [f64; 2] = [3.0, 0.5];
-const FIRST: [f64; 2] = [0.0, -2.0];
+const TRUE_WEIGHTS: [f64; 2] = [3.0, 0.5];
+const INITIAL_WEIGHTS: [f64; 2] = [0.0, -2.0];
 
 fn problem() -> Result<HeapOcp<impl ExactFormulation<f64> + Send + Sync>, OcpError> {
     let mut ocp = Problem::new(Erk::<Pendulum, Rk4>::new(Options::default())?)
         .running_cost(GeneralCost::<Price>::new())
         .on(Horizon::uniform(20, 0.05))?;
-    ocp.fix_initial_state(&[0.0; 2])?.set_parameters(.., &TRUTH)?.guess(&[0.0; 2], &[0.0])?;
+    ocp.fix_initial_state(&[0.0; 2])?.set_parameters(.., &TRUE_WEIGHTS)?.guess(&[0.0; 2], &[0.0])?;
     ocp.bound("u", .., -8.0, 8.0)?;
     Ok(ocp)
 }
@@ -73,15 +73,15 @@ where
 }
 
 /// Weights and losses on the way.
-fn learn(iterations: usize) -> Result<(Vec<[f64; 2]>, Vec<f64>), OcpError> {
+fn learn_weights(iterations: usize) -> Result<(Vec<[f64; 2]>, Vec<f64>), OcpError> {
     let ocp = problem()?;
     let mut batch = BatchOcp::new(&ocp, DEMONSTRATIONS, HeapSqp::new(&ocp)?)?;
     for (i, instance) in batch.instances_mut().iter_mut().enumerate() {
         let (row, column) = ((i / 8) as f64 - 3.5, (i % 8) as f64 - 3.5);
         instance.fix_initial_state(&[0.12 * row, 0.4 * column])?;
     }
-    let shown = controls(&mut batch, TRUTH)?;
-    let mut weights = Vector2::from(FIRST);
+    let shown = controls(&mut batch, TRUE_WEIGHTS)?;
+    let mut weights = Vector2::from(INITIAL_WEIGHTS);
     let (mut path, mut losses) = (Vec::new(), Vec::new());
     let (mut rate, mut before) = (0.1_f64, None::<[Vector2<f64>; 2]>);
     for _ in 0..iterations {
@@ -108,7 +108,7 @@ fn learn(iterations: usize) -> Result<(Vec<[f64; 2]>, Vec<f64>), OcpError> {
 }
 
 /// The angle of a closed loop with these weights.
-fn angle(weights: [f64; 2]) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
+fn closed_loop_angle(weights: [f64; 2]) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
     let mut ocp = problem()?;
     ocp.set_parameters(.., &weights)?.fix_initial_state(&[0.3, 0.0])?;
     HeapSqp::new(&ocp)?.solve(&mut ocp)?;
@@ -120,7 +120,7 @@ fn angle(weights: [f64; 2]) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (path, losses) = learn(60)?;
+    let (path, losses) = learn_weights(60)?;
     let learned = *path.last().ok_or("there is a first one")?;
     println!(
         "weights {:.3?} after {} gradients; loss {:.1e}",
@@ -132,9 +132,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loops = Panel::new("Closed loops")
         .x("time, s")
         .y("angle, rad")
-        .line("before", angle(FIRST)?)
-        .line("after", angle(learned)?)
-        .line("demonstrated", angle(TRUTH)?);
+        .line("before", closed_loop_angle(INITIAL_WEIGHTS)?)
+        .line("after", closed_loop_angle(learned)?)
+        .line("demonstrated", closed_loop_angle(TRUE_WEIGHTS)?);
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "plots".into()));
     Figure::new()
         .size(900, 320)
@@ -147,11 +147,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// The weights of the demonstrator are found to three digits: the loss is a billion times less.
 #[test]
-fn weights_are_learned() -> Result<(), Box<dyn Error>> {
-    let (path, losses) = learn(60)?;
+fn learned_weights() -> Result<(), Box<dyn Error>> {
+    let (path, losses) = learn_weights(60)?;
     let (first, last) = (losses[0], losses[losses.len() - 1]);
     assert!(last < 1e-9 * first, "{losses:?}");
     let learned = Vector2::from(path[path.len() - 1]);
-    assert!((learned - Vector2::from(TRUTH)).norm() < 1e-3, "{learned}");
+    assert!((learned - Vector2::from(TRUE_WEIGHTS)).norm() < 1e-3, "{learned}");
     Ok(())
 }

@@ -27,7 +27,7 @@ const NOISE: f64 = 0.02;
 const INTERVALS: usize = 60;
 /// s
 const PERIOD: f64 = 0.05;
-const TRUTH: [f64; 2] = [9.81 / 0.8, 0.3];
+const TRUE_PARAMETERS: [f64; 2] = [9.81 / 0.8, 0.3];
 
 /// Evenly distributed numbers between −1 and 1 (linear congruences of Knuth's MMIX).
 struct Numbers(u64);
@@ -42,7 +42,8 @@ impl Numbers {
 /// Angles with noise; one in seven is wrong by up to a radian, to one side.
 fn measure() -> Result<Vec<f64>, casados::Error> {
     let mut irk = Irk::<Pendulum, Gauss<4>>::new(Options::default())?;
-    let (mut x, u, mut random) = (vector![1.0, 0.0], vector![TRUTH[0], TRUTH[1]], Numbers(7));
+    let (mut x, u, mut random) =
+        (vector![1.0, 0.0], vector![TRUE_PARAMETERS[0], TRUE_PARAMETERS[1]], Numbers(7));
     let mut data = Vec::new();
     for k in 0..=INTERVALS {
         let noise = NOISE * (random.next() + random.next() + random.next());
@@ -91,7 +92,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // What is far from all data has no curvature: the estimate of least squares is a start.
     let (robust, by_huber) = estimate!(data, ConvexCost::<Angle, _>::new(huber), squares);
     println!("                 g / length    damping    iterations");
-    println!("truth          {:>12.4} {:>10.4}", TRUTH[0], TRUTH[1]);
+    println!("truth          {:>12.4} {:>10.4}", TRUE_PARAMETERS[0], TRUE_PARAMETERS[1]);
     for (name, stages, outcome) in [("least squares", &squares, &by_squares), ("Huber", &robust, &by_huber)] {
         let (_, u) = &stages[0];
         println!("{name:<14} {:>12.4} {:>10.4} {:>12}", u[0], u[1], outcome.iterations);

@@ -1,23 +1,23 @@
 //! Calls of an integrator whose types are chosen by the name of a case.
 
+mod batched;
 mod results;
 mod single;
-mod together;
 
 use crate::case::{Case, Family, Mode, Values};
 use crate::models::{Awe, Chain, Pendulum};
+use batched::BatchOfCalls;
 use casados::prelude::*;
 use casados::{Batch, BatchError, Error, Statistics};
-use single::Typed;
-use together::Side;
+use single::SingleCalls;
 
 /// An integrator with its inputs in place.
-pub trait Calls {
+pub trait IntegratorCalls {
     /// One call with an input of the case.
     ///
     /// # Errors
     /// Those of the integrator.
-    fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error>;
+    fn call_input(&mut self, mode: Mode, input: usize) -> Result<(), Error>;
     /// One call with every input, whose results are kept: what a batch is compared with, which
     /// keeps them too.
     ///
@@ -28,7 +28,7 @@ pub trait Calls {
     ///
     /// # Errors
     /// Those of the integrator.
-    fn values(&mut self, mode: Mode, input: usize) -> Result<Values, Error>;
+    fn results_of(&mut self, mode: Mode, input: usize) -> Result<Values, Error>;
     /// What the last call did.
     fn statistics(&self) -> Statistics;
 }
@@ -42,7 +42,7 @@ pub fn options(case: &Case, tolerance: f64, start: Start) -> Options {
 }
 
 /// All intervals of a case in one call of a batch, from zero.
-pub trait Together {
+pub trait BatchCalls {
     /// The call.
     ///
     /// # Errors
@@ -59,14 +59,14 @@ pub trait Together {
 ///
 /// # Errors
 /// The error of the batch.
-pub fn open_batch(case: &Case, options: Options) -> Result<Option<Box<dyn Together>>, String> {
+pub fn open_batch(case: &Case, options: Options) -> Result<Option<Box<dyn BatchCalls>>, String> {
     use Family::{Gauss as G, Radau};
     macro_rules! choose {
         ($($model:literal, $nx:literal, $family:pat, $stages:pat => $type:ty, $method:ty;)*) => {
             match (case.model, case.nx, case.family, case.stages) {
                 $(($model, $nx, $family, $stages) => {
                     let batch = Batch::<$type, $method>::new(options).map_err(|e| e.to_string())?;
-                    Ok(Some(Box::new(Side::new(case, batch))))
+                    Ok(Some(Box::new(BatchOfCalls::new(case, batch))))
                 })*
                 _ => Ok(None),
             }
@@ -93,14 +93,14 @@ pub fn open_batch(case: &Case, options: Options) -> Result<Option<Box<dyn Togeth
 ///
 /// # Errors
 /// A case that was not compiled in; or the error of the integrator.
-pub fn open(case: &Case, options: Options) -> Result<Box<dyn Calls>, String> {
+pub fn open_calls(case: &Case, options: Options) -> Result<Box<dyn IntegratorCalls>, String> {
     use Family::{Gauss as G, Radau, Rk4 as Explicit};
     macro_rules! choose {
         ($($model:literal, $nx:literal, $family:pat, $stages:pat => $type:ty, $integrator:ty;)*) => {
             match (case.model, case.nx, case.family, case.stages) {
                 $(($model, $nx, $family, $stages) => {
                     let integrator = <$integrator>::new(options).map_err(|e| e.to_string())?;
-                    Ok(Box::new(Typed::<$type, _>::new(case, integrator)))
+                    Ok(Box::new(SingleCalls::<$type, _>::new(case, integrator)))
                 })*
                 _ => Err(format!("{} is not compiled in", case.name)),
             }

@@ -19,7 +19,7 @@ pub enum Mode {
 
 impl Mode {
     /// In the order of all tables.
-    pub const ALL: [Self; 4] = [Self::Simulation, Self::Forward, Self::Adjoint, Self::Hessian];
+    pub const ALL_MODES: [Self; 4] = [Self::Simulation, Self::Forward, Self::Adjoint, Self::Hessian];
 
     /// As in tables and JSON.
     #[must_use]
@@ -73,7 +73,7 @@ impl Values {
 
     /// The part that a mode is asked for.
     #[must_use]
-    pub fn of(&self, mode: Mode) -> &[f64] {
+    pub fn part_of_mode(&self, mode: Mode) -> &[f64] {
         match mode {
             Mode::Simulation => &self.x,
             Mode::Forward => &self.forward,
@@ -85,8 +85,8 @@ impl Values {
     /// The largest error of that part, relative to the largest element of the reference; none where
     /// one of the two is not known.
     #[must_use]
-    pub fn error(&self, reference: &Self, mode: Mode) -> Option<f64> {
-        let (a, b) = (self.of(mode), reference.of(mode));
+    pub fn relative_error(&self, reference: &Self, mode: Mode) -> Option<f64> {
+        let (a, b) = (self.part_of_mode(mode), reference.part_of_mode(mode));
         if b.is_empty() || a.len() != b.len() {
             return None;
         }
@@ -208,7 +208,7 @@ impl Case {
     ///
     /// # Errors
     /// If the file cannot be read, or is of another interval.
-    pub fn with(mut self, file: &str) -> Result<Self, String> {
+    pub fn with_reference(mut self, file: &str) -> Result<Self, String> {
         let data = load(&format!("tests/data/{file}"))?;
         let same = |a: &[f64], b: &Value| a.iter().zip(numbers(b)).all(|(a, b)| (a - b).abs() < 1e-12);
         let (x0, u) = &self.inputs[0];
@@ -222,7 +222,7 @@ impl Case {
 
     /// What the peers are told, with so many of the inputs.
     #[must_use]
-    pub fn json(&self, inputs: usize) -> Value {
+    pub fn to_json(&self, inputs: usize) -> Value {
         let scheme = if self.family == Family::Radau { "radau" } else { "legendre" };
         json!({
             "name": self.name, "model": self.model, "nx": self.nx, "T": self.t, "scheme": scheme,

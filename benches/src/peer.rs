@@ -1,6 +1,6 @@
 //! Peers in Python processes of their own, which answer line by line in JSON.
 
-use crate::record::repository;
+use crate::record::repository_path;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ impl Peer {
     pub fn start(script: &str, prepare: impl FnOnce(&mut Command) -> &mut Command) -> Result<Self, String> {
         let python = python();
         let mut command = Command::new(&python);
-        command.arg(repository("benches/peers").join(script));
+        command.arg(repository_path("benches/peers").join(script));
         let mut child = prepare(&mut command)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// A file of the repository.
 #[must_use]
-pub fn repository(name: &str) -> PathBuf {
+pub fn repository_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)
 }
 
@@ -14,7 +14,7 @@ pub fn repository(name: &str) -> PathBuf {
 /// # Errors
 /// What is wrong with it, and where it is.
 pub fn load(name: &str) -> Result<Value, String> {
-    let path = repository(name);
+    let path = repository_path(name);
     let text = std::fs::read_to_string(&path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
     serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
@@ -32,7 +32,7 @@ pub fn numbers(value: &Value) -> Vec<f64> {
 ///
 /// # Errors
 /// If the file cannot be read or written, or lacks one of the lines.
-pub fn insert(file: &Path, name: &str, text: &str) -> Result<(), String> {
+pub fn insert_between_markers(file: &Path, name: &str, text: &str) -> Result<(), String> {
     let failed = |e: std::io::Error| format!("{}: {e}", file.display());
     let old = std::fs::read_to_string(file).map_err(failed)?;
     let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- end of {name} -->"));

@@ -20,7 +20,7 @@ pub struct Summary {
 impl Summary {
     /// Of samples in any order.
     #[must_use]
-    pub fn of(mut samples: Vec<f64>) -> Self {
+    pub fn from_samples(mut samples: Vec<f64>) -> Self {
         samples.sort_unstable_by(f64::total_cmp);
         let at = |p: f64| samples.get((p * (samples.len() as f64 - 1.0)).round() as usize).copied();
         let at = |p| at(p).unwrap_or(f64::NAN);
@@ -43,7 +43,7 @@ impl Summary {
 }
 
 /// A sample lasts at least this long: reading the clock is a system call.
-const SAMPLE: Duration = Duration::from_micros(200);
+const MIN_SAMPLE_DURATION: Duration = Duration::from_micros(200);
 
 /// Times a call: a tenth of the budget to warm up, then samples until it is spent, never fewer than
 /// nine.
@@ -58,7 +58,7 @@ pub fn measure<E>(budget: Duration, mut call: impl FnMut() -> Result<(), E>) -> 
         for _ in 0..repetitions {
             call()?;
         }
-        if start.elapsed() < SAMPLE {
+        if start.elapsed() < MIN_SAMPLE_DURATION {
             repetitions *= 2;
         } else if begin.elapsed() > budget / 10 {
             break;
@@ -73,12 +73,12 @@ pub fn measure<E>(budget: Duration, mut call: impl FnMut() -> Result<(), E>) -> 
         }
         samples.push(start.elapsed().as_secs_f64() / f64::from(repetitions));
     }
-    Ok(Summary::of(samples))
+    Ok(Summary::from_samples(samples))
 }
 
 /// The slope of log y over log x, by least squares.
 #[must_use]
-pub fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub fn log_log_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
     let points: Vec<_> = points.map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
@@ -88,7 +88,7 @@ pub fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
 }
 
 /// Keeps this thread, and the processes that it starts, on the last core that it may use.
-pub fn pin() -> bool {
+pub fn pin_to_last_core() -> bool {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     cores.last().is_some_and(|core| core_affinity::set_for_current(*core))
 }

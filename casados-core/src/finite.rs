@@ -22,17 +22,17 @@ pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
-pub(crate) fn check_named<M: Dae, T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
+pub(crate) fn check_model_input<M: Dae, T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
     match find_non_finite(values) {
         Some((index, value)) => {
-            Err(Error::NonFiniteInput { argument, index, name: name::<M>(argument, index), value })
+            Err(Error::NonFiniteInput { argument, index, name: element_name::<M>(argument, index), value })
         }
         None => Ok(()),
     }
 }
 
 /// What the model calls an element of an argument; of several columns each has these names.
-pub(crate) fn name<M: Dae>(argument: Argument, index: usize) -> &'static str {
+pub(crate) fn element_name<M: Dae>(argument: Argument, index: usize) -> &'static str {
     let structure = &M::STRUCTURE;
     let names = match argument {
         Argument::X0 | Argument::Lambda | Argument::SeedX | Argument::StartXdot => structure.x,
@@ -86,7 +86,7 @@ pub(crate) fn check_gradient<T: Real>(x0: &[T], u: &[T], p: &[T]) -> Result<(), 
 
 /// # Errors
 /// [`Error::Overflow`] of the first second derivative that is not finite.
-pub(crate) fn check_second<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
+pub(crate) fn check_second_derivatives<M: Dae, T: Real>(result: &Hessian<M, T>) -> Result<(), Error> {
     for values in result.second_derivative_blocks() {
         check_output(values, 0)?;
     }

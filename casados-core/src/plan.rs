@@ -6,7 +6,7 @@
 //! | [`&'static ModelTable`](ModelTable) | once for all models | loops | read |
 //!
 //! A kernel is generic over its plan and has it as a value, which is nothing at all where the model
-//! is known. Decisions that need constants ask [`Plan::KNOWN`].
+//! is known. Decisions that need constants ask [`Plan::KNOWN_STRUCTURE`].
 
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::shape::{Plain, Shape};
@@ -20,7 +20,7 @@ impl<T, A: AsRef<[T]> + AsMut<[T]> + ?Sized> Elements<T> for A {}
 /// The plan by which a kernel computes.
 pub trait Plan: Copy + Send + Sync + 'static {
     /// The structure of the model, if kernels are compiled for that one.
-    const KNOWN: Option<&'static Structure>;
+    const KNOWN_STRUCTURE: Option<&'static Structure>;
     /// How many columns there is memory for where directions are computed side by side, if that is
     /// known.
     const NC: usize;
@@ -39,7 +39,7 @@ pub trait Plan: Copy + Send + Sync + 'static {
     /// The structure of the model.
     fn structure(self) -> &'static Structure;
     /// What follows from it.
-    fn facts(self) -> &'static Facts;
+    fn facts(self) -> &'static DerivedFacts;
 
     /// The number of differential states.
     #[inline(always)]
@@ -174,7 +174,7 @@ impl<M> Clone for Known<M> {
 impl<M> Copy for Known<M> {}
 
 impl<M: Dae> Plan for Known<M> {
-    const KNOWN: Option<&'static Structure> = Some(&M::STRUCTURE);
+    const KNOWN_STRUCTURE: Option<&'static Structure> = Some(&M::STRUCTURE);
     // As many as the rows of `ArrayC` have.
     const NC: usize = if cfg!(any(target_arch = "x86_64", target_arch = "aarch64", target_arch = "wasm32")) {
         M::Shape::NC
@@ -191,8 +191,8 @@ impl<M: Dae> Plan for Known<M> {
         const { &M::STRUCTURE }
     }
     #[inline(always)]
-    fn facts(self) -> &'static Facts {
-        const { &Facts::of(&M::STRUCTURE) }
+    fn facts(self) -> &'static DerivedFacts {
+        const { &DerivedFacts::of(&M::STRUCTURE) }
     }
 }
 
@@ -204,18 +204,18 @@ impl<M: Dae> PlanOf<M> for Known<M> {
 #[derive(Debug)]
 pub struct ModelTable {
     structure: &'static Structure,
-    facts: Facts,
+    facts: DerivedFacts,
 }
 
 impl ModelTable {
     /// That of a model.
     pub const fn of(structure: &'static Structure) -> Self {
-        Self { structure, facts: Facts::of(structure) }
+        Self { structure, facts: DerivedFacts::of(structure) }
     }
 }
 
 impl Plan for &'static ModelTable {
-    const KNOWN: Option<&'static Structure> = None;
+    const KNOWN_STRUCTURE: Option<&'static Structure> = None;
     const NC: usize = 0;
     type X<T: Plain> = [T];
     type K<T: Plain> = [T];
@@ -227,7 +227,7 @@ impl Plan for &'static ModelTable {
         self.structure
     }
     #[inline(always)]
-    fn facts(self) -> &'static Facts {
+    fn facts(self) -> &'static DerivedFacts {
         &self.facts
     }
 }
@@ -249,34 +249,34 @@ pub const fn kinematic(structure: &Structure, slot: usize) -> Option<&'static Ki
 
 /// What follows from a structure, found when the model is compiled.
 #[derive(Debug)]
-pub struct Facts {
+pub struct DerivedFacts {
     /// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
-    pub unknowns: (usize, usize),
+    pub non_kinematic_range: (usize, usize),
     /// Terms of the Newton matrix that are fill.
-    pub fill: usize,
+    pub fill_terms: usize,
     /// How many curved variables come before the first state, and before the first algebraic state.
-    pub curved: [usize; 2],
+    pub nonlinear_before: [usize; 2],
     /// Whether each equation that has a derivative has that of one state, in their order: the
     /// entries of `f_ẋ` then are those of the states.
-    pub direct: bool,
+    pub has_direct_rates: bool,
 }
 
-impl Facts {
+impl DerivedFacts {
     /// Those of a structure.
     pub const fn of(structure: &Structure) -> Self {
         let nx = structure.x.len();
         Self {
-            unknowns: unknowns(structure),
-            fill: structure.elimination.fill(),
-            curved: [before(structure.curved, nx), before(structure.curved, 2 * nx)],
-            direct: is_direct(structure),
+            non_kinematic_range: non_kinematic_range(structure),
+            fill_terms: structure.elimination.fill(),
+            nonlinear_before: [count_before(structure.curved, nx), count_before(structure.curved, 2 * nx)],
+            has_direct_rates: has_direct_rates(structure),
         }
     }
 }
 
 /// How many of some numbers, in their order, come before one: of directions that have any
 /// influence, of curved variables.
-pub const fn before(numbers: &[u32], number: usize) -> usize {
+pub const fn count_before(numbers: &[u32], number: usize) -> usize {
     let mut count = 0;
     while count < numbers.len() && (numbers[count] as usize) < number {
         count += 1;
@@ -284,8 +284,8 @@ pub const fn before(numbers: &[u32], number: usize) -> usize {
     count
 }
 
-const fn unknowns(structure: &Structure) -> (usize, usize) {
-    let (mut first, mut end) = (0, Table::Unknowns.of(structure));
+const fn non_kinematic_range(structure: &Structure) -> (usize, usize) {
+    let (mut first, mut end) = (0, StructureTable::Unknowns.row_count(structure));
     while first < end && kinematic(structure, first).is_some() {
         first += 1;
     }
@@ -296,7 +296,7 @@ const fn unknowns(structure: &Structure) -> (usize, usize) {
 }
 
 /// See [`Facts`].
-pub const fn is_direct(structure: &Structure) -> bool {
+pub const fn has_direct_rates(structure: &Structure) -> bool {
     let (count, pattern) = (structure.blocks[1], &structure.jacobian);
     let mut entry = 0;
     while entry < count {
@@ -310,7 +310,7 @@ pub const fn is_direct(structure: &Structure) -> bool {
 
 /// A table of the structure that kernels go through, row by row.
 #[derive(Clone, Copy)]
-pub enum Table {
+pub enum StructureTable {
     /// The terms of the Newton matrix, fill first.
     Assembly,
     /// Those of them that are fill.
@@ -325,13 +325,13 @@ pub enum Table {
     Entries(usize, usize),
 }
 
-impl Table {
+impl StructureTable {
     /// All entries of the Jacobian.
     pub const JACOBIAN: Self = Self::Entries(0, 5);
 
     /// How many rows it has.
     #[inline(always)]
-    pub const fn of(self, structure: &Structure) -> usize {
+    pub const fn row_count(self, structure: &Structure) -> usize {
         let Structure { elimination, blocks, x, z, .. } = structure;
         match self {
             Self::Assembly => elimination.assembly.len(),
@@ -344,15 +344,15 @@ impl Table {
     }
 
     /// How many it has where kernels are compiled for one model.
-    pub const fn known<P: Plan>(self) -> Option<usize> {
-        match P::KNOWN {
-            Some(structure) => Some(self.of(structure)),
+    pub const fn known_row_count<P: Plan>(self) -> Option<usize> {
+        match P::KNOWN_STRUCTURE {
+            Some(structure) => Some(self.row_count(structure)),
             None => None,
         }
     }
 
     /// Whether it may have any.
-    pub const fn may_have<P: Plan>(self) -> bool {
-        !matches!(self.known::<P>(), Some(0))
+    pub const fn may_have_rows<P: Plan>(self) -> bool {
+        !matches!(self.known_row_count::<P>(), Some(0))
     }
 }

@@ -148,7 +148,7 @@ mod tests {
 
     /// Integers, each at its place.
     #[test]
-    fn order() {
+    fn order_of_numbers() {
         let value: Nested = (
             0.0,
             [Vector2::new(1.0, 2.0), Vector2::new(3.0, 4.0)],

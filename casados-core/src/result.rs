@@ -368,12 +368,16 @@ pub(crate) fn write_row<T: Plain>(
     p: &mut impl Matrix<T>,
 ) {
     let mut values = row.iter();
-    copy_row(&mut values, r, x);
-    copy_row(&mut values, r, u);
-    copy_row(&mut values, r, p);
+    write_matrix_row(&mut values, r, x);
+    write_matrix_row(&mut values, r, u);
+    write_matrix_row(&mut values, r, p);
 }
 
-fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
+fn write_matrix_row<'a, T: Plain, A: Matrix<T>>(
+    values: &mut impl Iterator<Item = &'a T>,
+    r: usize,
+    to: &mut A,
+) {
     for column in 0..A::COLUMNS {
         if let Some(value) = values.next() {
             update_entry(to, r, column, |_| *value);
@@ -382,7 +386,11 @@ fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>
 }
 
 /// A block on the diagonal, from its lower triangle.
-pub(crate) fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
+pub(crate) fn write_symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(
+    block: &mut A,
+    lower: &[R],
+    offset: usize,
+) {
     for r in 0..A::ROWS {
         for c in 0..=r {
             let value = lower[offset + r][offset + c];

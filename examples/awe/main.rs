@@ -63,13 +63,14 @@ struct Orbit {
 }
 
 /// m
-const SPAN: f64 = 5.5;
+const WING_SPAN: f64 = 5.5;
 
 impl Orbit {
     /// The orbit in space, with the wing at the start of each interval; what it yields; the errors.
-    fn figure(&self) -> Figure {
+    fn orbit_figure(&self) -> Figure {
         let curve = self.curve.iter().map(|(_, state, _)| (state.q.into(), power(state) / 1e3));
-        let wing = |state: &State| [-0.5, 0.5].map(|side| (state.q + side * SPAN * state.r.column(1)).into());
+        let wing =
+            |state: &State| [-0.5, 0.5].map(|side| (state.q + side * WING_SPAN * state.r.column(1)).into());
         let orbit = Space::new("The orbit; the wind blows along x, the ground station is at zero")
             .axes(["x, m", "y, m", "z, m"])
             .seen_from(-150.0, 15.0)
@@ -139,7 +140,7 @@ fn run(picture: &Path) -> Result<(), Box<dyn Error>> {
     println!("\nErrors are relative to the largest element of the reference. Each time is that of one call");
     println!("from start values of zero: the Jacobian includes the simulation, the Hessian everything.");
 
-    orbit.figure().save(picture)?;
+    orbit.orbit_figure().save(picture)?;
     println!("The orbit is drawn in {}", picture.display());
     Ok(())
 }

@@ -9,7 +9,7 @@ use nalgebra::SVector;
 
 /// Residuals of the conditions of Karush, Kuhn and Tucker, the largest of each kind.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Conditions {
+pub struct KktResiduals {
     /// `∇L` in states and controls.
     pub stationarity: f64,
     /// Gaps between intervals, and between the ends of the orbit.
@@ -26,12 +26,12 @@ const NU: usize = 4;
 /// Periodic states: all but the accumulated cost.
 const PERIODIC: usize = 22;
 
-impl Conditions {
+impl KktResiduals {
     /// At states, controls and multipliers, with intervals of length `h`.
     ///
     /// # Errors
     /// Those of the integrator.
-    pub fn at(solution: &HeapSolution, h: f64) -> Result<Self, casados::Error> {
+    pub fn at_point(solution: &HeapSolution, h: f64) -> Result<Self, casados::Error> {
         let options = Options { start: Start::Zero, ..Default::default() };
         let mut irk = Irk::<Awe, RadauIIA<4>>::new(options)?;
         let mut found = Self::default();
@@ -50,15 +50,15 @@ impl Conditions {
             for i in 0..NX {
                 of_x[i] += stage.x_upper[i] - stage.x_lower[i] - carried[i];
                 found.equations = found.equations.max((step.x[i] - next.x[i]).abs());
-                found.bound(stage.x[i], state_bounds(i, k), [stage.x_lower[i], stage.x_upper[i]]);
+                found.add_bound(stage.x[i], state_bounds(i, k), [stage.x_lower[i], stage.x_upper[i]]);
             }
             for i in 0..NU {
                 of_u[i] += stage.u_upper[i] - stage.u_lower[i];
                 let most = if i < 3 { 2.0 } else { 100.0 };
-                found.bound(stage.u[i], [-most, most], [stage.u_lower[i], stage.u_upper[i]]);
+                found.add_bound(stage.u[i], [-most, most], [stage.u_lower[i], stage.u_upper[i]]);
             }
             for (i, &value) in values.iter().enumerate() {
-                found.bound(value, [0.0, f64::INFINITY], [stage.g_lower[i], stage.g_upper[i]]);
+                found.add_bound(value, [0.0, f64::INFINITY], [stage.g_lower[i], stage.g_upper[i]]);
             }
             carried.copy_from_slice(stage.dynamics);
             found.stationarity = found.stationarity.max(of_u.amax());
@@ -86,7 +86,7 @@ impl Conditions {
     }
 
     /// Takes into account a value with bounds and multipliers. Of equal bounds these are free.
-    fn bound(&mut self, value: f64, [low, high]: [f64; 2], [lower, upper]: [f64; 2]) {
+    fn add_bound(&mut self, value: f64, [low, high]: [f64; 2], [lower, upper]: [f64; 2]) {
         self.inequalities = self.inequalities.max(low - value).max(value - high);
         if low < high {
             for (distance, multiplier) in [(value - low, lower), (high - value, upper)] {
@@ -97,7 +97,7 @@ impl Conditions {
     }
 
     /// The largest of all.
-    pub fn largest(&self) -> f64 {
+    pub fn largest_residual(&self) -> f64 {
         self.stationarity.max(self.equations).max(self.inequalities).max(self.complementarity)
     }
 }

@@ -9,7 +9,7 @@ use casados::qp::HeapSolution;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 /// The aircraft is drawn so many times larger than it is.
-const ENLARGED: f64 = 3.0;
+const AIRCRAFT_SCALE: f64 = 3.0;
 /// Wing, fuselage, tailplane and fin: metres along the chord, the span and upwards.
 const AIRCRAFT: [[[f64; 3]; 2]; 4] = [
     [[0.0, -2.75, 0.0], [0.0, 2.75, 0.0]],
@@ -32,7 +32,7 @@ impl Picture {
     ///
     /// # Errors
     /// Those of the integrator.
-    pub fn of(solution: &HeapSolution, h: f64) -> Result<Self, casados::Error> {
+    pub fn of_orbit(solution: &HeapSolution, h: f64) -> Result<Self, casados::Error> {
         let mut irk = Irk::<Awe, RadauIIA<4>>::new(Options { start: Start::Zero, ..Default::default() })?;
         let (mut states, mut controls, mut tensions) = (Vec::new(), Vec::new(), Vec::new());
         for stage in solution.stages() {
@@ -56,20 +56,20 @@ impl Picture {
     }
 
     /// The orbit, with the aircraft at every other node.
-    pub fn orbit(&self) -> Figure {
+    pub fn orbit_figure(&self) -> Figure {
         let space = Space::new("Orbit of most power; the aircraft three times its size")
             .axes(["with the wind, m", "across, m", "height, m"])
             .seen_from(-160.0, 12.0)
             .coloured("kW", self.states.iter().map(|state| (state.q.into(), power(state) / 1e3)));
         let space = self.states.iter().step_by(2).fold(space, |space, state| {
-            let at = |point: [f64; 3]| (state.q + ENLARGED * (state.r * Vector3::from(point))).into();
+            let at = |point: [f64; 3]| (state.q + AIRCRAFT_SCALE * (state.r * Vector3::from(point))).into();
             AIRCRAFT.into_iter().fold(space, |space, line| space.outline(line.map(at)))
         });
         Figure::new().size(680, 560).with(space)
     }
 
     /// Six panels over time.
-    pub fn over_time(&self) -> Figure {
+    pub fn time_panels(&self) -> Figure {
         let times = || (0..).map(|k| self.h * f64::from(k));
         let panel = |title: &str, unit: &str| Panel::new(title).x("time, s").y(unit);
         let of_state = |of: fn(&State) -> f64| times().zip(self.states.iter().map(of));
@@ -87,14 +87,19 @@ impl Picture {
             .with(panel("Tension of the tether", "kN").y_range(0.0..2.0).line("", tension).limit(1.8))
             .with(
                 panel("Angles of attack and sideslip", "degrees")
-                    .line("attack", of_state(|s| (air(s).z / air(s).x).to_degrees()))
-                    .line("sideslip", of_state(|s| (air(s).y / air(s).x).to_degrees()))
+                    .line("attack", of_state(|s| (air_velocity(s).z / air_velocity(s).x).to_degrees()))
+                    .line("sideslip", of_state(|s| (air_velocity(s).y / air_velocity(s).x).to_degrees()))
                     .limit(9.0)
                     .limit(-6.0),
             )
             .with(rates)
             .column(1.0)
-            .with(panel("Airspeed", "m/s").line("", of_state(|s| air(s).norm())).limit(10.0).limit(32.0))
+            .with(
+                panel("Airspeed", "m/s")
+                    .line("", of_state(|s| air_velocity(s).norm()))
+                    .limit(10.0)
+                    .limit(32.0),
+            )
             .with(deflections)
             .with(
                 panel("Drag coefficient of the turbines", "kg/m")
@@ -104,7 +109,7 @@ impl Picture {
 }
 
 /// The velocity of the air in the frame of the aircraft.
-fn air(state: &State) -> Vector3<f64> {
+fn air_velocity(state: &State) -> Vector3<f64> {
     let wind = 10.0 * ((state.q.z * state.q.z + 1.0).sqrt() / 100.0).powf(0.15);
     state.r.transpose() * (Vector3::new(wind, 0.0, 0.0) - state.dq)
 }

@@ -50,14 +50,14 @@ pub fn accumulated(x: [f64; 23], _z: [f64; 1], _u: [f64; 4]) -> f64 {
 pub type Shape = <Awe as Dae>::Shape;
 
 /// The orbit over dynamics, with intervals of length `h`.
-pub fn orbit<D>(
+pub fn orbit_problem<D>(
     dynamics: D,
     h: f64,
 ) -> Result<HeapOcp<impl Formulation<f64, Dynamics = D, Shape = Shape>>, Box<dyn Error>>
 where
     D: SecondOrder<f64, Shape = Shape>,
 {
-    let mut ocp = flight(dynamics, h)?;
+    let mut ocp = flight_problem(dynamics, h)?;
     ocp.free_initial_state();
     for name in ["x.q", "x.dq", "x.omega", "x.r", "x.delta", "x.kappa"] {
         ocp.periodic(name)?;
@@ -68,7 +68,7 @@ where
 }
 
 /// A flight from anywhere to anywhere, with all limits of states and controls.
-pub fn flight<D>(
+pub fn flight_problem<D>(
     dynamics: D,
     h: f64,
 ) -> Result<HeapOcp<impl Formulation<f64, Dynamics = D, Shape = Shape>>, Box<dyn Error>>
@@ -92,7 +92,7 @@ where
 }
 
 /// A guess as the iterate.
-pub fn begin<P: Formulation<f64>>(
+pub fn set_iterate<P: Formulation<f64>>(
     ocp: &mut HeapOcp<P>,
     [states, controls]: &[Vec<Vec<f64>>; 2],
 ) -> Result<(), Box<dyn Error>> {

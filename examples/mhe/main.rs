@@ -136,7 +136,8 @@ fn run() -> Result<(), Box<dyn Error>> {
         }
         // The first state of the next window.
         let first = Vector6::from_column_slice(ocp.stage(0)?.x);
-        (mean, covariance) = next(&mut filter, first, mean, covariance, measurements[begin], force(begin))?;
+        (mean, covariance) =
+            predict(&mut filter, first, mean, covariance, measurements[begin], force(begin))?;
         ocp.shift();
     }
     let windows = (SAMPLES - WINDOW + 1) as f64;
@@ -153,7 +154,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 
 /// Mean and covariance one sample later: a step of the extended Kalman filter, linearised at the
 /// smoothed state `at`.
-fn next(
+fn predict(
     model: &mut Erk<Cart, Rk4>,
     at: Vector6<f64>,
     mean: Vector6<f64>,
@@ -183,10 +184,10 @@ struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.equally()).sum::<f64>() - 6.0
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
     /// Between 0 and 1 (SplitMix: Steele, Lea and Flood, 2014).
-    fn equally(&mut self) -> f64 {
+    fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

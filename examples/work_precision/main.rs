@@ -29,7 +29,7 @@ use std::time::Instant;
 const USAGE: &str = "usage: cargo run --release --example work_precision [-- --only TEXT] [--without-peers] [--seconds S] [--out FOLDER] [--write FILE]";
 
 /// A run that takes longer is not repeated, and more accurate ones are not tried.
-const PATIENCE: f64 = 3.0;
+const MAX_SECONDS: f64 = 3.0;
 
 struct Arguments {
     only: String,
@@ -78,7 +78,7 @@ impl Measured {
             .x_range(1e-14..1.0);
         let mut drawn: Vec<(&str, bool)> = Vec::new();
         for run in &self.runs {
-            let solver = (run.solver.as_str(), run.ours);
+            let solver = (run.solver.as_str(), run.is_own);
             if drawn.contains(&solver) {
                 continue;
             }
@@ -88,7 +88,7 @@ impl Measured {
             let points: Vec<_> = outcomes.map(|o| (o.error.max(1e-14), 1e3 * o.time)).collect();
             if !points.is_empty() {
                 let series = Curve::line(solver.0, points).width(if solver.0 == "Radau" { 3.0 } else { 1.5 });
-                panel = panel.with(if run.ours { series.marked() } else { series.dashed().marked() });
+                panel = panel.with(if run.is_own { series.marked() } else { series.dashed().marked() });
             }
         }
         Figure::new().size(760, 560).with(panel)
@@ -115,11 +115,11 @@ fn measure(problem: &Problem, method: &Method, accuracy: f64, derivatives: bool,
         })
     };
     let outcome = time().map_err(|error| error.to_string());
-    Run { solver: method.name.into(), ours: true, accuracy, outcome }
+    Run { solver: method.name.into(), is_own: true, accuracy, outcome }
 }
 
 /// All methods of this library on a problem.
-fn ours(problem: &Problem, derivatives: bool, seconds: f64) -> Vec<Run> {
+fn measure_own_methods(problem: &Problem, derivatives: bool, seconds: f64) -> Vec<Run> {
     let mut runs = Vec::new();
     for method in &problem.methods {
         if derivatives && method.fixed {
@@ -133,7 +133,7 @@ fn ours(problem: &Problem, derivatives: bool, seconds: f64) -> Vec<Run> {
         for accuracy in accuracies {
             let begin = Instant::now();
             runs.push(measure(problem, method, accuracy, derivatives, seconds));
-            if begin.elapsed().as_secs_f64() > PATIENCE {
+            if begin.elapsed().as_secs_f64() > MAX_SECONDS {
                 break;
             }
         }
@@ -141,24 +141,24 @@ fn ours(problem: &Problem, derivatives: bool, seconds: f64) -> Vec<Run> {
     runs
 }
 
-fn run() -> Result<(), Box<dyn Error>> {
+fn measure_all() -> Result<(), Box<dyn Error>> {
     let arguments = arguments()?;
-    let mut peers = if arguments.peers { Peer::all() } else { Vec::new() };
+    let mut peers = if arguments.peers { Peer::start_all() } else { Vec::new() };
     let mut all = Vec::new();
-    for problem in problems::all()?.iter().filter(|problem| problem.name.contains(&arguments.only)) {
+    for problem in problems::all_problems()?.iter().filter(|problem| problem.name.contains(&arguments.only)) {
         for derivatives in [false, true] {
             if derivatives && problem.derivatives.is_none() {
                 continue;
             }
-            let mut runs = ours(problem, derivatives, arguments.seconds);
+            let mut runs = measure_own_methods(problem, derivatives, arguments.seconds);
             for peer in &mut peers {
-                match peer.runs(problem, derivatives, arguments.seconds) {
+                match peer.run_solvers(problem, derivatives, arguments.seconds) {
                     Ok(others) => runs.extend(others),
                     Err(error) => eprintln!("{}: {error}", problem.name),
                 }
             }
             // The machine has moods: once more, at the other end of the peers' runs.
-            for again in ours(problem, derivatives, arguments.seconds) {
+            for again in measure_own_methods(problem, derivatives, arguments.seconds) {
                 let same = |run: &&mut Run| run.solver == again.solver && run.accuracy == again.accuracy;
                 if let (Some(Run { outcome: Ok(first), .. }), Ok(second)) =
                     (runs.iter_mut().find(same), &again.outcome)
@@ -178,8 +178,8 @@ fn run() -> Result<(), Box<dyn Error>> {
             all.push(Measured { name: problem.name, title: problem.title, derivatives, runs });
         }
     }
-    let text = report::times(&all);
-    println!("{text}\n{}", report::runs(&all));
+    let text = report::times_at_equal_errors(&all);
+    println!("{text}\n{}", report::runs_at_four_tolerances(&all));
     for measured in &all {
         let with = if measured.derivatives { "_sensitivities" } else { "" };
         measured.figure().save(arguments.out.join(format!("{}{with}.svg", measured.name)))?;
@@ -196,7 +196,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 }
 
 fn main() -> ExitCode {
-    match run() {
+    match measure_all() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("work_precision: {error}");

@@ -23,7 +23,7 @@ fn repository(path: &str) -> PathBuf {
 
 impl Peer {
     /// Those that there are; what is not found is said.
-    pub fn all() -> Vec<Self> {
+    pub fn start_all() -> Vec<Self> {
         let mut peers = Vec::new();
         for (name, peer) in [("diffsol", Self::diffsol()), ("CVODES and IDAS", Self::casadi())] {
             match peer {
@@ -93,7 +93,12 @@ impl Peer {
     ///
     /// # Errors
     /// Of the process; a solver that fails is a run with an error.
-    pub fn runs(&mut self, problem: &Problem, derivatives: bool, seconds: f64) -> Result<Vec<Run>, String> {
+    pub fn run_solvers(
+        &mut self,
+        problem: &Problem,
+        derivatives: bool,
+        seconds: f64,
+    ) -> Result<Vec<Run>, String> {
         let tolerances: Vec<f64> = (6..=24).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect();
         // Peers take the amplifier as an equation with algebraic states, the voltages of its
         // capacitors.

@@ -158,7 +158,7 @@ fn states(x: &[f64], z: &[f64]) -> Vec<f64> {
 ///
 /// # Errors
 /// Data that is not there.
-pub fn all() -> Result<Vec<Problem>, String> {
+pub fn all_problems() -> Result<Vec<Problem>, String> {
     let load = Problem::load;
     let mut e5 = load("e5", "E5", 1e11, 1e-80)?;
     e5.x0.truncate(3);

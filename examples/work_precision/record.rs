@@ -8,7 +8,7 @@ use reference_data::Record;
 pub struct Run {
     pub solver: String,
     /// Whether it is one of this library.
-    pub ours: bool,
+    pub is_own: bool,
     /// The tolerance, or the number of equal steps.
     pub accuracy: f64,
     pub outcome: Result<Outcome, String>,
@@ -28,7 +28,8 @@ pub struct Outcome {
 
 /// The error of values at the end, and of derivatives if there are any.
 pub fn error(problem: &Problem, y: &[f64], derivatives: &[f64]) -> f64 {
-    let mut worst = worst(y.iter().zip(&problem.y).map(|(found, exact)| (found - exact).abs() / exact.abs()));
+    let mut worst =
+        nan_max(y.iter().zip(&problem.y).map(|(found, exact)| (found - exact).abs() / exact.abs()));
     if y.len() != problem.y.len() {
         worst = f64::INFINITY;
     }
@@ -41,14 +42,14 @@ pub fn error(problem: &Problem, y: &[f64], derivatives: &[f64]) -> f64 {
                 exact.iter().zip(sizes.clone()).map(|(exact, size)| (exact * size).abs()).fold(0.0, f64::max);
             let errors =
                 found.iter().zip(exact).zip(sizes).map(|((f, e), size)| ((f - e) * size).abs() / largest);
-            worst = worst.max(self::worst(errors));
+            worst = worst.max(self::nan_max(errors));
         }
     }
     worst
 }
 
 /// NaN is the worst.
-fn worst(errors: impl Iterator<Item = f64>) -> f64 {
+fn nan_max(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, |worst, error| if error.is_nan() { f64::INFINITY } else { worst.max(error) })
 }
 
@@ -65,13 +66,13 @@ impl Run {
             }
             _ => Err("no numbers".into()),
         };
-        Some(Self { solver, ours: false, accuracy, outcome })
+        Some(Self { solver, is_own: false, accuracy, outcome })
     }
 }
 
 /// The fastest run whose error is no larger.
 pub fn fastest(runs: &[Run], ours: bool, error: f64) -> Option<(&Run, Outcome)> {
-    let reached = runs.iter().filter(|run| run.ours == ours).filter_map(|run| {
+    let reached = runs.iter().filter(|run| run.is_own == ours).filter_map(|run| {
         let outcome = *run.outcome.as_ref().ok()?;
         (outcome.error <= error).then_some((run, outcome))
     });

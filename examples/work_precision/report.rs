@@ -18,7 +18,7 @@ fn entry(found: Option<(&Run, Outcome)>) -> String {
 }
 
 /// Times at equal errors, of ours and of the fastest peer.
-pub fn times(all: &[Measured]) -> String {
+pub fn times_at_equal_errors(all: &[Measured]) -> String {
     let mut text = String::new();
     for derivatives in [false, true] {
         let of = || all.iter().filter(|measured| measured.derivatives == derivatives);
@@ -45,13 +45,13 @@ pub fn times(all: &[Measured]) -> String {
 }
 
 /// Everything at four tolerances.
-pub fn runs(all: &[Measured]) -> String {
+pub fn runs_at_four_tolerances(all: &[Measured]) -> String {
     let mut text = String::new();
     text += "| problem | solver | tolerance or steps | error | steps | factorisations | ms |\n";
     text += "| --- | --- | --- | --- | --- | --- | --- |\n";
     for measured in all {
         let with = if measured.derivatives { ", with sensitivities" } else { "" };
-        for run in measured.runs.iter().filter(|run| shown(run)) {
+        for run in measured.runs.iter().filter(|run| shown_accuracies(run)) {
             let count = |count: Option<usize>| count.map_or("–".into(), |count| count.to_string());
             let rest = match &run.outcome {
                 Ok(outcome) => format!(
@@ -75,7 +75,7 @@ pub fn runs(all: &[Measured]) -> String {
 }
 
 /// Tolerances of whole digits; a few numbers of steps.
-fn shown(run: &Run) -> bool {
+fn shown_accuracies(run: &Run) -> bool {
     let steps = run.accuracy > 1.0 && [40.0, 640.0].contains(&run.accuracy);
     steps || [1e-4, 1e-6, 1e-8, 1e-10].iter().any(|tolerance| (run.accuracy / tolerance - 1.0).abs() < 1e-6)
 }

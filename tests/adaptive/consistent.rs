@@ -20,7 +20,7 @@ fn root(xdot: f64, x: f64, z: [f64; 2]) -> [f64; 3] {
 }
 
 #[test]
-fn solutions_are_found_on_the_side_of_the_start_values() {
+fn solutions_near_start_values() {
     let mut radau = Adaptive::<Root, Radau>::new(AdaptiveOptions::default()).unwrap();
     for sign in [1.0, -1.0] {
         radau.set_start(&vector![0.0], &vector![0.0, sign]).unwrap();
@@ -36,7 +36,7 @@ fn widening(x: f64) -> f64 {
 }
 
 #[test]
-fn rates_without_a_value_are_refused() {
+fn rates_without_a_value() {
     let mut pair = Adaptive::<Widening, DormandPrince5>::new(AdaptiveOptions::default()).unwrap();
     // The other solution that begins at zero.
     assert_eq!(pair.solve(&vector![0.0], &vector![], 1.0).unwrap().x[0], 0.0);
@@ -47,7 +47,7 @@ fn rates_without_a_value_are_refused() {
 }
 
 #[test]
-fn what_has_no_solution_is_named() {
+fn messages_about_missing_solutions() {
     let mut radau = Adaptive::<Root, Radau>::new(AdaptiveOptions::default()).unwrap();
     radau.set_time(0.25).unwrap();
     radau.set_start(&vector![0.0], &vector![0.0, 1.0]).unwrap();
@@ -77,7 +77,7 @@ fn hidden(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
 }
 
 #[test]
-fn what_is_not_determined_is_named() {
+fn messages_about_undetermined_states() {
     let mut radau = Adaptive::<Hidden, RadauIIA<5>>::new(AdaptiveOptions::default()).unwrap();
     radau.set_parameters(&Vector1::new(0.0)).unwrap();
     let error = radau.solve(&vector![1.5, 1.0], &vector![], 0.5).unwrap_err();

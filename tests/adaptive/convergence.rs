@@ -11,7 +11,7 @@ fn collapse(xdot: f64, x: f64, z: [f64; 2]) -> [f64; 3] {
 }
 
 #[test]
-fn algebraic_equations_that_lose_their_solution() {
+fn voltage_collapse() {
     for tolerance in [1e-4, 1e-8] {
         let options = AdaptiveOptions { rtol: tolerance, atol: tolerance, ..Default::default() };
         let mut radau = Adaptive::<Collapse, Radau>::new(options).unwrap();
@@ -36,7 +36,7 @@ fn any_matrix(xdot: f64, x: f64, z: [f64; 2], p: [f64; 4]) -> [f64; 3] {
 
 /// Of two permutations, and matrices next to them, one has a pivot of zero, whatever the plan is.
 #[test]
-fn planned_pivots_that_vanish() {
+fn vanishing_planned_pivots() {
     let mut pivoted = 0;
     for tiny in [0.0, 1e-300, 1e-17, 1e-12, 1e-9] {
         for (p, expected) in [([1.0, tiny, tiny, 1.0], (-1.0f64).exp()), ([tiny, 1.0, 1.0, tiny], 0.0)] {

@@ -108,7 +108,7 @@ fn rotation(x: [f64; 2], t: f64) -> [f64; 2] {
 }
 
 #[test]
-fn quadratic_invariants_stay() {
+fn quadratic_invariants() {
     let mut gauss = Adaptive::<Rotation, Gauss<3>>::new(options(1e-5)).unwrap();
     let x = gauss.solve(&vector![0.6, 0.8], &vector![], 200.0).unwrap().x;
     let steps = gauss.statistics().steps;

@@ -61,7 +61,7 @@ fn closed_form(x0: f64, controls: &[f64; 3], p: f64, t: f64) -> (f64, f64, [f64;
 }
 
 #[test]
-fn decay_has_a_closed_form() {
+fn closed_form_of_decay() {
     let controls = [0.4, -1.2, 2.0];
     let list = controls.map(Vector1::new);
     let (x0, p) = (1.5, 0.8);
@@ -180,13 +180,13 @@ macro_rules! derivatives {
 }
 
 #[test]
-fn derivatives_three_ways() {
+fn derivatives_by_three_methods() {
     derivatives!(Adaptive<Swing, Radau>);
     derivatives!(Adaptive<Explicit, DormandPrince8>);
 }
 
 #[test]
-fn one_interval_is_one_integration() {
+fn one_interval() {
     let (x0, p, u): (Vector2<f64>, _, _) = (vector![0.8, -0.4], Vector1::new(0.4), vector![0.3, 0.1]);
     let mut single = Adaptive::<Swing, RadauIIA<5>>::new(options(1e-8)).unwrap();
     let mut horizon = Piecewise::new(Adaptive::<Swing, RadauIIA<5>>::new(options(1e-8)).unwrap());
@@ -205,7 +205,7 @@ fn one_interval_is_one_integration() {
 }
 
 #[test]
-fn mistakes_are_errors() {
+fn invalid_arguments() {
     let mut horizon = Piecewise::new(Adaptive::<Decay, Radau>::new(options(1e-6)).unwrap());
     let (x0, u) = (Vector1::new(1.0), Vector1::new(0.0));
     assert_eq!(horizon.solve(&x0, &[u], &[1.0]).unwrap_err(), Error::ParametersNotSet);
@@ -251,7 +251,7 @@ fn steep(xdot: f64, x: f64, z: f64, u: f64) -> [f64; 2] {
 
 /// Those of each interval are numbers.
 #[test]
-fn derivatives_beyond_the_range_are_an_error() {
+fn overflow_of_derivatives() {
     let adaptive = Adaptive::<Pushed, DormandPrince5>::new(options(1e-6)).unwrap();
     let mut horizon = Piecewise::new(adaptive);
     horizon.integrator().set_parameters(&vector![0.0]).unwrap();

@@ -1,7 +1,7 @@
 //! Adaptive integrators allocate in the first call of each kind, and those of several intervals or
 //! with events the lists of their results.
 
-use crate::count;
+use crate::count_allocations;
 use crate::models::{Linear, Nonlinear, Shifted};
 use casados_core::{Adaptive, AdaptiveOptions, Crossing, Error, Event, Hybrid, Piecewise, Radau};
 use nalgebra::vector;
@@ -13,11 +13,11 @@ fn adaptive_integrators_allocate_once() -> Result<(), Error> {
     adaptive.set_parameters(&vector![1.3])?;
     let mut run = || {
         [
-            count(|| _ = adaptive.solve(&x0, &u, 0.5).unwrap()),
-            count(|| _ = adaptive.dense(0.2).unwrap()),
-            count(|| _ = adaptive.forward(&x0, &u, 0.5).unwrap()),
-            count(|| _ = adaptive.adjoint(&x0, &u, 0.5, &lambda).unwrap()),
-            count(|| _ = adaptive.hessian(&x0, &u, 0.5, &lambda).unwrap()),
+            count_allocations(|| _ = adaptive.solve(&x0, &u, 0.5).unwrap()),
+            count_allocations(|| _ = adaptive.dense(0.2).unwrap()),
+            count_allocations(|| _ = adaptive.forward(&x0, &u, 0.5).unwrap()),
+            count_allocations(|| _ = adaptive.adjoint(&x0, &u, 0.5, &lambda).unwrap()),
+            count_allocations(|| _ = adaptive.hessian(&x0, &u, 0.5, &lambda).unwrap()),
         ]
     };
     assert!(run()[0] > 0);
@@ -35,11 +35,11 @@ fn piecewise_integrators_allocate_lists_of_results() -> Result<(), Error> {
     let mut piecewise = Piecewise::new(adaptive);
     let mut run = || {
         [
-            count(|| _ = piecewise.solve(&x0, &u, &ends).unwrap()),
-            count(|| _ = piecewise.dense(0.25).unwrap()),
-            count(|| _ = piecewise.forward(&x0, &u, &ends).unwrap()),
-            count(|| _ = piecewise.adjoint(&x0, &u, &ends, &lambda).unwrap()),
-            count(|| _ = piecewise.hessian(&x0, &u, &ends, &lambda).unwrap()),
+            count_allocations(|| _ = piecewise.solve(&x0, &u, &ends).unwrap()),
+            count_allocations(|| _ = piecewise.dense(0.25).unwrap()),
+            count_allocations(|| _ = piecewise.forward(&x0, &u, &ends).unwrap()),
+            count_allocations(|| _ = piecewise.adjoint(&x0, &u, &ends, &lambda).unwrap()),
+            count_allocations(|| _ = piecewise.hessian(&x0, &u, &ends, &lambda).unwrap()),
         ]
     };
     assert!(run()[0] > 0);
@@ -58,11 +58,11 @@ fn hybrid_integrators_allocate_lists_of_results() -> Result<(), Error> {
     assert!(hybrid.solve(&x0, &u, 2.0)?.occurrences.len() >= 3);
     let mut run = || {
         [
-            count(|| _ = hybrid.solve(&x0, &u, 2.0).unwrap()),
-            count(|| _ = hybrid.dense(1.0).unwrap()),
-            count(|| _ = hybrid.forward(&x0, &u, 2.0).unwrap()),
-            count(|| _ = hybrid.adjoint(&x0, &u, 2.0, &lambda).unwrap()),
-            count(|| _ = hybrid.hessian(&x0, &u, 2.0, &lambda).unwrap()),
+            count_allocations(|| _ = hybrid.solve(&x0, &u, 2.0).unwrap()),
+            count_allocations(|| _ = hybrid.dense(1.0).unwrap()),
+            count_allocations(|| _ = hybrid.forward(&x0, &u, 2.0).unwrap()),
+            count_allocations(|| _ = hybrid.adjoint(&x0, &u, 2.0, &lambda).unwrap()),
+            count_allocations(|| _ = hybrid.hessian(&x0, &u, 2.0, &lambda).unwrap()),
         ]
     };
     run();

@@ -1,6 +1,6 @@
 //! Only the first call of each kind allocates, and none after memory was reserved.
 
-use crate::count;
+use crate::count_allocations;
 use crate::models::Nonlinear;
 use casados_core::result::Seeds;
 use casados_core::{Gauss, Irk, Options};
@@ -14,18 +14,18 @@ fn memory_is_allocated_once() {
     let lambdas = SMatrix::<f64, 2, 3>::identity();
     let run = |irk: &mut Irk<Nonlinear, Gauss<2>>| {
         [
-            count(|| _ = irk.solve(&x0, &u, 0.1).unwrap()),
-            count(|| _ = irk.forward(&x0, &u, 0.1).unwrap()),
-            count(|| _ = irk.forward_adjoint(&x0, &u, 0.1, &lambda).unwrap()),
-            count(|| _ = irk.dense_forward(0.05).unwrap()),
-            count(|| _ = irk.adjoint(&x0, &u, 0.1, &lambda).unwrap()),
-            count(|| _ = irk.adjoint_many(&x0, &u, 0.1, &lambdas).unwrap()),
-            count(|| _ = irk.directional(&x0, &u, 0.1, &seeds).unwrap()),
-            count(|| _ = irk.hessian(&x0, &u, 0.1, &lambda).unwrap()),
+            count_allocations(|| _ = irk.solve(&x0, &u, 0.1).unwrap()),
+            count_allocations(|| _ = irk.forward(&x0, &u, 0.1).unwrap()),
+            count_allocations(|| _ = irk.forward_adjoint(&x0, &u, 0.1, &lambda).unwrap()),
+            count_allocations(|| _ = irk.dense_forward(0.05).unwrap()),
+            count_allocations(|| _ = irk.adjoint(&x0, &u, 0.1, &lambda).unwrap()),
+            count_allocations(|| _ = irk.adjoint_many(&x0, &u, 0.1, &lambdas).unwrap()),
+            count_allocations(|| _ = irk.directional(&x0, &u, 0.1, &seeds).unwrap()),
+            count_allocations(|| _ = irk.hessian(&x0, &u, 0.1, &lambda).unwrap()),
         ]
     };
     let mut irk = Irk::<Nonlinear, Gauss<2>>::new(options).unwrap();
-    assert_eq!(count(|| irk.set_parameters(&vector![1.3]).unwrap()), 1);
+    assert_eq!(count_allocations(|| irk.set_parameters(&vector![1.3]).unwrap()), 1);
     // The two records of `solve`; then one for each new kind of call, and a list for those that
     // depend on the number of seeds.
     assert_eq!(run(&mut irk), [2, 1, 0, 0, 2, 1, 2, 2]);

@@ -15,10 +15,10 @@ use std::cell::Cell;
 thread_local!(static COUNT: Cell<usize> = const { Cell::new(0) });
 
 /// Counts the allocations of each thread.
-struct Counting;
+struct CountingAllocator;
 
 // SAFETY: every call is passed on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get() + 1));
         unsafe { System.alloc(layout) }
@@ -33,10 +33,10 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// The number of allocations in `f`.
-fn count(f: impl FnOnce()) -> usize {
+fn count_allocations(f: impl FnOnce()) -> usize {
     let before = COUNT.get();
     f();
     COUNT.get() - before

@@ -21,7 +21,7 @@ fn control(_x: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> [f64; 1] {
 
 /// What a constant control holds: `x = p x + 1`, so that `dx/dp = 1/(1 − p)²`.
 #[test]
-fn a_state_that_is_held() -> Test {
+fn derivatives_of_a_steady_state() -> Test {
     const P: f64 = 0.5;
     let mut ocp = Problem::new(Map::<Relax, f64>::new())
         .stage_cost(LeastSquaresCost::<Control>::diagonal(&[1.0]))
@@ -53,7 +53,7 @@ fn height(x: [f64; 1], _u: [f64; 1], p: [f64; 1]) -> [f64; 1] {
 /// A line through data `p²`, `4`, …: where it begins is the first state, its slope the control of
 /// all stages. Every coefficient of the regression is linear in the first number.
 #[test]
-fn a_line_through_data() -> Test {
+fn derivatives_of_a_fitted_line() -> Test {
     const P: f64 = 1.3;
     let mut ocp = Problem::new(Map::<Climb, f64>::new())
         .stage_cost(LeastSquaresCost::<Height>::diagonal(&[1.0]))
@@ -110,7 +110,7 @@ const INTERVALS: usize = 12;
 
 /// What is coupled.
 #[derive(Clone, Copy)]
-struct Case {
+struct Coupling {
     periodic: &'static [&'static str],
     shared: &'static [&'static str],
     fixed: bool,
@@ -118,7 +118,7 @@ struct Case {
 
 /// `at` is `(x₀, p)`, or `p` where the initial state is free.
 fn problem(
-    case: Case,
+    case: Coupling,
     at: &[f64],
 ) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>> {
     let mut ocp = Problem::new(Irk::<Driven, Gauss<2>>::new(Options::default())?)
@@ -142,13 +142,13 @@ fn problem(
 /// given.
 #[test]
 fn differences_of_coupled_solutions() -> Test {
-    const CASES: [Case; 6] = [
-        Case { periodic: &[], shared: &[], fixed: false },
-        Case { periodic: &[], shared: &["u[1]"], fixed: true },
-        Case { periodic: &[], shared: &["u[1]"], fixed: false },
-        Case { periodic: &["x"], shared: &["u[1]"], fixed: false },
-        Case { periodic: &["x[1]"], shared: &["u"], fixed: false },
-        Case { periodic: &["x[0]"], shared: &["u[1]"], fixed: true },
+    const CASES: [Coupling; 6] = [
+        Coupling { periodic: &[], shared: &[], fixed: false },
+        Coupling { periodic: &[], shared: &["u[1]"], fixed: true },
+        Coupling { periodic: &[], shared: &["u[1]"], fixed: false },
+        Coupling { periodic: &["x"], shared: &["u[1]"], fixed: false },
+        Coupling { periodic: &["x[1]"], shared: &["u"], fixed: false },
+        Coupling { periodic: &["x[0]"], shared: &["u[1]"], fixed: true },
     ];
     for case in CASES {
         let at: &[f64] = if case.fixed { &[-0.3, 0.2, 1.3, 0.8] } else { &[1.3, 0.8] };

@@ -30,7 +30,7 @@ fn problem() -> Result<HeapOcp<impl Formulation<f64>>, OcpError> {
 }
 
 /// Each says something, and the same in both ways.
-fn are_texts<E: Debug + Display>(errors: &[E]) {
+fn check_debug_texts<E: Debug + Display>(errors: &[E]) {
     for error in errors {
         assert_eq!(format!("{error:?}"), format!("{error}"));
         assert_eq!(format!("{:?}", Err::<(), _>(error)), format!("Err({error})"));
@@ -38,7 +38,7 @@ fn are_texts<E: Debug + Display>(errors: &[E]) {
     }
 }
 
-fn of_integrators() -> Vec<Error> {
+fn debug_of_integrators() -> Vec<Error> {
     let at = Place { step: 1, stage: 2, iteration: 3 };
     let started = Started { unknown: "z", value: 0.5 };
     let input = |argument, name| Error::NonFiniteInput { argument, index: 1, name, value: f64::NAN };
@@ -105,7 +105,7 @@ fn of_integrators() -> Vec<Error> {
     ]
 }
 
-fn of_tableaux() -> [TableauError; 4] {
+fn debug_of_tableaux() -> [TableauError; 4] {
     [
         TableauError::Empty,
         TableauError::NotFinite,
@@ -114,7 +114,7 @@ fn of_tableaux() -> [TableauError; 4] {
     ]
 }
 
-fn of_starts() -> [Inconsistent; 6] {
+fn debug_of_start_values() -> [Inconsistent; 6] {
     let (equation, derivative, residual) = (4, 1, 1e-3);
     let input =
         |name| Inconsistent::NonFiniteInput { argument: Argument::T, index: 0, name, value: f64::NAN };
@@ -128,7 +128,7 @@ fn of_starts() -> [Inconsistent; 6] {
     ]
 }
 
-fn of_batches(error: Error) -> [BatchError; 4] {
+fn debug_of_batches(error: Error) -> [BatchError; 4] {
     [
         BatchError::Length { slice: batch::Slice::Results, length: 3, intervals: 1 },
         BatchError::Intervals { failed: 2, first: 1, error },
@@ -137,7 +137,7 @@ fn of_batches(error: Error) -> [BatchError; 4] {
     ]
 }
 
-fn of_qps() -> Vec<QpError> {
+fn debug_of_qps() -> Vec<QpError> {
     let (field, stage, index) = (QpField::StateBounds, 1, 2);
     vec![
         QpError::Dimension { field, stage, expected: 1, found: 2 },
@@ -151,7 +151,7 @@ fn of_qps() -> Vec<QpError> {
     ]
 }
 
-fn of_problems(error: Error) -> Vec<OcpError> {
+fn debug_of_problems(error: Error) -> Vec<OcpError> {
     let (part, stage, name) = (Part::StateBounds, 1, "x[0]");
     let mut errors = vec![
         OcpError::NoSuchStage { part, stage, stages: 1 },
@@ -182,25 +182,25 @@ fn of_problems(error: Error) -> Vec<OcpError> {
         OcpError::InvalidOption { name: "tolerance", value: -1.0, allowed: "positive" },
         OcpError::OutOfMemory { bytes: 100 },
     ];
-    errors.extend(of_qps().into_iter().map(OcpError::Qp));
-    errors.extend(of_starts().map(OcpError::Inconsistent));
-    errors.extend(of_batches(error).map(OcpError::from));
+    errors.extend(debug_of_qps().into_iter().map(OcpError::Qp));
+    errors.extend(debug_of_start_values().map(OcpError::Inconsistent));
+    errors.extend(debug_of_batches(error).map(OcpError::from));
     errors
 }
 
 #[test]
-fn is_the_text() -> Test {
-    let error = of_integrators()[0];
-    are_texts(&of_integrators());
-    are_texts(&of_tableaux());
-    are_texts(&of_starts());
-    are_texts(&of_batches(error));
-    are_texts(&of_qps());
-    let mut problems = of_problems(error);
+fn debug_texts() -> Test {
+    let error = debug_of_integrators()[0];
+    check_debug_texts(&debug_of_integrators());
+    check_debug_texts(&debug_of_tableaux());
+    check_debug_texts(&debug_of_start_values());
+    check_debug_texts(&debug_of_batches(error));
+    check_debug_texts(&debug_of_qps());
+    let mut problems = debug_of_problems(error);
     let mut ocp = problem()?;
     problems.extend(ocp.bound("speed", .., 0.0, 1.0).err());
     problems.extend(ocp.soften("u", .., 1.0, 1.0).err());
-    are_texts(&problems);
+    check_debug_texts(&problems);
     let (name, found) = (String::from("x"), vec![String::from("x[0]"), String::from("x[1]")]);
     let mut trajectories = vec![
         TrajectoryError::Ambiguous { name: name.clone(), found },
@@ -210,14 +210,14 @@ fn is_the_text() -> Test {
     ];
     trajectories.extend(ocp.solution()?.state("speed").err());
     trajectories.extend(problems.into_iter().map(TrajectoryError::from));
-    are_texts(&trajectories);
+    check_debug_texts(&trajectories);
     Ok(())
 }
 
 /// What is nested is found by `source`, and said once.
 #[test]
-fn sources() {
-    let error = of_integrators()[1];
+fn error_sources() {
+    let error = debug_of_integrators()[1];
     let nested: [&dyn std::error::Error; 4] =
         [&error, &BatchError::Integrator(error), &OcpError::Integrator(error), &TrajectoryError::from(error)];
     for error in nested {
@@ -227,7 +227,7 @@ fn sources() {
 }
 
 /// The plan of a controller, a simulation and a batch in one function, with `?` alone.
-fn everything(h: f64) -> Result<f64, OcpError> {
+fn derive_all_errors(h: f64) -> Result<f64, OcpError> {
     let x = vector![1.0, 0.0];
     problem()?;
     let mut plant = Irk::<Cart, Gauss<2>>::new(Options::default())?;
@@ -240,22 +240,22 @@ fn everything(h: f64) -> Result<f64, OcpError> {
 }
 
 /// The name of a trajectory, a tableau of one's own, and all of the above.
-fn more(h: f64) -> Result<f64, TrajectoryError> {
+fn convert_further_errors(h: f64) -> Result<f64, TrajectoryError> {
     let tableau = || -> Result<_, Error> { Ok(casados::Tableau::new([[0.5]], [1.0], [0.5])?) };
     tableau()?;
     problem()?.solution()?.state("x[0]")?;
-    Ok(everything(h)?)
+    Ok(derive_all_errors(h)?)
 }
 
 #[test]
-fn convert() -> Test {
-    assert_eq!(more(0.1)?, 0.0);
-    let error = everything(f64::NAN).expect_err("the length is no number");
+fn error_conversion() -> Test {
+    assert_eq!(convert_further_errors(0.1)?, 0.0);
+    let error = derive_all_errors(f64::NAN).expect_err("the length is no number");
     assert_eq!(format!("{error:?}"), "the length `h` of the interval is NaN: it must be finite");
     let refused = Tableau::new([[0.5]], [1.0], [0.4]).map_err(Error::from).expect_err("sums of rows");
     assert_eq!(format!("{refused:?}"), "row 0 of A sums to 5e-1, but c[0] = 4e-1");
     // Of a batch the interval is known.
-    let error = of_integrators()[0];
+    let error = debug_of_integrators()[0];
     let of_batch = OcpError::from(BatchError::Intervals { failed: 1, first: 2, error });
     assert!(matches!(of_batch, OcpError::Integration { interval: 2, .. }));
     assert!(matches!(

@@ -14,7 +14,7 @@ type Result<T> = core::result::Result<T, Box<dyn std::error::Error>>;
 
 /// Solves, and shows the log where something is not as it has to be. Where no multipliers exist
 /// residuals may stay above the tolerance: such problems are solved and do not converge.
-fn run<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+fn solve_and_check<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
     check: impl Fn(&HeapOcp<P>, &Outcome) -> bool,
 ) -> Result<Outcome> {
@@ -25,11 +25,11 @@ fn run<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
 }
 
 /// The controls of the first stage.
-fn u<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> Vec<f64> {
+fn first_controls<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> Vec<f64> {
     ocp.stage(0).map_or(vec![], |stage| stage.u.to_vec())
 }
 
-fn near(values: &[f64], expected: &[f64], tolerance: f64) -> bool {
+fn assert_near(values: &[f64], expected: &[f64], tolerance: f64) -> bool {
     values.len() == expected.len() && values.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance)
 }
 
@@ -99,7 +99,9 @@ fn d01_dependent_terminal_equations() -> Test {
         problem!(Energy).terminal_constraints(Constraint::<TwiceTheEnd>::new([1.0, 2.0], [1.0, 2.0]));
     let mut ocp = problem.on(Horizon::uniform(2, 1.0))?;
     ocp.fix_initial_state(&[0.0])?.guess(&[0.3], &[0.0, 0.4])?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.5, 0.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -112,7 +114,9 @@ fn plane_twice(_x: [f64; 1], u: [f64; 2]) -> [f64; 2] {
 #[test]
 fn d02_dependent_path_equations() -> Test {
     let mut ocp = on_one!(problem!(Energy, PlaneTwice, [1.0, 3.0], [1.0, 3.0]), [0.9, -0.4]);
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.5], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.5, 0.5], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -125,7 +129,7 @@ fn square(_x: [f64; 1], u: [f64; 2]) -> f64 {
 #[test]
 fn d03_inequality_without_interior() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Square, [-NONE], [0.0]), [0.5, 0.0]);
-    run(&mut ocp, |ocp, _| near(&u(ocp), &[0.0, 1.0], 1e-3))?;
+    solve_and_check(&mut ocp, |ocp, _| assert_near(&first_controls(ocp), &[0.0, 1.0], 1e-3))?;
     Ok(())
 }
 
@@ -133,7 +137,7 @@ fn d03_inequality_without_interior() -> Test {
 #[test]
 fn d04_equation_with_a_gradient_that_vanishes() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Square, [0.0], [0.0]), [0.5, 0.0]);
-    run(&mut ocp, |ocp, _| near(&u(ocp), &[0.0, 1.0], 1e-3))?;
+    solve_and_check(&mut ocp, |ocp, _| assert_near(&first_controls(ocp), &[0.0, 1.0], 1e-3))?;
     Ok(())
 }
 
@@ -148,8 +152,10 @@ fn product(_x: [f64; 1], u: [f64; 2]) -> f64 {
 fn d05_complementarity_constraints() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Product, [-NONE], [0.0]), [0.8, 0.3]);
     ocp.bound("u", .., 0.0, NONE)?;
-    run(&mut ocp, |ocp, outcome| {
-        outcome.is_solved() && (near(&u(ocp), &[1.0, 0.0], 1e-3) || near(&u(ocp), &[0.0, 1.0], 1e-3))
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved()
+            && (assert_near(&first_controls(ocp), &[1.0, 0.0], 1e-3)
+                || assert_near(&first_controls(ocp), &[0.0, 1.0], 1e-3))
     })?;
     Ok(())
 }
@@ -165,7 +171,7 @@ fn cusp(_x: [f64; 1], u: [f64; 2]) -> f64 {
 fn d06_hock_schittkowski_13() -> Test {
     let mut ocp = on_one!(problem!(FromTwo, Cusp, [0.0], [NONE]), [-2.0, -2.0]);
     ocp.bound("u", .., 0.0, NONE)?;
-    run(&mut ocp, |ocp, _| near(&u(ocp), &[1.0, 0.0], 2e-2))?;
+    solve_and_check(&mut ocp, |ocp, _| assert_near(&first_controls(ocp), &[1.0, 0.0], 2e-2))?;
     Ok(())
 }
 
@@ -184,9 +190,11 @@ fn d07_waechter_biegler() -> Test {
     let (part, side) = (Part::PathBounds, Side::Lower);
     let expected =
         ConstraintName { part, stage: 0, name: "TwoSides", output: 1, point: 0, side, phase: None };
-    run(&mut ocp, |ocp, outcome| {
-        let solved = outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6);
-        solved || (is_infeasible(outcome, expected, 1.5) && near(&u(ocp), &[-1.0, 0.0], 1e-4))
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        let solved = outcome.is_solved() && assert_near(&first_controls(ocp), &[1.0, 0.0], 1e-6);
+        solved
+            || (is_infeasible(outcome, expected, 1.5)
+                && assert_near(&first_controls(ocp), &[-1.0, 0.0], 1e-4))
     })?;
     Ok(())
 }
@@ -196,7 +204,9 @@ fn d07_waechter_biegler() -> Test {
 fn d08_concave_cost() -> Test {
     let mut ocp = on_one!(problem!(Concave), [0.3, 1.0]);
     ocp.bound("u[0]", .., -1.0, 2.0)?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[2.0, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[2.0, 0.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -205,7 +215,9 @@ fn d08_concave_cost() -> Test {
 fn d09_indefinite_hessian() -> Test {
     let mut ocp = on_one!(problem!(DoubleWell), [1.0, 0.1]);
     let depth = core::f64::consts::FRAC_1_SQRT_2;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.0, depth], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.0, depth], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -213,7 +225,9 @@ fn d09_indefinite_hessian() -> Test {
 #[test]
 fn d10_indefinite_but_for_constraints() -> Test {
     let mut ocp = on_one!(problem!(Concave, First, [0.5], [0.5]), [0.1, 0.9]);
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.5, 0.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -230,7 +244,7 @@ fn d11_state_out_of_reach() -> Test {
     ocp.bound("u[0]", .., -1.0, 1.0)?.bound("x[0]", 1.., 3.0, 4.0)?;
     let (part, side) = (Part::StateBounds, Side::Lower);
     let expected = ConstraintName { part, stage: 1, name: "x[0]", output: 0, point: 0, side, phase: None };
-    run(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 2.0))?;
+    solve_and_check(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 2.0))?;
     Ok(())
 }
 
@@ -243,7 +257,7 @@ fn both(_x: [f64; 1], u: [f64; 2]) -> [f64; 2] {
 #[test]
 fn d12_contradictory_equations() -> Test {
     let mut ocp = on_one!(problem!(Energy, Both, [0.0, 1.0], [0.0, 1.0]), [0.3, 0.0]);
-    run(&mut ocp, |_, outcome| {
+    solve_and_check(&mut ocp, |_, outcome| {
         matches!(outcome.status, Status::Infeasible { constraint, violation }
             if constraint.part == Part::PathBounds && violation > 0.49 && violation < 1.01)
     })?;
@@ -256,7 +270,7 @@ fn d13_no_real_solution() -> Test {
     let mut ocp = on_one!(problem!(FromOne, Square, [-NONE], [-1.0]), [0.5, 0.0]);
     let (part, side) = (Part::PathBounds, Side::Upper);
     let expected = ConstraintName { part, stage: 0, name: "Square", output: 0, point: 0, side, phase: None };
-    run(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 1.0))?;
+    solve_and_check(&mut ocp, |_, outcome| is_infeasible(outcome, expected, 1.0))?;
     Ok(())
 }
 
@@ -264,7 +278,7 @@ fn d13_no_real_solution() -> Test {
 #[test]
 fn d14_unbounded_linear() -> Test {
     let mut ocp = on_one!(problem!(First), [0.0, 0.0]);
-    run(&mut ocp, |_, outcome| outcome.status == Status::Unbounded)?;
+    solve_and_check(&mut ocp, |_, outcome| outcome.status == Status::Unbounded)?;
     Ok(())
 }
 
@@ -273,7 +287,7 @@ fn d14_unbounded_linear() -> Test {
 fn d15_unbounded_concave() -> Test {
     let mut ocp = on_one!(problem!(Concave), [0.3, 0.1]);
     ocp.bound("u[0]", .., 0.0, NONE)?;
-    run(&mut ocp, |_, outcome| outcome.status == Status::Unbounded)?;
+    solve_and_check(&mut ocp, |_, outcome| outcome.status == Status::Unbounded)?;
     Ok(())
 }
 
@@ -282,7 +296,9 @@ fn d15_unbounded_concave() -> Test {
 fn d16_fixed_control() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u[0]", .., 0.7, 0.7)?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.7, 1.0], 1e-7))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.7, 1.0], 1e-7)
+    })?;
     Ok(())
 }
 
@@ -291,10 +307,10 @@ fn d16_fixed_control() -> Test {
 fn d17_everything_fixed() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u[0]", .., 0.7, 0.7)?.bound("u[1]", .., -0.2, -0.2)?;
-    run(&mut ocp, |ocp, outcome| {
+    solve_and_check(&mut ocp, |ocp, outcome| {
         outcome.is_solved()
-            && near(&u(ocp), &[0.7, -0.2], 1e-7)
-            && near(ocp.stage(1).unwrap().x, &[0.7], 1e-7)
+            && assert_near(&first_controls(ocp), &[0.7, -0.2], 1e-7)
+            && assert_near(ocp.stage(1).unwrap().x, &[0.7], 1e-7)
     })?;
     Ok(())
 }
@@ -303,7 +319,9 @@ fn d17_everything_fixed() -> Test {
 #[test]
 fn d18_singular_hessian() -> Test {
     let mut ocp = on_one!(problem!(OneControl), [0.0, 0.3]);
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp)[..1], &[1.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp)[..1], &[1.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -312,7 +330,9 @@ fn d18_singular_hessian() -> Test {
 fn d19_weakly_active_bound() -> Test {
     let mut ocp = on_one!(problem!(FromOne), [0.0, 0.0]);
     ocp.bound("u", .., -5.0, 1.0)?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 1.0], 1e-4))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[1.0, 1.0], 1e-4)
+    })?;
     Ok(())
 }
 
@@ -321,7 +341,9 @@ fn d19_weakly_active_bound() -> Test {
 fn d20_redundant_bounds() -> Test {
     let mut ocp = on_one!(problem!(FromTwo, Both, [-NONE, -NONE], [1.0, 1.0]), [0.0, 0.5]);
     ocp.bound("u[0]", .., -NONE, 1.0)?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[1.0, 0.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -329,7 +351,9 @@ fn d20_redundant_bounds() -> Test {
 #[test]
 fn d21_no_interior() -> Test {
     let mut ocp = on_one!(problem!(Energy, Both, [-NONE, 1.0], [1.0, NONE]), [0.0, 0.5]);
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.0, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[1.0, 0.0], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -349,9 +373,9 @@ fn d22_redundant_periodicity() -> Test {
     let problem = Problem::new(Map::<KeepsOne, f64>::new()).stage_cost(GeneralCost::<Around>::new());
     let mut ocp = problem.on(Horizon::uniform(6, 1.0))?;
     ocp.free_initial_state().periodic("x")?.guess(&[0.0, 0.3], &[0.1])?;
-    run(&mut ocp, |ocp, outcome| {
+    solve_and_check(&mut ocp, |ocp, outcome| {
         let stages = || (0..=6).filter_map(|k| ocp.stage(k).ok());
-        outcome.is_solved() && stages().all(|stage| near(stage.x, &[1.0, 1.6], 1e-6))
+        outcome.is_solved() && stages().all(|stage| assert_near(stage.x, &[1.0, 1.6], 1e-6))
     })?;
     Ok(())
 }
@@ -363,7 +387,9 @@ fn d23_periodicity_of_given_states() -> Test {
     let mut ocp = problem.on(Horizon::uniform(1, 1.0))?;
     ocp.fix_initial_state(&[1.0, 1.0])?.bound("x[1]", 1.., 1.0, 1.0)?.periodic("x")?;
     ocp.guess(&[0.0, 0.3], &[0.1])?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[0.5], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[0.5], 1e-6)
+    })?;
     Ok(())
 }
 
@@ -376,6 +402,8 @@ fn d24_shared_control_with_bounds_everywhere() -> Test {
         .shared("u[0]")?
         .bound("u[0]", .., -1.0, 1.5)?
         .guess(&[0.0], &[0.1, 0.3])?;
-    run(&mut ocp, |ocp, outcome| outcome.is_solved() && near(&u(ocp), &[1.5, 0.0], 1e-6))?;
+    solve_and_check(&mut ocp, |ocp, outcome| {
+        outcome.is_solved() && assert_near(&first_controls(ocp), &[1.5, 0.0], 1e-6)
+    })?;
     Ok(())
 }

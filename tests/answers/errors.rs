@@ -34,7 +34,7 @@ macro_rules! problem {
 }
 
 #[test]
-fn names() -> Test {
+fn messages_about_names() -> Test {
     let mut ocp = problem!();
     let Err(error) = ocp.bound("speed", .., 0.0, 1.0).map(|_| ()) else { return Err("no error".into()) };
     assert_eq!(
@@ -50,23 +50,23 @@ fn names() -> Test {
 }
 
 /// The text of an error.
-fn text<V>(result: Result<V, OcpError>) -> String {
+fn message<V>(result: Result<V, OcpError>) -> String {
     result.err().map(|error| error.to_string()).unwrap_or_default()
 }
 
 #[test]
-fn stages() -> Test {
+fn messages_about_stages() -> Test {
     let mut ocp = problem!();
     assert_eq!(
-        text(ocp.bound("x", 2..=4, 0.0, 1.0)),
+        message(ocp.bound("x", 2..=4, 0.0, 1.0)),
         "there is no stage 4: the bounds of the states are at stages 0 to 3"
     );
     assert_eq!(
-        text(ocp.bound("u", 3..=3, 0.0, 1.0)),
+        message(ocp.bound("u", 3..=3, 0.0, 1.0)),
         "there is no stage 3: the bounds of the controls are at stages 0 to 2"
     );
     assert_eq!(
-        text(ocp.bound("u", 3.., 0.0, 1.0)),
+        message(ocp.bound("u", 3.., 0.0, 1.0)),
         "there is no stage 3: the bounds of the controls are at stages 0 to 2"
     );
     assert!(matches!(
@@ -88,7 +88,7 @@ fn stages() -> Test {
 fn ranges_without_stages() -> Test {
     let mut ocp = problem!();
     assert_eq!(
-        text(ocp.bound("x", 2..2, 0.0, 1.0)),
+        message(ocp.bound("x", 2..2, 0.0, 1.0)),
         "the range of stages 2..2 is empty: the bounds of the states are at stages 0 to 3"
     );
     let empty =
@@ -108,7 +108,7 @@ fn ranges_without_stages() -> Test {
 fn softening_without_bounds() -> Test {
     let mut ocp = problem!();
     assert_eq!(
-        text(ocp.soften("x[1]", 1.., 1e3, 0.0)),
+        message(ocp.soften("x[1]", 1.., 1e3, 0.0)),
         "`x[1]` has no finite bound at stages 1 to 3: call `bound` before `soften`"
     );
     ocp.bound("x[0]", 2..=2, 0.0, f64::INFINITY)?;
@@ -147,7 +147,7 @@ fn bounds_before_the_initial_state_is_free() -> Test {
 }
 
 #[test]
-fn values() -> Test {
+fn messages_about_values() -> Test {
     let mut ocp = problem!();
     assert!(matches!(
         ocp.bound("x[1]", 2.., 1.0, 0.0),
@@ -161,11 +161,11 @@ fn values() -> Test {
         })
     ));
     assert_eq!(
-        text(ocp.bound("x[1]", 2.., 1.0, 0.0)),
+        message(ocp.bound("x[1]", 2.., 1.0, 0.0)),
         "stage 2: the lower bound 1 of `x[1]` is above the upper bound 0"
     );
     assert_eq!(
-        text(ocp.bound("u", .., f64::NAN, 0.0)),
+        message(ocp.bound("u", .., f64::NAN, 0.0)),
         "stage 0: a bound of `u[0]` is NaN: it must be a number, -inf for no lower bound, or inf for no upper bound"
     );
     assert!(matches!(
@@ -174,7 +174,7 @@ fn values() -> Test {
     ));
     ocp.bound("u", .., -1.0, 1.0)?;
     assert_eq!(
-        text(ocp.soften("u", .., -1.0, 0.0)),
+        message(ocp.soften("u", .., -1.0, 0.0)),
         "stage 0: a penalty of `u[0]` is -1: it must be at least 0, and finite if quadratic"
     );
     for (linear, quadratic) in [(f64::NAN, 0.0), (1.0, -1.0), (1.0, f64::INFINITY), (1.0, f64::NAN)] {
@@ -184,31 +184,37 @@ fn values() -> Test {
         ));
     }
     assert_eq!(
-        text(ocp.set_path_bounds(1.., &[2.0], &[1.0])),
+        message(ocp.set_path_bounds(1.., &[2.0], &[1.0])),
         "stage 1: the lower bound 2 of output 0 of `Root` is above the upper bound 1"
     );
     assert_eq!(
-        text(ocp.set_reference(1.., &[0.0, f64::NAN])),
+        message(ocp.set_reference(1.., &[0.0, f64::NAN])),
         "stage 1: the reference of output 1 of `Output` is NaN: it must be finite"
     );
-    assert_eq!(text(ocp.set_parameters(1.., &[f64::INFINITY])), "stage 1: `p[0]` is inf: it must be finite");
     assert_eq!(
-        text(ocp.fix_initial_state(&[0.0, f64::NAN])),
+        message(ocp.set_parameters(1.., &[f64::INFINITY])),
+        "stage 1: `p[0]` is inf: it must be finite"
+    );
+    assert_eq!(
+        message(ocp.fix_initial_state(&[0.0, f64::NAN])),
         "the initial value of `x[1]` is NaN: it must be finite"
     );
-    assert_eq!(text(ocp.guess_stage(2, &[0.0; 2], &[f64::NAN])), "stage 2: `u[0]` is NaN: it must be finite");
+    assert_eq!(
+        message(ocp.guess_stage(2, &[0.0; 2], &[f64::NAN])),
+        "stage 2: `u[0]` is NaN: it must be finite"
+    );
     Ok(())
 }
 
 #[test]
-fn lengths() -> Test {
+fn messages_about_lengths() -> Test {
     let mut ocp = problem!();
-    assert_eq!(text(ocp.fix_initial_state(&[0.0])), "the initial state has 1 element instead of 2");
+    assert_eq!(message(ocp.fix_initial_state(&[0.0])), "the initial state has 1 element instead of 2");
     assert!(matches!(
         ocp.fix_initial_state(&[0.0; 3]),
         Err(OcpError::Length { part: Part::InitialState, stage: 0, expected: 2, found: 3 })
     ));
-    assert_eq!(text(ocp.set_parameters(.., &[])), "stage 0: the parameters have 0 elements instead of 1");
+    assert_eq!(message(ocp.set_parameters(.., &[])), "stage 0: the parameters have 0 elements instead of 1");
     assert!(matches!(
         ocp.set_path_bounds(.., &[0.0], &[]),
         Err(OcpError::Length { part: Part::PathBounds, expected: 1, found: 0, .. })
@@ -221,7 +227,7 @@ fn lengths() -> Test {
 }
 
 #[test]
-fn what_is_missing() -> Test {
+fn messages_about_missing_parts() -> Test {
     let mut ocp = problem!();
     let mut sqp = HeapSqp::new(&ocp)?;
     ocp.guess(&[1.0; 2], &[0.0])?;
@@ -235,11 +241,11 @@ fn what_is_missing() -> Test {
 }
 
 #[test]
-fn horizons() {
+fn messages_about_horizons() {
     let problem = |horizon| Problem::new(Map::<Next, f64>::new()).on(horizon).map(|_| ());
     for horizon in [Horizon::uniform(0, 0.1), Horizon::nodes(&[]), Horizon::nodes(&[1.0])] {
         assert_eq!(
-            text(problem(horizon)),
+            message(problem(horizon)),
             "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times"
         );
     }
@@ -297,7 +303,7 @@ fn exported_horizons_of_absurd_sizes() {
 
 /// Functions of what does not exist where they are evaluated.
 #[test]
-fn what_does_not_exist() {
+fn functions_at_missing_stages() {
     let terminal = Problem::new(Map::<Next, f64>::new())
         .terminal_cost(LeastSquaresCost::<Output>::diagonal(&[1.0; 2]))
         .on(Horizon::uniform(3, 0.1));
@@ -333,10 +339,10 @@ fn functions_without_a_derivative() -> Test {
     ocp.guess_stage(2, &[0.0; 2], &[0.0])?;
     let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: take another guess, or bounds \
                     that keep the variables inside its domain";
-    assert_eq!(text(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
-    assert_eq!(text(HeapIpm::new(&ocp)?.solve(&mut ocp)), expected);
+    assert_eq!(message(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
+    assert_eq!(message(HeapIpm::new(&ocp)?.solve(&mut ocp)), expected);
     let mut controller = HeapRealTime::new(ocp)?;
-    assert_eq!(text(controller.prepare()?.feedback(&[1.0; 2])), expected);
+    assert_eq!(message(controller.prepare()?.feedback(&[1.0; 2])), expected);
     Ok(())
 }
 
@@ -348,9 +354,9 @@ fn iterates_that_are_not_finite() -> Test {
     let mut sqp = HeapSqp::new(&ocp)?;
     let place = ocp.iterate_mut().stage_mut(1).ok_or("no stage")?;
     (place.dynamics[1], place.g_upper[0]) = (f64::NAN, f64::NAN);
-    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `x[1]` is NaN: it must be finite");
+    assert_eq!(message(sqp.solve(&mut ocp)), "stage 1: a multiplier of `x[1]` is NaN: it must be finite");
     ocp.iterate_mut().stage_mut(1).ok_or("no stage")?.dynamics[1] = 0.0;
-    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `Root` is NaN: it must be finite");
+    assert_eq!(message(sqp.solve(&mut ocp)), "stage 1: a multiplier of `Root` is NaN: it must be finite");
     Ok(())
 }
 

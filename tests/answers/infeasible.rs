@@ -25,7 +25,7 @@ fn square(x: [f64; 1], _u: [f64; 1]) -> f64 {
 
 /// Three steps of one at most do not reach five: the end is missed by two, and is named.
 #[test]
-fn out_of_reach() -> Test {
+fn unreachable_end() -> Test {
     for elastic in [true, false] {
         let mut ocp = Problem::new(Map::<Step, f64>::new())
             .stage_cost(LeastSquaresCost::<Size>::diagonal(&[1e-3, 1e-3]))
@@ -67,7 +67,7 @@ fn out_of_reach() -> Test {
 /// `x² ≥ 1` at the end, linearised at `x = 0.1`, asks for `x ≥ 5.05`, which bounds forbid: the
 /// first QP is infeasible, the problem is not.
 #[test]
-fn infeasible_on_the_way() -> Test {
+fn infeasible_linearisations() -> Test {
     for globalisation in [Globalisation::FullStep, Globalisation::Merit, Globalisation::Filter] {
         let mut ocp = Problem::new(Map::<Step, f64>::new())
             .stage_cost(LeastSquaresCost::<Size>::diagonal(&[0.1, 1.0]))
@@ -87,7 +87,7 @@ fn infeasible_on_the_way() -> Test {
 
 /// An observer that has seen enough.
 #[test]
-fn observers_may_stop() -> Test {
+fn stop_by_observers() -> Test {
     let mut ocp = Problem::new(Map::<Step, f64>::new())
         .stage_cost(LeastSquaresCost::<Size>::diagonal(&[1.0, 1.0]))
         .terminal_constraints(Constraint::<Square>::new([1.0], [f64::INFINITY]))

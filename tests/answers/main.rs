@@ -4,20 +4,20 @@
 mod coupled_derivatives;
 mod debug;
 mod degenerate;
+mod distant_solutions;
 mod errors;
 mod failing_intervals;
-mod far;
 mod infeasible;
 mod mass;
 mod messages;
 mod outcomes;
 mod print;
+mod remedies;
 mod return_map;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;
 mod verdicts;
-mod ways_out;
 mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

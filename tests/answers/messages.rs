@@ -26,13 +26,13 @@ fn problem(weights: [f64; 2], horizon: Horizon<'_, f64>) -> Result<HeapOcp<impl 
 }
 
 /// The text of an error.
-fn text<V, E: Display>(result: Result<V, E>) -> String {
+fn message<V, E: Display>(result: Result<V, E>) -> String {
     result.err().map(|error| error.to_string()).unwrap_or_default()
 }
 
 #[test]
-fn of_a_horizon_and_weights() {
-    let horizon = |n, h| text(problem([1.0; 2], Horizon::uniform(n, h)));
+fn messages_about_horizons_and_weights() {
+    let horizon = |n, h| message(problem([1.0; 2], Horizon::uniform(n, h)));
     assert_eq!(
         horizon(0, 0.1),
         "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times"
@@ -40,64 +40,64 @@ fn of_a_horizon_and_weights() {
     assert_eq!(horizon(3, 0.0), "interval 0 goes from 0 to 0: times of nodes must be finite and increasing");
     for (weight, shown) in [(-2.0, "-2"), (f64::NAN, "NaN")] {
         assert_eq!(
-            text(problem([1.0, weight], Horizon::uniform(3, 0.1))),
+            message(problem([1.0, weight], Horizon::uniform(3, 0.1))),
             format!("the weight of output 1 of `Deviation` is {shown}: it must be finite and at least 0")
         );
     }
 }
 
 #[test]
-fn of_values_by_name() -> Test {
+fn messages_about_values_by_name() -> Test {
     let mut ocp = problem([1.0; 2], Horizon::uniform(3, 0.1))?;
     assert_eq!(
-        text(ocp.bound("speed", .., 0.0, 1.0)),
+        message(ocp.bound("speed", .., 0.0, 1.0)),
         "`Cart` has no variable `speed` of this kind. States: `x[0]`, `x[1]`; controls: `u`"
     );
     assert_eq!(
-        text(ocp.bound("u", .., f64::NAN, 1.0)),
+        message(ocp.bound("u", .., f64::NAN, 1.0)),
         "stage 0: a bound of `u` is NaN: it must be a number, -inf for no lower bound, or inf for no upper bound"
     );
     assert_eq!(
-        text(ocp.bound("x[1]", 1.., 2.0, 1.0)),
+        message(ocp.bound("x[1]", 1.., 2.0, 1.0)),
         "stage 1: the lower bound 2 of `x[1]` is above the upper bound 1"
     );
     assert_eq!(
-        text(ocp.bound("u", 3.., 0.0, 1.0)),
+        message(ocp.bound("u", 3.., 0.0, 1.0)),
         "there is no stage 3: the bounds of the controls are at stages 0 to 2"
     );
     assert_eq!(
-        text(ocp.soften("u", .., 1.0, 1.0)),
+        message(ocp.soften("u", .., 1.0, 1.0)),
         "`u` has no finite bound at stages 0 to 2: call `bound` before `soften`"
     );
-    assert_eq!(text(ocp.fix_initial_state(&[1.0])), "the initial state has 1 element instead of 2");
+    assert_eq!(message(ocp.fix_initial_state(&[1.0])), "the initial state has 1 element instead of 2");
     assert_eq!(
-        text(ocp.fix_initial_state(&[1.0, f64::NAN])),
+        message(ocp.fix_initial_state(&[1.0, f64::NAN])),
         "the initial value of `x[1]` is NaN: it must be finite"
     );
     assert_eq!(
-        text(ocp.set_terminal_reference(&[1.0])),
+        message(ocp.set_terminal_reference(&[1.0])),
         "the reference of the terminal cost has 1 element instead of 0: the problem has none"
     );
     ocp.fix_initial_state(&[1.0, 0.0])?;
     assert_eq!(
-        text(ocp.solution()?.state("speed")),
+        message(ocp.solution()?.state("speed")),
         "the solution of `Cart` has no `speed`: it has `x[0]`, `x[1]`"
     );
     Ok(())
 }
 
 #[test]
-fn of_runs() -> Test {
+fn messages_about_runs() -> Test {
     let mut ocp = problem([1.0; 2], Horizon::uniform(3, 0.1))?;
     let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     assert_eq!(
-        text(sqp.solve(&mut ocp)),
+        message(sqp.solve(&mut ocp)),
         "the initial state is undefined: call `fix_initial_state` or `free_initial_state`"
     );
     ocp.fix_initial_state(&[1.0, 0.0])?;
     let other = problem([1.0; 2], Horizon::uniform(4, 0.1))?;
     assert_eq!(
-        text(HeapSqp::new(&other)?.gauss_newton().solve(&mut ocp)),
+        message(HeapSqp::new(&other)?.gauss_newton().solve(&mut ocp)),
         "dimensions of another problem: 5 instead of 4 at stage 0. Make solvers and memory for each problem: \
          `HeapSqp::new(&ocp)`"
     );
@@ -113,18 +113,18 @@ fn of_runs() -> Test {
 }
 
 #[test]
-fn of_integrators() -> Test {
+fn messages_of_integrators() -> Test {
     let mut irk = Irk::<Outflow, Gauss<2>>::new(Options::default())?;
     assert_eq!(
-        text(irk.solve(&Vector1::new(f64::NAN), &vector![], 0.1)),
+        message(irk.solve(&Vector1::new(f64::NAN), &vector![], 0.1)),
         "`x` of x0 is NaN: it must be finite"
     );
     assert_eq!(
-        text(irk.solve(&Vector1::new(1.0), &vector![], f64::INFINITY)),
+        message(irk.solve(&Vector1::new(1.0), &vector![], f64::INFINITY)),
         "the length `h` of the interval is inf: it must be finite"
     );
     assert_eq!(
-        text(irk.solve(&Vector1::new(-1.0), &vector![], 0.1)),
+        message(irk.solve(&Vector1::new(-1.0), &vector![], 0.1)),
         "equation 0 of the model is NaN at step 0, stage 0, iteration 0: look for roots, logarithms or quotients outside \
          of their domains, or take shorter steps"
     );
@@ -133,7 +133,7 @@ fn of_integrators() -> Test {
 
 /// Terms are those of the field, and the way out is a call.
 #[test]
-fn of_the_terms_of_the_field() {
+fn terms_of_the_field_in_messages() {
     let limit = Status::MaxIterations.to_string();
     assert!(limit.starts_with("not converged: the maximum number of iterations was reached"), "{limit}");
     assert!(limit.contains("Raise `options.max_iterations`"), "{limit}");
@@ -164,7 +164,7 @@ fn bead(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
 /// Sample points need not be on the wire. Where `x[0]` is negative the constraint has no gradient,
 /// which is no fault of the mechanism: some have the full rank, and none is called singular.
 #[test]
-fn of_a_constraint_whose_gradient_vanishes_off_the_mechanism() {
+fn messages_about_vanishing_constraint_gradients() {
     let text = Bead::describe().to_string();
     let rank = text.lines().find(|line| line.contains("sample points")).unwrap_or_default();
     assert!(rank.contains("rank") && rank.contains("which need not satisfy the constraints"), "{text}");

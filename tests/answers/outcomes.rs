@@ -39,7 +39,7 @@ macro_rules! outcomes {
     }};
 }
 
-fn assert_convex(outcomes: [Outcome; 2], is_convex: bool) {
+fn assert_convexity(outcomes: [Outcome; 2], is_convex: bool) {
     for outcome in outcomes {
         assert!(outcome.is_converged() && outcome.is_convex == is_convex, "{outcome:?}");
         let local = outcome.to_string().starts_with("converged to a local solution after");
@@ -55,12 +55,12 @@ fn solutions_are_local_unless_the_problem_is_convex() -> Test {
     let squares = || LeastSquaresCost::<Both>::diagonal(&[1.0; 2]);
     let horizon = || Horizon::uniform(4, 0.1);
     let linear = || Constraint::<Sum>::new([-3.0], [3.0]);
-    assert_convex(outcomes!(map().stage_cost(squares()).on(horizon())?), true);
-    assert_convex(outcomes!(map().stage_cost(squares()).path_constraints(linear()).on(horizon())?), true);
+    assert_convexity(outcomes!(map().stage_cost(squares()).on(horizon())?), true);
+    assert_convexity(outcomes!(map().stage_cost(squares()).path_constraints(linear()).on(horizon())?), true);
     // The same cost, of which nobody sees that it is convex.
-    assert_convex(outcomes!(map().stage_cost(GeneralCost::<Square>::new()).on(horizon())?), false);
+    assert_convexity(outcomes!(map().stage_cost(GeneralCost::<Square>::new()).on(horizon())?), false);
     let curved = || Constraint::<Product>::new([-3.0], [3.0]);
-    assert_convex(outcomes!(map().stage_cost(squares()).path_constraints(curved()).on(horizon())?), false);
+    assert_convexity(outcomes!(map().stage_cost(squares()).path_constraints(curved()).on(horizon())?), false);
     Ok(())
 }
 
@@ -78,7 +78,7 @@ fn deviation(x: [f64; 2], u: f64) -> [f64; 3] {
 }
 
 #[test]
-fn models_are_linear_or_not() -> Test {
+fn linearity_of_models() -> Test {
     macro_rules! solved {
         ($model:ty) => {{
             let mut ocp = Problem::new(Irk::<$model, Gauss<2>>::new(Options::default())?)
@@ -106,7 +106,10 @@ fn inflow(_x: f64, _z: f64, u: f64) -> f64 {
 }
 
 /// The bound that is violated most, by the trajectory of the iterate: its code is another one.
-fn assert_named<P: casados::ocp::Formulation<f64>>(ocp: &mut HeapOcp<P>, outcome: &Outcome) -> Test {
+fn assert_named_constraint<P: casados::ocp::Formulation<f64>>(
+    ocp: &mut HeapOcp<P>,
+    outcome: &Outcome,
+) -> Test {
     let (constraint, violation) = outcome.violated.ok_or("no bound is named")?;
     let solution = ocp.solution()?;
     let largest = solution.violations(0.0);
@@ -122,7 +125,7 @@ fn assert_named<P: casados::ocp::Formulation<f64>>(ocp: &mut HeapOcp<P>, outcome
 
 /// Walls on both sides that exclude each other, and runs that end before they can say so.
 #[test]
-fn walls_that_contradict_each_other_are_named() -> Test {
+fn names_of_contradictory_constraints() -> Test {
     for iterations in [0, 1] {
         let mut ocp = Problem::new(Map::<Add, f64>::new())
             .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
@@ -133,7 +136,7 @@ fn walls_that_contradict_each_other_are_named() -> Test {
         sqp.options.max_iterations = iterations;
         let outcome = sqp.solve(&mut ocp)?;
         assert_eq!(outcome.status, Status::MaxIterations, "{outcome}");
-        assert_named(&mut ocp, &outcome)?;
+        assert_named_constraint(&mut ocp, &outcome)?;
     }
     // Constraints of algebraic states, which are those of the iterate.
     let mut ocp = Problem::new(Irk::<Tank, RadauIIA<2>>::new(Options::default())?)
@@ -151,12 +154,12 @@ fn walls_that_contradict_each_other_are_named() -> Test {
     );
     // At the guess the outflow is 0.1; at nodes it is that of the polynomial through the stages.
     assert!((violation - 4.9).abs() < 1e-4, "{violation}: {outcome}");
-    assert_named(&mut ocp, &outcome)
+    assert_named_constraint(&mut ocp, &outcome)
 }
 
 /// Soft bounds may be violated, and a status that names a constraint needs no other one.
 #[test]
-fn nothing_else_is_named() -> Test {
+fn statuses_without_a_constraint() -> Test {
     let make = || -> Result<_, Box<dyn std::error::Error>> {
         let mut ocp = Problem::new(Map::<Add, f64>::new())
             .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))

@@ -33,7 +33,7 @@ fn corners(x: [f64; 2], _u: [f64; 2], _p: f64) -> [f64; 2] {
 }
 
 #[test]
-fn everything_that_can_be_said() -> Test {
+fn printed_problems() -> Test {
     let infinity = f64::INFINITY;
     let integral = casados::LeastSquares::<Effort>::new(&nalgebra::matrix![1.0, 0.0; 0.0, 1.0]);
     let mut ocp =
@@ -86,7 +86,7 @@ Slider: 6 intervals, t from 0 to 1.5
 
 /// A copy is solved as the original is, and neither knows of the other.
 #[test]
-fn copies() -> Test {
+fn copies_of_problems() -> Test {
     macro_rules! problem {
         ($dynamics:expr) => {{
             let mut ocp = Problem::new($dynamics)

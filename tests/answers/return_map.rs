@@ -33,7 +33,7 @@ fn batch() -> Result<Shooting<Irk<Duffing, Gauss<3>>>, Error> {
 /// is even, and twice that of a half. Solutions are those of the tolerance 1e-6 of the solvers
 /// with curvatures of one, whose last step is quadratic.
 #[test]
-fn half_of_a_symmetric_period() -> Test {
+fn half_period_of_a_symmetric_orbit() -> Test {
     const HALF: usize = 12;
     let cost = || GeneralCost::<Price>::new();
     let mut whole =
@@ -104,7 +104,7 @@ where
 
 /// The same numbers up to rounding, iterates too, since all derivatives are the same.
 #[test]
-fn a_map_beside_dynamics_that_contain_it() -> Test {
+fn return_map_within_the_dynamics() -> Test {
     let mut apart = on(ReturnMap::<Bend, _>::new(Map::<Stir, f64>::new()))?;
     let mut whole = on(Map::<StirAndBend, f64>::new())?;
     let (mut one, mut other) = (HeapSqp::new(&apart)?, HeapSqp::new(&whole)?);
@@ -142,7 +142,7 @@ fn effort(_x: f64, u: f64) -> f64 {
 
 /// The error has the name of the map and the number of the interval.
 #[test]
-fn a_map_that_is_not_finite() -> Test {
+fn return_maps_that_are_not_finite() -> Test {
     let dynamics = ReturnMap::<Logarithm, _>::new(Map::<Climb, f64>::new());
     let mut ocp =
         Problem::new(dynamics).stage_cost(GeneralCost::<Effort>::new()).on(Horizon::uniform(3, 1.0))?;

@@ -33,7 +33,7 @@ fn speed(x: [f64; 3], u: [f64; 1]) -> f64 {
 
 /// With bounds of controls, a constraint of the path and a soft bound that are active somewhere.
 #[test]
-fn differences_of_solutions() -> Test {
+fn sensitivities_by_differences() -> Test {
     let n = 12;
     let mut ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
         .stage_cost(LeastSquaresCost::<Tracking>::diagonal(&[1.0; 3]))
@@ -93,7 +93,7 @@ fn differences_of_solutions() -> Test {
 /// A long horizon without bounds: gains of the regulator, and `x_k = dx_k/dx₀ x₀`, since everything
 /// is linear.
 #[test]
-fn linear_problems() -> Test {
+fn sensitivities_of_linear_problems() -> Test {
     let mut ocp = Problem::new(Map::<Push, f64>::new())
         .stage_cost(LeastSquaresCost::<Both>::diagonal(&[2.0, 1.0, 0.5]))
         .on(Horizon::uniform(25, 0.1))?;
@@ -208,7 +208,7 @@ const EXACT: Exact = Exact { convexification: Convexification::None };
 /// integrator, of one with an integral, of a map; exact and of Gauss and Newton. Constraints are
 /// active somewhere.
 #[test]
-fn parameters_as_states() -> Test {
+fn sensitivities_by_parameters_as_states() -> Test {
     macro_rules! compare {
         ($dynamics:ident, $curvature:expr) => {{
             let x0 = [-0.8, 0.1, P[0], P[1]];
@@ -259,7 +259,7 @@ fn parameters_as_states() -> Test {
 
 /// Differences of solutions with other parameters.
 #[test]
-fn differences_by_parameters() -> Test {
+fn parameter_sensitivities_by_differences() -> Test {
     let x0 = [-0.8, 0.1];
     let (ocp, result) = solved!(parameters, integrator!(parameters), x0, P, EXACT);
     let bounded = ocp.iterate().stages().filter(|s| s.u_upper.iter().any(|&m| m > 1e-3)).count();
@@ -288,7 +288,7 @@ fn differences_by_parameters() -> Test {
 
 /// A stage that there is not has no derivatives, however large its number is.
 #[test]
-fn stages_that_there_are_not() -> Test {
+fn sensitivities_at_missing_stages() -> Test {
     let ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
         .terminal_cost(GeneralCost::<Energy>::new())
         .on(Horizon::uniform(3, 0.1))?;
@@ -316,7 +316,7 @@ fn little(_x: f64, u: f64, p: f64) -> f64 {
 }
 
 #[test]
-fn derivatives_that_are_not_finite() -> Test {
+fn sensitivities_that_are_not_finite() -> Test {
     let mut ocp = Problem::new(Map::<Steep, f64>::new())
         .stage_cost(LeastSquaresCost::<Little>::diagonal(&[1.0]))
         .on(Horizon::uniform(5, 1.0))?;

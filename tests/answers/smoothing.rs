@@ -88,7 +88,7 @@ fn weakly_active_bounds() -> Test {
 
 /// Mistakes have names.
 #[test]
-fn refusals() -> Test {
+fn refused_options() -> Test {
     let build = |n: usize| -> Result<_, OcpError> {
         let problem = Problem::new(Map::<Push, f64>::new());
         let problem = problem.stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 3]));

@@ -15,7 +15,7 @@ use nalgebra::{Matrix2, Matrix2x1, Matrix3, Vector2, matrix};
 pub const EXACT: Exact = Exact { convexification: Convexification::None };
 
 /// A solution, its value, and what `SolutionFactors` says of it, by `(x₀, p)`.
-pub struct Solved {
+pub struct SolutionDerivatives {
     value: f64,
     /// All states and controls.
     w: Vec<f64>,
@@ -31,7 +31,7 @@ pub struct Solved {
 const SEEDS: usize = 3;
 
 /// Elements of seeds, none of which is like another.
-fn seed(which: usize, element: usize) -> f64 {
+fn seed_entry(which: usize, element: usize) -> f64 {
     (1.3 * which as f64 + 0.7 * element as f64 + 0.2).sin()
 }
 
@@ -46,7 +46,7 @@ pub enum By {
 pub fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     mut ocp: HeapOcp<P>,
     by: By,
-) -> Result<Solved, Box<dyn std::error::Error>> {
+) -> Result<SolutionDerivatives, Box<dyn std::error::Error>> {
     let mut factors = SolutionFactors::new(&ocp)?;
     let value = match by {
         By::Sqp => {
@@ -86,7 +86,7 @@ pub fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
         for k in 0..=ocp.intervals() {
             let stage = lambda.stage_mut(k).ok_or("no stage")?;
             for value in stage.x.iter_mut().chain(stage.u) {
-                *value = seed(which, element);
+                *value = seed_entry(which, element);
                 element += 1;
             }
         }
@@ -97,11 +97,15 @@ pub fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     let active =
         ocp.iterate().stages().skip(1).flat_map(|s| [s.x_upper, s.u_lower, s.u_upper, s.g_upper].concat());
     let active = active.map(|multiplier| multiplier > 1e-4).collect();
-    Ok(Solved { value, w, active, gradient, hessian, adjoints })
+    Ok(SolutionDerivatives { value, w, active, gradient, hessian, adjoints })
 }
 
 /// Central differences of order six.
-fn difference(step: f64, f: impl Fn(f64) -> Solved, of: impl Fn(&Solved) -> Vec<f64>) -> Vec<f64> {
+fn difference(
+    step: f64,
+    f: impl Fn(f64) -> SolutionDerivatives,
+    of: impl Fn(&SolutionDerivatives) -> Vec<f64>,
+) -> Vec<f64> {
     let mut sum = Vec::new();
     for (distance, weight) in [(1.0, 45.0), (2.0, -9.0), (3.0, 1.0)] {
         let (plus, minus) = (of(&f(distance * step)), of(&f(-distance * step)));
@@ -117,7 +121,7 @@ fn difference(step: f64, f: impl Fn(f64) -> Solved, of: impl Fn(&Solved) -> Vec<
 pub fn check_by_differences(
     at: &[f64],
     by: By,
-    solve: impl Fn(&[f64]) -> Result<Solved, Box<dyn std::error::Error>>,
+    solve: impl Fn(&[f64]) -> Result<SolutionDerivatives, Box<dyn std::error::Error>>,
     tolerance: f64,
 ) -> Test {
     let here = solve(at)?;
@@ -141,7 +145,7 @@ pub fn check_by_differences(
             assert!(error < tolerance * (1.0 + slope.abs()), "{i} {j} {slope} {}", here.hessian[i][j]);
         }
         for (which, adjoint) in here.adjoints.iter().enumerate() {
-            let product: f64 = w.iter().enumerate().map(|(k, w)| seed(which, k) * w).sum();
+            let product: f64 = w.iter().enumerate().map(|(k, w)| seed_entry(which, k) * w).sum();
             let error = (product - adjoint[i]).abs();
             assert!(error < tolerance * (1.0 + product.abs()), "λ {which} {i} {product} {}", adjoint[i]);
         }
@@ -151,7 +155,7 @@ pub fn check_by_differences(
 
 /// The linear-quadratic regulator: `V = ½ x₀ᵀ P x₀` by Riccati's recursion, and the closed loop.
 #[test]
-fn value_of_the_regulator() -> Test {
+fn value_function_of_a_regulator() -> Test {
     let (a, b) = (Matrix2::new(1.0, 0.1, 0.0, 1.0), Matrix2x1::new(0.005, 0.1));
     let weights = matrix![2.0, 0.3, 0.1; 0.3, 1.0, 0.2; 0.1, 0.2, 0.5];
     let (q, s) =
@@ -181,7 +185,7 @@ fn value_of_the_regulator() -> Test {
     let (mut closed, mut expected) = (Matrix2::identity(), Vector2::zeros());
     for k in 0..=N {
         let stage = lambda.stage_mut(k).ok_or("no stage")?;
-        let (of_x, of_u) = (Vector2::new(seed(0, k), seed(1, k)), seed(2, k));
+        let (of_x, of_u) = (Vector2::new(seed_entry(0, k), seed_entry(1, k)), seed_entry(2, k));
         stage.x.copy_from_slice(of_x.as_slice());
         expected += closed.transpose() * of_x;
         if k < N {
@@ -253,7 +257,7 @@ pub(crate) use bounded;
 /// bound of the last state that is violated by more than the differences move it: where it is just
 /// reached, second derivatives jump.
 #[test]
-fn values_and_adjoints_are_differences_of_solutions() -> Test {
+fn value_function_and_adjoints_by_differences() -> Test {
     macro_rules! check {
         ($dynamics:expr) => {{
             let mut ocp = bounded!($dynamics, AT, x[0] <= -0.05, from N);
@@ -277,7 +281,7 @@ fn values_and_adjoints_are_differences_of_solutions() -> Test {
 
 /// Integral costs with parameters: squares, and a general one.
 #[test]
-fn integral_costs_have_derivatives_by_parameters() -> Test {
+fn parameter_derivatives_of_integral_costs() -> Test {
     let squares = |at: &[f64]| {
         let irk = Irk::<Pendulum, Gauss<2>>::new(Options::default())?;
         let along = WithIntegral::new(irk, LeastSquares::<Tracking>::new(&Matrix3::identity()));
@@ -311,7 +315,7 @@ fn power(x: [f64; 3], z: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 2] {
 }
 
 #[test]
-fn algebraic_states_have_derivatives_by_parameters() -> Test {
+fn parameter_derivatives_of_algebraic_states() -> Test {
     let solve = |at: &[f64]| {
         let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
             .running_cost(LeastSquaresCost::<Place>::new(&matrix![

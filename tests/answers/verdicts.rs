@@ -52,7 +52,7 @@ macro_rules! solve {
 /// At `u = 0` the gradient of `u₁² + u₂² = 1` vanishes: the start is beside it. Each control of the
 /// solution is `(−0.6, −0.8)`, and the objective minus one for each of them.
 #[test]
-fn directions_of_length_one_from_zero() -> Test {
+fn unit_directions_from_zero() -> Test {
     for n in [1_usize, 4, 25] {
         let make = || -> Result<_, Box<dyn std::error::Error>> {
             let mut ocp = Problem::new(Map::<Walk, f64>::new())
@@ -73,7 +73,7 @@ fn directions_of_length_one_from_zero() -> Test {
 /// The end is at least one away from where every state of the guess is: its gradient vanishes
 /// there. The least effort is that of a straight line, `n (10 / n)²`.
 #[test]
-fn ends_on_a_circle_around_the_guess() -> Test {
+fn degenerate_initial_guess() -> Test {
     for n in [2_usize, 10] {
         let make = || -> Result<_, Box<dyn std::error::Error>> {
             let mut ocp = Problem::new(Map::<Walk, f64>::new())
@@ -94,7 +94,7 @@ fn ends_on_a_circle_around_the_guess() -> Test {
 
 /// A guess where all gradients are numbers is where a run begins.
 #[test]
-fn other_guesses_stay() -> Test {
+fn regular_initial_guesses() -> Test {
     let make = || -> Result<_, Box<dyn std::error::Error>> {
         let mut ocp = Problem::new(Map::<Walk, f64>::new())
             .stage_cost(GeneralCost::<Tilted>::new())
@@ -136,7 +136,7 @@ fn shared(n: usize, a: f64, b: f64) -> Result<[Outcome; 2], Box<dyn std::error::
 }
 
 #[test]
-fn bounds_of_a_shared_control_contradict_each_other() -> Test {
+fn contradictory_bounds_of_a_shared_control() -> Test {
     for n in [3, 12] {
         for outcome in shared(n, 0.0, 0.5)? {
             let Status::Infeasible { constraint, violation } = outcome.status else {
@@ -158,7 +158,7 @@ type Sum<C> = HeapOcp<Problem<Map<Add, f64>, C>, f64>;
 /// `x₀ = 0`, `u ≥ c`: all controls are `c`, and the objective is `½ c² Σ (k² + 1)`, `17.5 c²` over
 /// five stages.
 #[test]
-fn bounded_problems_far_from_one_are_not_unbounded() -> Test {
+fn bounded_problems_with_large_solutions() -> Test {
     fn bounded<C>(mut ocp: Sum<C>, lower: f64, upper: f64) -> Result<Sum<C>, Box<dyn std::error::Error>>
     where
         Problem<Map<Add, f64>, C>: casados::ocp::Formulation<f64>,
@@ -191,7 +191,7 @@ fn bounded_problems_far_from_one_are_not_unbounded() -> Test {
 
 /// QPs that are found infeasible have iterations, too.
 #[test]
-fn iterations_of_infeasible_qps_are_counted() -> Test {
+fn iterations_of_infeasible_qps() -> Test {
     let mut ocp = Problem::new(Map::<Add, f64>::new())
         .stage_cost(GeneralCost::<Squares>::new())
         .on(Horizon::uniform(3, 1.0))?;

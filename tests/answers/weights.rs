@@ -23,7 +23,7 @@ fn mass(x: [f64; 2], u: f64) -> [f64; 2] {
 
 /// Weights of costs are those of a norm: `yᵀ W y ≥ 0`.
 #[test]
-fn weights() -> Test {
+fn definiteness_of_weights() -> Test {
     type Weighted = LeastSquaresCost<Output>;
     let refused = |cost: Weighted| {
         let stage = Problem::new(Map::<Next, f64>::new()).stage_cost(cost);

@@ -12,7 +12,7 @@ use nalgebra::{SVector, Vector1, vector};
 /// most thirty on a path through a stage (the model, its derivatives, the sums over stages), each
 /// to ε/2 of what is summed up; models here are scaled so that a step enlarges no error by more
 /// than a half. So results of `n` steps of `s` stages are `30 n s ε` apart at most.
-fn rounding(steps: usize, stages: usize) -> f64 {
+fn rounding_tolerance(steps: usize, stages: usize) -> f64 {
     30.0 * (steps * stages) as f64
 }
 
@@ -20,30 +20,30 @@ fn rounding(steps: usize, stages: usize) -> f64 {
 #[test]
 fn every_number_of_intervals() -> Test {
     for count in 1..=17 {
-        check::<Erk<_, Rk4, _>>(steps(1), &pendulum::<f64>(count), rounding(1, 4))?;
-        check::<Erk<_, Rk4, _>>(steps(2), &pendulum::<f32>(count), rounding(2, 4))?;
-        check::<Erk<_, Rk4, _>>(steps(3), &quadrotor(count), rounding(3, 4))?;
+        check::<Erk<_, Rk4, _>>(steps(1), &pendulum::<f64>(count), rounding_tolerance(1, 4))?;
+        check::<Erk<_, Rk4, _>>(steps(2), &pendulum::<f32>(count), rounding_tolerance(2, 4))?;
+        check::<Erk<_, Rk4, _>>(steps(3), &quadrotor(count), rounding_tolerance(3, 4))?;
     }
-    check::<Erk<_, Rk4, _>>(steps(4), &chain::<21>(40), rounding(4, 4))
+    check::<Erk<_, Rk4, _>>(steps(4), &chain::<21>(40), rounding_tolerance(4, 4))
 }
 
 #[test]
 fn every_method() -> Test {
     let horizon = quadrotor(11);
-    check::<Erk<_, Euler, _>>(steps(2), &horizon, rounding(2, 1))?;
-    check::<Erk<_, Midpoint, _>>(steps(2), &horizon, rounding(2, 2))?;
-    check::<Erk<_, Heun, _>>(steps(2), &horizon, rounding(2, 2))?;
-    check::<Erk<_, DormandPrince5, _>>(steps(2), &horizon, rounding(2, 6))?;
-    check::<Erk<_, Butcher6, _>>(steps(2), &horizon, rounding(2, 7))?;
-    check::<Erk<_, DormandPrince8, _>>(steps(2), &horizon, rounding(2, 12))?;
+    check::<Erk<_, Euler, _>>(steps(2), &horizon, rounding_tolerance(2, 1))?;
+    check::<Erk<_, Midpoint, _>>(steps(2), &horizon, rounding_tolerance(2, 2))?;
+    check::<Erk<_, Heun, _>>(steps(2), &horizon, rounding_tolerance(2, 2))?;
+    check::<Erk<_, DormandPrince5, _>>(steps(2), &horizon, rounding_tolerance(2, 6))?;
+    check::<Erk<_, Butcher6, _>>(steps(2), &horizon, rounding_tolerance(2, 7))?;
+    check::<Erk<_, DormandPrince8, _>>(steps(2), &horizon, rounding_tolerance(2, 12))?;
     let compensated = Options { compensated: true, ..steps(3) };
-    check::<Erk<_, Rk4, _>>(compensated, &horizon, rounding(3, 4))?;
+    check::<Erk<_, Rk4, _>>(compensated, &horizon, rounding_tolerance(3, 4))?;
     // Kutta's method of order three.
     let (a, b) = ([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [-1.0, 2.0, 0.0]], [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0]);
     let tableau = Tableau::new(a, b, [0.0, 0.5, 1.0])?;
     let batch = Integrator::<Erk<Quadrotor, Custom<3>>>::with_tableau(steps(2), tableau)?;
     let single = Erk::<Quadrotor, Custom<3>>::with_tableau(steps(2), tableau)?;
-    check_with(batch, single, &horizon, rounding(2, 3))
+    check_with(batch, single, &horizon, rounding_tolerance(2, 3))
 }
 
 /// Hovering, all of them elsewhere.
@@ -124,7 +124,7 @@ fn closed_form() -> Test {
                 result.h_pp[0],
             ];
             // Numbers are below 64: `t u`, and what is summed up to them.
-            let limit = rounding(1, 4) * f64::EPSILON * 64.0;
+            let limit = rounding_tolerance(1, 4) * f64::EPSILON * 64.0;
             for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
                 assert!((found - expected).abs() < limit, "{i} of {k}: {found:e}, {expected:e}");
             }

@@ -15,12 +15,12 @@ use reference_data::Record;
 pub type Test = Result<(), Box<dyn std::error::Error>>;
 
 /// Numbers of intervals: one alone, whole and incomplete groups of any register, and a horizon.
-pub const COUNTS: [usize; 5] = [1, 3, 4, 5, 40];
+pub const INTERVAL_COUNTS: [usize; 5] = [1, 3, 4, 5, 40];
 
 /// Pendulum and chain have Newton matrices with conditions of order ten; four steps add up.
-pub const ORDINARY: f64 = 2.0 * 100.0;
+pub const ORDINARY_TOLERANCE: f64 = 2.0 * 100.0;
 /// Aircraft: 6e3.
-pub const AIRCRAFT: f64 = 2.0 * 6e3;
+pub const AIRCRAFT_TOLERANCE: f64 = 2.0 * 6e3;
 
 /// Intervals of a model, with adjoint seeds.
 pub struct Horizon<M: Dae, T: Real = f64> {
@@ -79,7 +79,7 @@ pub fn aircraft(count: usize) -> Result<Horizon<Awe>, Box<dyn std::error::Error>
 }
 
 /// Two results are the same to so many ε.
-pub fn close<T: Real>(what: &str, bound: f64, pairs: &[(&[T], &[T])]) {
+pub fn assert_close<T: Real>(what: &str, bound: f64, pairs: &[(&[T], &[T])]) {
     for (field, (a, b)) in pairs.iter().enumerate() {
         let largest = b.iter().map(|b| b.to_f64().abs()).fold(0.0, f64::max);
         for (i, (a, b)) in a.iter().zip(*b).enumerate() {
@@ -136,16 +136,16 @@ pub fn check_with<I: Single>(
             single.set_parameters(p)?;
         }
         let expected = single.hessian(x0, u, h, lambda)?;
-        close("nominal", bound, pairs!(nominal[k], expected; x z z0));
+        assert_close("nominal", bound, pairs!(nominal[k], expected; x z z0));
         for result in [&forward[k], &both[k].forward, &hessian[k].first.forward] {
             let fields =
                 pairs!(result, expected; x z z0 dx_dx0 dx_du dx_dp dz_dx0 dz_du dz_dp dz0_dx0 dz0_du dz0_dp);
-            close("forward", bound, fields);
+            assert_close("forward", bound, fields);
         }
-        close("adjoint", bound, pairs!(adjoint[k], expected; x z z0 grad_x0 grad_u grad_p));
-        close("forward adjoint", bound, pairs!(both[k], expected; grad_x0 grad_u grad_p));
+        assert_close("adjoint", bound, pairs!(adjoint[k], expected; x z z0 grad_x0 grad_u grad_p));
+        assert_close("forward adjoint", bound, pairs!(both[k], expected; grad_x0 grad_u grad_p));
         let fields = pairs!(hessian[k], expected; grad_x0 grad_u grad_p h_xx h_xu h_uu h_xp h_up h_pp);
-        close("Hessian", bound, fields);
+        assert_close("Hessian", bound, fields);
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use nalgebra::{SVector, vector};
 /// `ẋ = p x + u` has `x(h) = e^{ph} x₀ + (e^{ph} − 1)/p u`. The error of Gauss with 8 stages is
 /// `(ph)¹⁷ (8!)²/((16!)² 17)·…` < 1e-19 at |ph| ≤ 1, and its second derivative in p below 1e-16.
 #[test]
-fn linear_model_meets_its_closed_form() {
+fn closed_form_of_a_linear_model() {
     let mut irk = Irk::<Linear, Gauss<8>>::new(Options::default()).unwrap();
     for (p, x0, u, h) in [(-1.0, 2.0, 0.3, 0.5), (0.7, -1.0, 0.5, -1.0), (1.0, 3.0, 0.0, 0.9)] {
         irk.set_parameters(&vector![p]).unwrap();
@@ -45,7 +45,7 @@ fn linear_model_meets_its_closed_form() {
 
 /// The last stage of Radau IIA is the end of the step, also for z.
 #[test]
-fn algebraic_states_at_the_end_solve_their_equation() {
+fn algebraic_states_at_the_end() {
     let mut irk = Irk::<Linear, RadauIIA<3>>::new(Options { steps: 3, ..Default::default() }).unwrap();
     irk.set_parameters(&vector![-20.0]).unwrap();
     let r = irk.forward(&vector![2.0], &vector![3.0], 0.5).unwrap();
@@ -57,7 +57,7 @@ fn algebraic_states_at_the_end_solve_their_equation() {
 
 /// From x = 1 to the equilibrium −u/p within a step of 10⁴ … 10¹² time constants.
 #[test]
-fn stiff_models_need_no_more_iterations() {
+fn iterations_of_stiff_models() {
     let mut irk = Irk::<Linear, RadauIIA<3>>::new(Options::default()).unwrap();
     for p in [-1e4, -1e6, -1e8, -1e10, -1e12] {
         irk.set_parameters(&vector![p]).unwrap();
@@ -75,7 +75,7 @@ fn stiff_models_need_no_more_iterations() {
 
 /// Scaling a linear problem by a power of two scales every result, to the last bit.
 #[test]
-fn powers_of_two_scale_through() {
+fn scaling_by_powers_of_two() {
     let mut irk = Irk::<Linear, RadauIIA<3>>::new(Options { steps: 2, ..Default::default() }).unwrap();
     irk.set_parameters(&vector![-3.0]).unwrap();
     let expected = *irk.forward(&vector![1.3], &vector![0.4], 0.7).unwrap();
@@ -111,7 +111,7 @@ fn no_differential_states() {
 /// A matrix of 450 unknowns (1.6 MB) and three of them in the record, on a thread with 2 MB of
 /// stack.
 #[test]
-fn large_models_stay_off_the_stack() {
+fn stack_of_large_models() {
     let run = || {
         let mut irk = Irk::<Rod, Gauss<3>>::new(Options { steps: 2, ..Default::default() }).unwrap();
         let x0 = Box::new(SVector::<f64, N>::from_fn(|i, _| (i as f64 / 10.0).sin()));
@@ -133,7 +133,7 @@ fn large_models_stay_off_the_stack() {
 }
 
 #[test]
-fn memory_inside_the_integrator_gives_the_same_bits() {
+fn inline_memory() {
     let options = Options { steps: 2, ..Default::default() };
     let (x0, u, p, lambda) = (vector![0.4, -0.7], vector![0.9], vector![1.3], vector![0.3, 1.7]);
     let mut heap = Irk::<Nonlinear, Gauss<2>>::new(options).unwrap();
@@ -159,14 +159,14 @@ fn memory_inside_the_integrator_gives_the_same_bits() {
 }
 
 #[test]
-fn integrators_can_move_to_other_threads() {
+fn integrators_on_other_threads() {
     fn check<T: Send>(_: &T) {}
     check(&Irk::<Nonlinear, Gauss<2>>::new(Options::default()).unwrap());
 }
 
 /// What the models of these tests say about themselves is true.
 #[test]
-fn patterns_and_facts() {
+fn declared_structures() {
     use casados_core::testing::{Points, check_pattern};
     check_pattern::<Nonlinear>(&Points::random(4)).assert();
     check_pattern::<Linear>(&Points::random(4)).assert();

@@ -48,7 +48,7 @@ fn difference<const R: usize>(mut f: impl FnMut(V4) -> SVector<f64, R>, w: V4) -
 const DIFFERENCE: f64 = 2e-11;
 
 /// Columns beside each other.
-fn join<const R: usize>(
+fn join_columns<const R: usize>(
     x: &SMatrix<f64, R, 2>,
     u: &SVector<f64, R>,
     p: &SVector<f64, R>,
@@ -89,9 +89,9 @@ for_methods!(forward_sensitivities_are_derivatives, B, {
         },
         point(),
     );
-    let x = join(&step.dx_dx0, &step.dx_du, &step.dx_dp);
-    let z = join(&step.dz_dx0, &step.dz_du, &step.dz_dp);
-    let z0 = join(&step.dz0_dx0, &step.dz0_du, &step.dz0_dp);
+    let x = join_columns(&step.dx_dx0, &step.dx_du, &step.dx_dp);
+    let z = join_columns(&step.dz_dx0, &step.dz_du, &step.dz_dp);
+    let z0 = join_columns(&step.dz0_dx0, &step.dz0_du, &step.dz0_dp);
     assert!((x - expected.fixed_rows::<2>(0)).amax() < DIFFERENCE, "{x} {expected}");
     assert!((z - expected.fixed_rows::<1>(2)).amax() < DIFFERENCE, "{z} {expected}");
     assert!((z0 - expected.fixed_rows::<1>(3)).amax() < DIFFERENCE, "{z0} {expected}");
@@ -101,7 +101,7 @@ for_methods!(adjoints_and_directions_agree_with_forward_sensitivities, B, {
     let mut irk = Irk::<Nonlinear, B>::new(options()).unwrap();
     let (x0, u) = at!(irk, point());
     let s = *irk.forward(&x0, &u, H).unwrap();
-    let full = join(&s.dx_dx0, &s.dx_du, &s.dx_dp);
+    let full = join_columns(&s.dx_dx0, &s.dx_du, &s.dx_dp);
     // Each is a sum of a few dozen products of numbers of order one.
     let rounding = 50.0 * f64::EPSILON;
 
@@ -133,8 +133,8 @@ for_methods!(adjoints_and_directions_agree_with_forward_sensitivities, B, {
     };
     let directional = irk.directional(&x0, &u, H, &seeds).unwrap();
     assert!((directional.dx - full * w).amax() < rounding);
-    assert!((directional.dz - join(&s.dz_dx0, &s.dz_du, &s.dz_dp) * w).amax() < rounding);
-    assert!((directional.dz0 - join(&s.dz0_dx0, &s.dz0_du, &s.dz0_dp) * w).amax() < rounding);
+    assert!((directional.dz - join_columns(&s.dz_dx0, &s.dz_du, &s.dz_dp) * w).amax() < rounding);
+    assert!((directional.dz0 - join_columns(&s.dz0_dx0, &s.dz0_du, &s.dz0_dp) * w).amax() < rounding);
 });
 
 for_methods!(hessians_are_derivatives_of_adjoints, B, {
@@ -198,8 +198,8 @@ for_methods!(dense_output_is_the_collocation_polynomial, B, {
                 },
                 point(),
             );
-            let x = join(&dense.dx_dx0, &dense.dx_du, &dense.dx_dp);
-            let z = join(&dense.dz_dx0, &dense.dz_du, &dense.dz_dp);
+            let x = join_columns(&dense.dx_dx0, &dense.dx_du, &dense.dx_dp);
+            let z = join_columns(&dense.dz_dx0, &dense.dz_du, &dense.dz_dp);
             assert!((x - expected.fixed_rows::<2>(0)).amax() < DIFFERENCE);
             assert!((z - expected.fixed_rows::<1>(2)).amax() < DIFFERENCE);
         }
@@ -209,7 +209,7 @@ for_methods!(dense_output_is_the_collocation_polynomial, B, {
 });
 
 #[test]
-fn newton_variants_find_the_same_solution() {
+fn newton_variants() {
     let mut irk = Irk::<Nonlinear, Gauss<3>>::new(options()).unwrap();
     let (x0, u) = at!(irk, point());
     let lambda = vector![0.3, 1.7];
@@ -249,7 +249,7 @@ fn newton_variants_find_the_same_solution() {
 }
 
 #[test]
-fn newton_takes_few_iterations() {
+fn newton_iterations() {
     let start = |start| {
         let mut irk = Irk::<Nonlinear, Gauss<3>>::new(Options { start, ..Default::default() }).unwrap();
         irk.set_start(&vector![0.1, 0.2], &vector![1.0]).unwrap();
@@ -272,7 +272,7 @@ fn newton_takes_few_iterations() {
 }
 
 #[test]
-fn calls_repeat_to_the_last_bit() {
+fn repeated_calls() {
     let lambda = vector![0.3, 1.7];
     let mut irk = Irk::<Nonlinear, RadauIIA<4>>::new(options()).unwrap();
     let (x0, u) = at!(irk, point());
@@ -284,7 +284,7 @@ fn calls_repeat_to_the_last_bit() {
 }
 
 #[test]
-fn an_empty_interval_is_the_identity() {
+fn intervals_of_no_length() {
     let mut irk = Irk::<Nonlinear, Gauss<2>>::new(options()).unwrap();
     let (x0, u) = at!(irk, point());
     let h = irk.hessian(&x0, &u, 0.0, &vector![1.0, 1.0]).unwrap();

@@ -7,7 +7,7 @@ use casados_core::{Error, Gauss, Irk, Options, RadauIIA};
 use nalgebra::vector;
 
 #[test]
-fn options_that_make_no_sense() {
+fn invalid_options() {
     let newton = Newton::default();
     for (options, name) in [
         (Options { steps: 0, ..Default::default() }, "steps"),
@@ -38,7 +38,7 @@ fn options_that_make_no_sense() {
 }
 
 #[test]
-fn input_that_is_not_finite() {
+fn non_finite_inputs() {
     let mut irk = Irk::<Nonlinear, Gauss<2>>::new(Options::default()).unwrap();
     let (x0, u, lambda) = (vector![1.0, 2.0], vector![3.0], vector![1.0, 1.0]);
     assert_eq!(irk.solve(&x0, &u, 0.1).unwrap_err(), Error::ParametersNotSet);
@@ -72,7 +72,7 @@ fn input_that_is_not_finite() {
 }
 
 #[test]
-fn a_model_that_is_not_finite() {
+fn non_finite_models() {
     let mut irk = Irk::<Fragile, RadauIIA<2>>::new(Options { steps: 2, ..Default::default() }).unwrap();
     let error = irk.solve(&vector![-1.0], &vector![1.0], 0.1).unwrap_err();
     match error {
@@ -103,7 +103,7 @@ fn a_model_that_is_not_finite() {
 }
 
 #[test]
-fn a_matrix_that_is_singular() {
+fn singular_matrices() {
     // One stage of Radau IIA is implicit Euler: 1 − h p = 0 at h = p = 1.
     let mut irk = Irk::<Linear, RadauIIA<1>>::new(Options::default()).unwrap();
     irk.set_parameters(&vector![1.0]).unwrap();
@@ -126,7 +126,7 @@ fn a_matrix_that_is_singular() {
 }
 
 #[test]
-fn an_iteration_that_does_not_converge() {
+fn divergent_iterations() {
     let newton = Newton { max_iterations: 2, ..Default::default() };
     let mut irk = Irk::<Nonlinear, Gauss<2>>::new(Options { newton, ..Default::default() }).unwrap();
     irk.set_parameters(&vector![1.3]).unwrap();
@@ -141,7 +141,7 @@ fn an_iteration_that_does_not_converge() {
 }
 
 #[test]
-fn results_beyond_the_range_of_numbers() {
+fn overflow_of_results() {
     let mut irk = Irk::<Linear, Gauss<1>>::new(Options::default()).unwrap();
     irk.set_parameters(&vector![1.0]).unwrap();
     // (1 + h/2)/(1 − h/2) = 1e4 nearly, times 1e307.
@@ -150,7 +150,7 @@ fn results_beyond_the_range_of_numbers() {
 }
 
 #[test]
-fn the_warm_start_survives_errors() {
+fn warm_start_after_errors() {
     let options = Options { steps: 2, start: Start::Warm, ..Default::default() };
     let mut irk = Irk::<Fragile, RadauIIA<2>>::new(options).unwrap();
     let mut calm = Irk::<Fragile, RadauIIA<2>>::new(options).unwrap();
@@ -172,7 +172,7 @@ fn the_warm_start_survives_errors() {
 }
 
 #[test]
-fn start_values_that_were_not_given() {
+fn missing_start_values() {
     let mut irk =
         Irk::<Fragile, Gauss<2>>::new(Options { start: Start::Given, ..Default::default() }).unwrap();
     assert_eq!(irk.solve(&vector![1.0], &vector![1.0], 0.1).unwrap_err(), Error::StartNotGiven);

@@ -85,7 +85,7 @@ const LAMBDA: [f64; 4] = [0.3, -0.2, 0.7, 1.1];
 
 /// One test: they would share the pool and the cache.
 #[test]
-fn as_casadi_calls_them() {
+fn calls_by_casadi() {
     pendulum_incref();
     let memory = pendulum_checkout();
     let mut irk = Irk::<Pendulum, Gauss<2>>::new(Options { steps: 2, ..Default::default() }).unwrap();
@@ -142,7 +142,7 @@ fn as_casadi_calls_them() {
     assert_eq!(unsafe { pendulum_work(null_mut(), null_mut(), null_mut(), null_mut()) }, 0);
     assert_eq!(sizes, [3, 1, 0, 0]);
 
-    threads();
+    concurrent_calls();
     // With the last reference everything is forgotten.
     pendulum_decref();
     assert!(call(pendulum, &[&X0, &[1.5], &[]], &[4], memory).is_none());
@@ -168,7 +168,7 @@ fn entries_of(pointer: *const c_longlong) -> Vec<(usize, usize)> {
 }
 
 /// Several at the same time, over more inputs than are remembered: as one after the other.
-fn threads() {
+fn concurrent_calls() {
     let run = |first: usize| {
         let memory = pendulum_checkout();
         let values: Vec<_> = (0..6)

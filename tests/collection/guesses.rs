@@ -25,7 +25,7 @@ fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, part: f64, seed: f64) -> T
     Ok(())
 }
 
-fn converges<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) -> Test {
+fn assert_convergence<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) -> Test {
     let mut sqp = HeapSqp::new(ocp)?;
     let outcome = sqp.solve(ocp)?;
     println!("{}{outcome}", sqp.log());
@@ -38,27 +38,27 @@ fn disturbed_swing_ups() -> Test {
     for (part, seed) in [(0.1, 1.0), (0.1, 2.0), (0.3, 3.0), (0.3, 4.0)] {
         let mut ocp = ocps::mechanics::pendulum(ocps::GIVEN)?;
         disturb(&mut ocp, part, seed)?;
-        converges(&mut ocp)?;
+        assert_convergence(&mut ocp)?;
     }
     Ok(())
 }
 
 /// The same point at all nodes.
 #[test]
-fn a_chain_from_a_point() -> Test {
+fn constant_guess_of_a_chain() -> Test {
     let mut ocp = ocps::textbook::hanging_chain(ocps::GIVEN)?;
     ocp.guess(&[1.0, 0.0, 0.0], &[2.0])?;
-    converges(&mut ocp)
+    assert_convergence(&mut ocp)
 }
 
 /// The density of the atmosphere overflows below the ground, where bounds do not let the rocket be.
 #[test]
-fn a_guess_without_values() -> Test {
+fn guess_outside_of_the_domain() -> Test {
     for seed in [3.0, 4.0] {
         let mut ocp = ocps::flight::goddard(ocps::GIVEN)?;
         disturb(&mut ocp, 0.3, seed)?;
         assert!(ocp.linearise(casados::ocp::Exact::default()).is_err());
-        converges(&mut ocp)?;
+        assert_convergence(&mut ocp)?;
     }
     Ok(())
 }
@@ -67,21 +67,21 @@ fn a_guess_without_values() -> Test {
 /// the middle gaps are as large as violations, and are closed first. The second attempt begins at a
 /// simulation, which drives through.
 #[test]
-fn obstacles_from_a_point() -> Test {
+fn constant_guess_among_obstacles() -> Test {
     for place in [0.0, 5.0] {
         let mut ocp = ocps::vehicles::obstacles(ocps::GIVEN)?;
         ocp.guess(&[place, 0.0, 0.0, 1.0], &[0.0; 2])?;
-        converges(&mut ocp)?;
+        assert_convergence(&mut ocp)?;
     }
     Ok(())
 }
 
 /// The end everywhere: at the start that is far from the state that is given.
 #[test]
-fn swing_up_from_its_end() -> Test {
+fn constant_guess_of_a_swing_up() -> Test {
     let mut ocp = ocps::mechanics::pendulum(ocps::GIVEN)?;
     ocp.guess(&[std::f64::consts::PI, 0.0], &[0.0])?;
-    converges(&mut ocp)
+    assert_convergence(&mut ocp)
 }
 
 /// People who may fall ill, who are, who have been or are vaccinated, and doses; doses a day.

@@ -13,7 +13,7 @@ use casados::{Erk, Rk4};
 type Test<T = ()> = Result<T, Box<dyn std::error::Error>>;
 
 /// The outcomes of both solvers, with what each leaves.
-fn both<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+fn outcomes_of_both_solvers<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     make: impl Fn() -> Test<HeapOcp<P>>,
 ) -> Test<[(Outcome, HeapOcp<P>); 2]> {
     let (mut one, mut other) = (make()?, make()?);
@@ -27,7 +27,7 @@ fn both<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
 }
 
 /// The name of what is violated, its stage, and by how much.
-fn violated(outcome: &Outcome) -> Test<(&'static str, usize, f64)> {
+fn violated_constraint(outcome: &Outcome) -> Test<(&'static str, usize, f64)> {
     let Status::Infeasible { constraint, violation } = outcome.status else {
         return Err(outcome.to_string().into());
     };
@@ -45,7 +45,7 @@ fn effort(_x: [f64; 2], u: [f64; 1]) -> f64 {
     u[0] * u[0]
 }
 
-fn brakes_before(wall: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
+fn braking_problem(wall: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
     let n = 40;
     let mut ocp = Problem::new(Erk::<Braking, Rk4>::new(Options::default())?)
         .stage_cost(GeneralCost::<Effort>::new())
@@ -59,18 +59,18 @@ fn brakes_before(wall: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: Seco
 
 /// From `v` the way is `ln(1 + k v² / a) / 2k = 65.79 m`: a wall after 60 m is hit at many stages.
 #[test]
-fn way_to_stop() -> Test {
+fn stopping_distance() -> Test {
     let way = (1.0 + 0.0002 * 400.0 / 3.0_f64).ln() / 0.0004;
-    let mut ocp = brakes_before(60.0)?;
+    let mut ocp = braking_problem(60.0)?;
     let outcome = HeapIpm::new(&ocp)?.solve(&mut ocp)?;
-    let (name, stage, violation) = violated(&outcome)?;
+    let (name, stage, violation) = violated_constraint(&outcome)?;
     assert!(outcome.iterations <= 60 && name == "x[0]", "{outcome}");
     // What is said is what the iterate does.
     assert!((violation - (ocp.stage(stage)?.x[0] - 60.0)).abs() < 1e-9, "{outcome}");
     // The sum of violations has its minimum there; it is said where a hundredth is left of it,
     // spread over eight stages.
     assert!((violation - (way - 60.0)).abs() < 0.05, "{violation} {way}");
-    for (outcome, _) in both(|| brakes_before(66.0))? {
+    for (outcome, _) in outcomes_of_both_solvers(|| braking_problem(66.0))? {
         assert!(outcome.is_converged(), "{outcome}");
     }
     Ok(())
@@ -83,7 +83,7 @@ fn tank(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
     [4.0 * s * s - u[0] * x[0].sqrt(), 1.0]
 }
 
-fn tank_with(valve: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
+fn tank_problem(valve: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
     let mut ocp = Problem::new(Erk::<Tank, Rk4>::new(Options::default())?)
         .stage_cost(GeneralCost::<Effort>::new())
         .on(Horizon::uniform(60, 0.2))?;
@@ -96,13 +96,13 @@ fn tank_with(valve: f64) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondO
 /// there flow in `2 t − sin(0.6 t) / 0.3 = 19.3`; out flow no more than `4 √(8 + v)`, where `v` is
 /// the largest violation: `5 + 19.3 − 4 √(8 + v) ≤ 8 + v`, so that `v > 3`.
 #[test]
-fn tank_that_overflows() -> Test {
-    for (outcome, ocp) in both(|| tank_with(0.5))? {
-        let (name, stage, violation) = violated(&outcome)?;
+fn overflowing_tank() -> Test {
+    for (outcome, ocp) in outcomes_of_both_solvers(|| tank_problem(0.5))? {
+        let (name, stage, violation) = violated_constraint(&outcome)?;
         assert!(outcome.iterations <= 50 && name == "x[0]" && violation > 3.0, "{outcome}");
         assert!((violation - (ocp.stage(stage)?.x[0] - 8.0)).abs() < 1e-9, "{outcome}");
     }
-    for (outcome, _) in both(|| tank_with(1.1))? {
+    for (outcome, _) in outcomes_of_both_solvers(|| tank_problem(1.1))? {
         assert!(outcome.is_converged(), "{outcome}");
     }
     Ok(())
@@ -114,7 +114,10 @@ fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 }
 
 /// Below one metre until stage `below`, above two from stage `above` on.
-fn between(below: usize, above: usize) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
+fn contradictory_bounds(
+    below: usize,
+    above: usize,
+) -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
     #[function]
     fn sides(x: [f64; 2], _u: [f64; 1]) -> [f64; 2] {
         [x[0], x[0]]
@@ -138,13 +141,13 @@ fn between(below: usize, above: usize) -> Test<HeapOcp<impl Formulation<f64, Dyn
 /// violated by half of a metre at least.
 #[test]
 fn contradictory_constraints() -> Test {
-    for (outcome, _) in both(|| between(20, 15))? {
-        let (name, stage, violation) = violated(&outcome)?;
+    for (outcome, _) in outcomes_of_both_solvers(|| contradictory_bounds(20, 15))? {
+        let (name, stage, violation) = violated_constraint(&outcome)?;
         assert!(outcome.iterations <= 50 && name == "Sides", "{outcome}");
         assert!((15..=20).contains(&stage) && violation >= 0.5 - 1e-9, "{outcome}");
     }
     // With 20 m/s² a metre from 1 to 2 takes less than the seven stages between.
-    for (outcome, _) in both(|| between(15, 22))? {
+    for (outcome, _) in outcomes_of_both_solvers(|| contradictory_bounds(15, 22))? {
         assert!(outcome.is_converged(), "{outcome}");
     }
     Ok(())
@@ -170,7 +173,7 @@ fn ellipse(x: [f64; 4], _u: [f64; 1]) -> f64 {
 }
 
 /// To a place 200 m away, within 25 s, around an ellipse of 300 m on either side of the way.
-fn walled() -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
+fn walled_problem() -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> {
     let n = 60;
     let mut ocp = Problem::new(Erk::<Dubins, Rk4>::new(Options::default())?)
         .terminal_cost(GeneralCost::<Time>::new())
@@ -188,8 +191,8 @@ fn walled() -> Test<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>> 
 /// behind it.
 #[test]
 fn walled_corridor() -> Test {
-    for (outcome, _) in both(walled)? {
-        let (name, stage, _) = violated(&outcome)?;
+    for (outcome, _) in outcomes_of_both_solvers(walled_problem)? {
+        let (name, stage, _) = violated_constraint(&outcome)?;
         assert!(name == "Ellipse" || (name, stage) == ("x[0]", 60), "{outcome}");
     }
     Ok(())

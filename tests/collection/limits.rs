@@ -7,7 +7,7 @@ use casados::ocp::{HeapSqp, OcpError, SqpOptions, Status};
 
 /// The limit of iterations proves nothing.
 #[test]
-fn limits_of_iterations_are_no_infeasibility() -> Test {
+fn status_at_the_iteration_limit() -> Test {
     for most in [50.0, 1.0] {
         for limit in [0, 1, 2] {
             let mut ocp = car_within(most, GIVEN)?;
@@ -23,7 +23,7 @@ fn limits_of_iterations_are_no_infeasibility() -> Test {
 
 /// What makes no sense is refused by its name.
 #[test]
-fn options_are_validated() -> Test {
+fn invalid_options() -> Test {
     type Change = fn(&mut SqpOptions, f64);
     let bad: [(&str, Change, &[f64]); 4] = [
         ("tolerance", |o, v| o.tolerance = v, &[f64::NAN, -1.0, 0.0, f64::INFINITY]),
@@ -51,7 +51,7 @@ fn options_are_validated() -> Test {
 /// QPs of an iteration share their iterations, whatever they end with: on the way to a verdict, and
 /// to a solution.
 #[test]
-fn iterations_of_qps_are_limited() -> Test {
+fn limit_of_qp_iterations() -> Test {
     for most in [12, 30, 100] {
         for time in [1.0, 50.0] {
             let mut ocp = car_within(time, GIVEN)?;
@@ -73,7 +73,7 @@ fn iterations_of_qps_are_limited() -> Test {
 
 /// The log grows with what happens, not with what may.
 #[test]
-fn any_number_of_iterations_is_a_limit() -> Test {
+fn large_iteration_limits() -> Test {
     let mut ocp = car_within(50.0, GIVEN)?;
     let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.max_iterations = usize::MAX;

@@ -2,16 +2,16 @@
 //! minima and its iterations (`tests/data/ocp/collection.json`), and what is said of problems that
 //! have no solution.
 
-mod astray;
-mod climb;
-mod creeping;
+mod active_state_bounds;
 mod guesses;
-mod held;
 mod infeasible;
-mod kinds;
 mod limits;
+mod minimum_time_climb;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;
+mod problem_kinds;
+mod restarts;
+mod short_steps;
 mod units;
 
 use casados::ocp::{Exact, Formulation, HeapOcp, HeapSqp, Iteration, Outcome, Part, SecondOrder, Status};
@@ -47,15 +47,15 @@ fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     assert!(judged.largest() <= 1e-6, "{judged}");
 
     let mut sqp = HeapSqp::new(ocp)?;
-    sqp.options.tolerance = FINE;
-    sqp.qp_solver.options.tolerance = 0.1 * FINE;
+    sqp.options.tolerance = FINE_TOLERANCE;
+    sqp.qp_solver.options.tolerance = 0.1 * FINE_TOLERANCE;
     let fine = sqp.solve(ocp)?;
     println!("{}{fine}", sqp.log());
     assert!(fine.is_converged(), "{fine}");
-    let terms = change_by_residuals(ocp);
+    let terms = objective_change_by_residuals(ocp);
     let record = Record::load("ocp/collection.json")?.record("problems")?.record(name)?;
     // IPOPT's tolerance is a tenth of ours.
-    let tolerance = 1.1 * FINE * terms;
+    let tolerance = 1.1 * FINE_TOLERANCE * terms;
     let nearest =
         record.list("minima")?.into_iter().map(|f| (fine.objective - f).abs()).fold(f64::INFINITY, f64::min);
     println!("{name}: {nearest:e} from a minimum, {tolerance:e} allowed");
@@ -65,11 +65,11 @@ fn solved<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     assert!(outcome.iterations as f64 <= 1.5 * theirs, "{outcome}");
     Ok(log)
 }
-const FINE: f64 = 1e-9;
+const FINE_TOLERANCE: f64 = 1e-9;
 
 /// What residuals of one change the objective by, to first order: gaps and violations by their
 /// multipliers, complementarity by one for each bound.
-fn change_by_residuals<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> f64 {
+fn objective_change_by_residuals<P: Formulation<f64>>(ocp: &HeapOcp<P>) -> f64 {
     let mut terms = 0.0;
     for stage in ocp.iterate().stages() {
         terms += stage.dynamics.iter().map(|pi| pi.abs()).sum::<f64>();
@@ -95,7 +95,7 @@ ocps::each_ocp!(all_are_solved);
 /// Algebraic states are eliminated stage by stage, so that both models have the same discrete map:
 /// the same iterations and the same trajectories, to what the tolerance of the solver leaves.
 #[test]
-fn batch_reactor_as_dae() -> Test {
+fn batch_reactor_with_algebraic_states() -> Test {
     let (mut implicit, mut explicit) = ocps::processes::batch_reactors(ocps::GIVEN)?;
     let ((dae, _), (ode, _)) = (solve(&mut implicit)?, solve(&mut explicit)?);
     assert!(dae.is_converged() && ode.is_converged() && dae.iterations == ode.iterations, "{dae} {ode}");
@@ -116,7 +116,7 @@ fn batch_reactor_as_dae() -> Test {
 
 /// All of them in fewer iterations than IPOPT takes.
 #[test]
-fn iterations_in_sum() -> Test {
+fn total_iterations() -> Test {
     let record = Record::load("ocp/collection.json")?.record("problems")?;
     let (mut mine, mut theirs) = (0, 0.0);
     macro_rules! count {
@@ -132,7 +132,7 @@ fn iterations_in_sum() -> Test {
 
 /// The last step needs no regularisation, and leaves less than a hundredth of the residuals.
 #[test]
-fn convergence_is_quadratic() -> Test {
+fn quadratic_convergence() -> Test {
     for log in [
         solve(&mut ocps::flight::quadrotor(ocps::GIVEN)?)?.1,
         solve(&mut ocps::vehicles::car(ocps::GIVEN)?)?.1,
@@ -148,7 +148,7 @@ fn convergence_is_quadratic() -> Test {
 /// One second is not enough for 50 m from rest: the end is missed, and it is said by how much at
 /// the iterate that is handed back.
 #[test]
-fn car_without_time() -> Test {
+fn car_in_too_little_time() -> Test {
     let mut ocp = ocps::vehicles::car_within(1.0, ocps::GIVEN)?;
     let (outcome, _) = solve(&mut ocp)?;
     let Status::Infeasible { constraint, violation } = outcome.status else {

@@ -18,7 +18,7 @@ pub fn fix<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, stage: usize, values: &[(u
 /// Converged in at most so many iterations, at a minimum of IPOPT's (CasADi 3.8.2, the same
 /// discretisation and guess, a tolerance of 1e-6). IPOPT relaxes bounds by 1e-8 of their size,
 /// which changes objectives by as much, times ratios of sizes and differences of up to ten.
-pub fn is_solved<P: Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>(
+pub fn assert_solved<P: Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
     minimum: f64,
     iterations: usize,
@@ -84,7 +84,7 @@ fn shuttle_in_feet() -> Test {
     fix(&mut ocp, n, &[(0, 80000.0), (3, 2500.0), (4, -5.0 * degree)])?;
     let end = [80000.0, 1.0, 0.5, 2500.0, -5.0 * degree, 0.1, 2000.0];
     line(&mut ocp, &start, &end, &[17.0, -0.7])?;
-    is_solved(&mut ocp, -0.5958546686713527, 25)
+    assert_solved(&mut ocp, -0.5958546686713527, 25)
 }
 
 /// A satellite of a tonne over `τ ∈ [0, 1]`, pushed by 100 N: radius in metres, radial and
@@ -126,7 +126,7 @@ fn transfer() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>
 /// IPOPT takes 273 iterations.
 #[test]
 fn satellite_in_metres() -> Test {
-    is_solved(&mut transfer()?, 5158.556192072234, 25)
+    assert_solved(&mut transfer()?, 5158.556192072234, 25)
 }
 
 /// What makes Newton's equations convex is measured in units: in that of the angle of the thrust
@@ -168,5 +168,5 @@ fn cart_in_millimetres() -> Test {
         fix(&mut ocp, stage, &[(0, state[0]), (1, state[1]), (2, state[2])])?;
     }
     line(&mut ocp, &ends[0], &ends[1], &[0.0])?;
-    is_solved(&mut ocp, 27303029807.437916, 30)
+    assert_solved(&mut ocp, 27303029807.437916, 30)
 }

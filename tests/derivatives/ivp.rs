@@ -29,7 +29,7 @@ fn derivatives_of_chemistry() {
 }
 
 #[test]
-fn derivatives_of_the_others() {
+fn derivatives_of_other_models() {
     derivatives::<VanDerPol>(&Points::random(8).all(-2.0..=2.0));
     derivatives::<VanDerPolScaled>(&Points::random(8).all(-2.0..=2.0));
     derivatives::<RingModulator>(&Points::random(4).all(-0.3..=0.3));
@@ -108,7 +108,7 @@ fn start_values() {
 
 /// Both forms of the amplifier have the same currents.
 #[test]
-fn two_forms_of_the_amplifier() {
+fn forms_of_the_amplifier() {
     let y = [0.1, 0.2, 0.15, 2.9, 0.3, 0.21, 4.0, 1.2];
     let rates = [3.0, -2.0, 5.0, 0.7, -1.3, 2.5, 4.0, -0.4];
     let capacitors = |y: &[f64]| [y[1] - y[0], y[2], y[4] - y[3], y[5], y[7] - y[6]];

@@ -59,24 +59,24 @@ fn problem() -> Result<(HeapOcp<Controlled>, State), Box<dyn std::error::Error>>
 /// What a loop saw: the farthest ball, the farthest one at the end, in which sample divergence was
 /// first reported, and how often controls went from one bound to the other.
 #[derive(Debug, Default)]
-struct Seen {
+struct LoopRecord {
     farthest: f64,
     /// Over the last second.
     settled: f64,
     diverging: Option<(usize, f64)>,
-    flips: usize,
+    sign_changes: usize,
 }
 
 /// A loop of so many samples; measurements have an error of up to a tenth of a millimetre and of
 /// 1 mm/s.
-fn run<C: Curvature<Irk<Plate, Gauss<2>>, f64>>(
+fn run_loop<C: Curvature<Irk<Plate, Gauss<2>>, f64>>(
     controller: HeapRealTime<Controlled, HeapInteriorPoint, C>,
     mut x: State,
     samples: usize,
-) -> Result<Seen, Box<dyn std::error::Error>> {
+) -> Result<LoopRecord, Box<dyn std::error::Error>> {
     let mut controller = controller.monitored()?;
     let mut plant = Irk::<Plate, Gauss<3>>::new(Options { steps: 2, ..Default::default() })?;
-    let (mut seen, mut before) = (Seen::default(), 0.0);
+    let (mut seen, mut before) = (LoopRecord::default(), 0.0);
     for sample in 0..samples {
         let mut measured = x;
         for (i, size) in [(0, 1e-4), (1, 1e-3), (4, 1e-4), (5, 1e-3)] {
@@ -98,7 +98,7 @@ fn run<C: Curvature<Irk<Plate, Gauss<2>>, f64>>(
         if feedback.is_diverging() && seen.diverging.is_none() {
             seen.diverging = Some((sample, x[0].abs()));
         }
-        seen.flips += usize::from(u[0] * before < -0.2);
+        seen.sign_changes += usize::from(u[0] * before < -0.2);
         before = u[0];
         x = plant.solve(&x, &u, SAMPLE)?.x;
         seen.farthest = seen.farthest.max(x[0].abs());
@@ -113,10 +113,10 @@ fn run<C: Curvature<Irk<Plate, Gauss<2>>, f64>>(
 
 /// Every control is `Ok`, and the ball leaves: the status says so while it is near.
 #[test]
-fn gauss_newton_diverges_and_says_so() -> Test {
+fn divergence_of_gauss_newton() -> Test {
     let (ocp, x) = problem()?;
-    let seen = run(HeapRealTime::new(ocp)?, x, 40)?;
-    assert!(seen.farthest > 1.0 && seen.flips > 5, "{seen:?}");
+    let seen = run_loop(HeapRealTime::new(ocp)?, x, 40)?;
+    assert!(seen.farthest > 1.0 && seen.sign_changes > 5, "{seen:?}");
     let (_, place) = seen.diverging.ok_or("nothing was reported")?;
     assert!(place < 2.0 * WALL + 0.2, "{seen:?}");
     Ok(())
@@ -125,9 +125,9 @@ fn gauss_newton_diverges_and_says_so() -> Test {
 /// With exact Hessians the ball comes back, is within 5 mm all of the last second, and nothing is
 /// reported.
 #[test]
-fn exact_hessians_hold_the_ball() -> Test {
+fn closed_loop_with_exact_hessians() -> Test {
     let (ocp, x) = problem()?;
-    let seen = run(HeapRealTime::exact(ocp)?, x, 160)?;
+    let seen = run_loop(HeapRealTime::exact(ocp)?, x, 160)?;
     assert!(seen.settled < 5e-3 && seen.farthest < WALL + 0.05, "{seen:?}");
     assert_eq!(seen.diverging, None);
     Ok(())
@@ -136,7 +136,7 @@ fn exact_hessians_hold_the_ball() -> Test {
 /// With the same state in every sample exact iterations converge to a solution, more than one in a
 /// sample too.
 #[test]
-fn exact_iterations_converge() -> Test {
+fn convergence_with_exact_hessians() -> Test {
     let (ocp, x) = problem()?;
     let mut solution = ocp.clone();
     assert!(HeapSqp::new(&solution)?.solve(&mut solution)?.is_converged());
@@ -165,7 +165,7 @@ fn exact_iterations_converge() -> Test {
 
 /// Where a measurement is broken the control is the one that was chosen for that.
 #[test]
-fn fallbacks() -> Test {
+fn controls_after_invalid_measurements() -> Test {
     let (ocp, x) = problem()?;
     let mut controller = HeapRealTime::exact(ocp)?;
     let first = controller.prepare()?.feedback(x.as_slice())?.u.to_vec();

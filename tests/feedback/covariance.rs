@@ -103,7 +103,7 @@ const NAMES: [&str; 5] = ["x[0]", "x[1]", "x[2]", "x[3]", "x[4]"];
 
 /// At the first and at the last stage, of all pairs of variables.
 #[test]
-fn as_dense_normal_equations() -> Test {
+fn covariance_of_normal_equations() -> Test {
     let mut ocp = problem()?;
     let mut k = 0.0;
     let noise = || {
@@ -139,7 +139,7 @@ fn as_dense_normal_equations() -> Test {
 
 /// Of amounts and gain only products are seen: the direction is `δa/a = δb/b = −δ ln g`.
 #[test]
-fn a_product_is_not_identifiable() -> Test {
+fn unidentifiable_product() -> Test {
     let (x0, covariance) = estimate(&mut problem()?, false, || 0.0)?;
     let [direction] = covariance.unidentifiable() else {
         return Err(format!("{:?}", covariance.unidentifiable()).into());
@@ -196,7 +196,7 @@ fn monte_carlo() -> Test {
 struct Random(u64);
 
 impl Random {
-    fn equal(&mut self) -> f64 {
+    fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -204,7 +204,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
     fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.equal()).sum::<f64>() - 6.0
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 

@@ -140,7 +140,7 @@ fn reference() -> Result<(f64, Vector4<f64>, Matrix4<f64>), &'static str> {
 }
 
 #[test]
-fn parameters_from_a_guess_by_simulation() -> Test {
+fn parameters_from_a_simulated_guess() -> Test {
     let mut ocp = problem()?;
     ocp.guess(&start(), &[])?.guess_by_simulation()?;
     // The guess has no gaps.
@@ -169,7 +169,7 @@ fn parameters_from_a_guess_by_simulation() -> Test {
 
 /// A simulation that has no end says where, and what is large there.
 #[test]
-fn simulations_that_blow_up() -> Test {
+fn divergent_simulations() -> Test {
     let mut ocp = problem()?;
     let mut wild = start();
     // A sensitivity to insulin that is no number.
@@ -189,7 +189,7 @@ fn simulations_that_blow_up() -> Test {
 
 /// All starts with one call: the best outcome first, what has no value last.
 #[test]
-fn many_starts() -> Test {
+fn solve_from_many_guesses() -> Test {
     let mut ocp = problem()?;
     let rates = [0.1, f64::NAN, 0.03, 0.01];
     let found = ocp.multi_start(

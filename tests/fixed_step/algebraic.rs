@@ -49,19 +49,19 @@ fn options(steps: usize) -> Options {
     Options { steps, ..Default::default() }
 }
 
-fn prepare<B: Method<S>, const S: usize>(irk: &mut Integrator<B, S>, w: &W) -> Result<(), Error> {
+fn prepare_integrator<B: Method<S>, const S: usize>(irk: &mut Integrator<B, S>, w: &W) -> Result<(), Error> {
     irk.set_parameters(&vector![w[3]])?;
     irk.set_time(0.3)
 }
 
-fn parts(w: &W) -> (SVector<f64, 2>, SVector<f64, 1>) {
+fn split_arguments(w: &W) -> (SVector<f64, 2>, SVector<f64, 1>) {
     (vector![w[0], w[1]], vector![w[2]])
 }
 
 /// The gradient over `(x₀, u, p)` from derivatives of first order.
 fn gradient<B: Method<S>, const S: usize>(irk: &mut Integrator<B, S>, w: &W) -> Result<W, Error> {
-    prepare(irk, w)?;
-    let (x0, u) = parts(w);
+    prepare_integrator(irk, w)?;
+    let (x0, u) = split_arguments(w);
     let step = irk.forward(&x0, &u, H)?;
     let x = step.dx_dx0.tr_mul(&LAMBDA) + step.dz0_dx0.tr_mul(&NU);
     let u = step.dx_du.tr_mul(&LAMBDA) + step.dz0_du.tr_mul(&NU);
@@ -100,7 +100,7 @@ fn matrix(step: &Hessian<Cart>) -> Matrix4 {
     hessian
 }
 
-fn slopes(step: &Hessian<Cart>) -> W {
+fn sensitivities_of_algebraic_states(step: &Hessian<Cart>) -> W {
     vector![step.grad_x0[0], step.grad_x0[1], step.grad_u[0], step.grad_p[0]]
 }
 
@@ -117,7 +117,7 @@ fn check<B: Method<S>, const S: usize>() -> Test {
         let mut group = batch::Integrator::<Integrator<B, S>>::new(options(steps))?;
         for count in [1, 5, 40] {
             let starts: Vec<W> = (0..count).map(start).collect();
-            let (x0, u): (Vec<_>, Vec<_>) = starts.iter().map(parts).unzip();
+            let (x0, u): (Vec<_>, Vec<_>) = starts.iter().map(split_arguments).unzip();
             let p: Vec<_> = starts.iter().map(|w| vector![w[3]]).collect();
             let intervals = Intervals { x0: &x0, u: &u, p: &p, h: &[H], t0: &[0.3] };
             let mut results = vec![Hessian::default(); count];
@@ -129,11 +129,17 @@ fn check<B: Method<S>, const S: usize>() -> Test {
                 assert!(statistics.groups > 0 && statistics.alone <= 1, "{statistics:?}");
             }
             for (k, (w, result)) in starts.iter().zip(&results).enumerate() {
-                prepare(&mut single, w)?;
+                prepare_integrator(&mut single, w)?;
                 let alone = *single.hessian_with_z0(&x0[k], &u[k], H, &LAMBDA, &NU)?;
-                assert!((slopes(&alone) - slopes(result)).amax() < ROUNDING);
+                assert!(
+                    (sensitivities_of_algebraic_states(&alone) - sensitivities_of_algebraic_states(result))
+                        .amax()
+                        < ROUNDING
+                );
                 assert!((matrix(&alone) - matrix(result)).amax() < ROUNDING);
-                assert!((slopes(&alone) - gradient(&mut single, w)?).amax() < ROUNDING);
+                assert!(
+                    (sensitivities_of_algebraic_states(&alone) - gradient(&mut single, w)?).amax() < ROUNDING
+                );
                 if k < 5 {
                     let expected = differences(|w| gradient(&mut single, w), w)?;
                     for found in [&alone, result] {
@@ -141,7 +147,7 @@ fn check<B: Method<S>, const S: usize>() -> Test {
                         assert!(error < DIFFERENCE, "{steps} {count} {k}: {error:e}");
                     }
                     // The weights are felt.
-                    prepare(&mut single, w)?;
+                    prepare_integrator(&mut single, w)?;
                     let without = *single.hessian(&x0[k], &u[k], H, &LAMBDA)?;
                     assert!((matrix(&alone) - matrix(&without)).amax() > 0.1);
                 }
@@ -152,32 +158,32 @@ fn check<B: Method<S>, const S: usize>() -> Test {
 }
 
 #[test]
-fn gauss() -> Test {
+fn gauss_methods() -> Test {
     check::<Gauss<1>, 1>()?;
     check::<Gauss<2>, 2>()?;
     check::<Gauss<4>, 4>()
 }
 
 #[test]
-fn radau() -> Test {
+fn radau_methods() -> Test {
     check::<RadauIIA<1>, 1>()?;
     check::<RadauIIA<3>, 3>()
 }
 
 /// With an integral of the algebraic states along.
 #[test]
-fn with_an_integral() -> Test {
+fn integral_of_algebraic_states() -> Test {
     for steps in [1, 3] {
         let mut irk = Integrator::<Gauss<2>, 2>::new(options(steps))?;
         let mut integral = Quadrature::<Effort>::new();
         integral.nu = vector![0.9];
         let w = start(1);
-        let (x0, u) = parts(&w);
-        prepare(&mut irk, &w)?;
+        let (x0, u) = split_arguments(&w);
+        prepare_integrator(&mut irk, &w)?;
         let found = *irk.with(&mut integral).hessian_with_z0(&x0, &u, H, &LAMBDA, &NU)?;
         let all = |w: &W| -> Result<W, Error> {
             let others = gradient(&mut irk, w)?;
-            let (x0, u) = parts(w);
+            let (x0, u) = split_arguments(w);
             irk.with(&mut integral).forward(&x0, &u, H)?;
             let Quadrature { dq_dx0, dq_du, dq_dp, .. } = &integral;
             Ok(others + 0.9 * vector![dq_dx0[0], dq_dx0[1], dq_du[0], dq_dp[0]])
@@ -234,7 +240,7 @@ fn check_closed_form<B>(
 }
 
 #[test]
-fn closed_forms() -> Test {
+fn closed_form_of_second_derivatives() -> Test {
     let root = 3f64.sqrt();
     let a = nalgebra::matrix![0.25, 0.25 - root / 6.0; 0.25 + root / 6.0, 0.25];
     let gauss = irk::Integrator::<Decay, Gauss<2>, 2, f64, Heap>::new(Options::default())?;
@@ -256,7 +262,7 @@ fn permuted(xdot: [f64; 1], x: [f64; 1], z: [f64; 2], u: [f64; 1], p: [f64; 4]) 
 /// Where the whole matrix is pivoted, alone and beside intervals that need no such thing:
 /// `νᵀ∂²(P⁻¹ r)` in closed form.
 #[test]
-fn pivoted() -> Test {
+fn dense_fallback() -> Test {
     let permutations = [vector![1.0, 0.0, 0.0, 1.0], vector![0.0, 1.0, 1.0, 0.0]];
     let (x, u) = (1.3, 0.7);
     let check = |k: usize, step: &Hessian<Permuted>| {
@@ -302,8 +308,8 @@ fn pivoted() -> Test {
 
 /// Calls without weights know nothing of those before them.
 #[test]
-fn nothing_stays() -> Test {
-    let (x0, u) = parts(&start(3));
+fn calls_without_weights() -> Test {
+    let (x0, u) = split_arguments(&start(3));
     let mut used = Integrator::<Gauss<2>, 2>::new(options(3))?;
     let mut fresh = Integrator::<Gauss<2>, 2>::new(options(3))?;
     for irk in [&mut used, &mut fresh] {
@@ -316,7 +322,7 @@ fn nothing_stays() -> Test {
 
     let mut used = Batch::<Cart, Gauss<2>>::new(options(3))?;
     let mut fresh = Batch::<Cart, Gauss<2>>::new(options(3))?;
-    let x0: Vec<_> = (0..7).map(|k| parts(&start(k)).0).collect();
+    let x0: Vec<_> = (0..7).map(|k| split_arguments(&start(k)).0).collect();
     let intervals = Intervals { x0: &x0, u: &[u], p: &[vector![0.5]], h: &[H], t0: &[] };
     let [mut found, mut expected] = [(); 2].map(|()| vec![Hessian::default(); x0.len()]);
     used.hessian_with_z0(&intervals, &[LAMBDA], &[NU], &mut found)?;
@@ -328,8 +334,8 @@ fn nothing_stays() -> Test {
 
 /// Weights that are not finite, too few, or too many.
 #[test]
-fn mistakes() -> Test {
-    let (x0, u) = parts(&start(0));
+fn invalid_weights() -> Test {
+    let (x0, u) = split_arguments(&start(0));
     let bad = vector![1.0, f64::NAN];
     let mut irk = Integrator::<Gauss<2>, 2>::new(options(1))?;
     irk.set_parameters(&vector![0.5])?;

@@ -138,7 +138,7 @@ fn problem(name: &str) -> Problem {
 }
 
 /// Passes, with tolerances that can tell.
-fn accept(report: Report, limit: f64) {
+fn assert_report(report: Report, limit: f64) {
     println!("{report}");
     report.assert();
     for row in &report.rows {
@@ -183,7 +183,7 @@ fn run<M, I, const NX: usize, const NU: usize, const NP: usize>(
         problem.h,
         &problem.exact,
     );
-    accept(report.expect("the problem can be solved"), limit);
+    assert_report(report.expect("the problem can be solved"), limit);
 }
 
 // Not stiff: implicit methods of high order and an explicit one.
@@ -311,7 +311,7 @@ fn implicit_branch() {
 
 /// Beyond the pole there is no solution, and none is reported.
 #[test]
-fn riccati_beyond_the_pole() {
+fn riccati_behind_the_pole() {
     let mut irk = Irk::<Riccati, Gauss<6>>::new(Options { steps: 64, ..Default::default() })
         .expect("options are valid");
     let result = irk.solve(&SVector::from([0.0]), &SVector::from([1.0]), 1.6);
@@ -320,7 +320,7 @@ fn riccati_beyond_the_pole() {
 
 /// No problem of the collection is left out.
 #[test]
-fn the_whole_collection_is_checked() {
+fn coverage_of_the_collection() {
     let text = include_str!("../data/analytic/analytic.json");
     let all: Value = serde_json::from_str(text).expect("the collection is JSON");
     let here = include_str!("analytic.rs");

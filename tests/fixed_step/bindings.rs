@@ -1,7 +1,7 @@
 //! Kernels that are bound to the model when they run (`Shared`), beside those that are compiled for
 //! it (`Heap`): the same identities, values that differ by rounding, the same errors.
 
-use crate::interval::{check, options};
+use crate::interval::{check_interval, options};
 use crate::lost::Lost;
 use crate::models::awe::Awe;
 use crate::models::chain::{Chain, stretched};
@@ -57,7 +57,7 @@ macro_rules! agree {
 }
 
 #[test]
-fn values_differ_by_rounding() -> Test {
+fn values_of_shared_kernels() -> Test {
     let (x0, u) = (vector![0.1, 2.4, -0.3, 1.2], vector![0.7]);
     agree!(Pendulum, Gauss<2>, options(1), x0, u, 0.05);
     agree!(Pendulum, Gauss<4>, options(4), x0, u, 0.1);
@@ -80,23 +80,29 @@ fn values_differ_by_rounding() -> Test {
 fn identities_of_sensitivities() -> Test {
     let (x0, u) = (vector![0.1, 2.4, -0.3, 1.2], vector![0.7]);
     let pendulum = Irk::<Pendulum, RadauIIA<3>, f64, Shared>::new(options(2))?;
-    check::<Pendulum, _, 4, 1, 0>(pendulum, &x0, &u, &SVector::zeros(), 0.1);
+    check_interval::<Pendulum, _, 4, 1, 0>(pendulum, &x0, &u, &SVector::zeros(), 0.1);
     let chain = Irk::<Chain<9>, Gauss<2>, f64, Shared>::new(options(1))?;
-    check::<Chain<9>, _, 9, 3, 0>(chain, &stretched(), &vector![-1.0, 1.0, 1.0], &SVector::zeros(), 0.2);
+    check_interval::<Chain<9>, _, 9, 3, 0>(
+        chain,
+        &stretched(),
+        &vector![-1.0, 1.0, 1.0],
+        &SVector::zeros(),
+        0.2,
+    );
     let record = Record::load("awe/intervals.json").map_err(|error| error.to_string())?;
     let interval = record.records("intervals").expect("intervals").remove(7);
     let x0: SVector<f64, 23> = interval.vector("x0").expect("x0");
     let u: SVector<f64, 4> = interval.vector("u").expect("u");
     let h = record.number("T").expect("T");
     let aircraft = Irk::<Awe, RadauIIA<4>, f64, Shared>::new(options(1))?;
-    check::<Awe, _, 23, 4, 0>(aircraft, &x0, &u, &SVector::zeros(), h);
+    check_interval::<Awe, _, 23, 4, 0>(aircraft, &x0, &u, &SVector::zeros(), h);
     Ok(())
 }
 
 /// A batch takes its intervals one after the other: each has the bits of a single call, and one
 /// that fails does so alone.
 #[test]
-fn batches_are_single_calls() -> Test {
+fn batches_of_shared_kernels() -> Test {
     let mut irk = Irk::<Chain<9>, Gauss<2>, f64, Shared>::new(options(2))?;
     let mut batch = casados::batch::Integrator::<Irk<Chain<9>, Gauss<2>, f64, Shared>>::new(options(2))?;
     let (u, lambda) = (vector![-1.0, 1.0, 1.0], SVector::from_fn(|i, _| 1.0 - 0.1 * i as f64));
@@ -129,12 +135,12 @@ fn fragile(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1], p: [f64; 2]) -
 }
 
 /// An error without its numbers.
-fn words(error: &casados::Error) -> String {
+fn message_without_numbers(error: &casados::Error) -> String {
     error.to_string().chars().filter(|c| !(c.is_ascii_digit() || ".-e".contains(*c))).collect()
 }
 
 #[test]
-fn errors_are_the_same() -> Test {
+fn errors_of_shared_kernels() -> Test {
     let mut known = Irk::<Fragile, Gauss<2>>::new(Options::default())?;
     let mut shared = Irk::<Fragile, Gauss<2>, f64, Shared>::new(Options::default())?;
     for (x0, u, p, h) in [
@@ -149,7 +155,11 @@ fn errors_are_the_same() -> Test {
         shared.set_parameters(&p)?;
         let expected = known.forward(&x0, &u, h).expect_err("there is no solution");
         let found = shared.forward(&x0, &u, h).expect_err("there is no solution");
-        assert_eq!(words(&found), words(&expected), "{found}, not {expected}");
+        assert_eq!(
+            message_without_numbers(&found),
+            message_without_numbers(&expected),
+            "{found}, not {expected}"
+        );
     }
     Ok(())
 }

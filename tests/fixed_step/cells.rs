@@ -1,7 +1,7 @@
 //! Models with many nonlinear states, each coupled to its neighbours alone: their second
 //! derivatives are summed by the matrix adjoint.
 
-use crate::interval::{check, options};
+use crate::interval::{check_interval, options};
 use casados::prelude::*;
 use nalgebra::{SVector, vector};
 
@@ -38,32 +38,32 @@ fn springs(x: [f64; 120], u: [f64; 1]) -> [f64; 120] {
 }
 
 #[test]
-fn with_gauss() -> Test {
+fn gauss_methods() -> Test {
     let irk = Irk::<Tube, Gauss<2>>::new(options(3))?;
-    check::<Tube, _, 60, 1, 0>(irk, &concentrations(), &vector![2.0], &SVector::zeros(), 0.1);
+    check_interval::<Tube, _, 60, 1, 0>(irk, &concentrations(), &vector![2.0], &SVector::zeros(), 0.1);
     Ok(())
 }
 
 /// The trapezoidal rule, whose `A` has no inverse.
 #[test]
-fn with_a_singular_tableau() -> Test {
+fn singular_tableau() -> Test {
     let trapezoidal = Tableau::new([[0.0, 0.0], [0.5, 0.5]], [0.5, 0.5], [0.0, 1.0])?;
     let irk = Irk::<Tube, Custom<2>>::with_tableau(options(2), trapezoidal)?;
-    check::<Tube, _, 60, 1, 0>(irk, &concentrations(), &vector![2.0], &SVector::zeros(), 0.1);
+    check_interval::<Tube, _, 60, 1, 0>(irk, &concentrations(), &vector![2.0], &SVector::zeros(), 0.1);
     Ok(())
 }
 
 #[test]
-fn with_kinematic_states() -> Test {
+fn kinematic_states() -> Test {
     let x0 = SVector::from_fn(|i, _| 0.3 * (0.5 * i as f64).sin());
     let irk = Irk::<Springs, Gauss<2>>::new(options(2))?;
-    check::<Springs, _, 120, 1, 0>(irk, &x0, &vector![0.2], &SVector::zeros(), 0.1);
+    check_interval::<Springs, _, 120, 1, 0>(irk, &x0, &vector![0.2], &SVector::zeros(), 0.1);
     Ok(())
 }
 
 /// Over no time nothing changes, nor over one whose reciprocal is infinite.
 #[test]
-fn intervals_of_no_length() -> Test {
+fn intervals_of_zero_length() -> Test {
     let lambda = SVector::from_fn(|i, _| 1.0 + (i as f64).sin());
     let mut irk = Irk::<Tube, Gauss<2>>::new(options(2))?;
     for h in [0.0, 1e-310, -1e-310] {

@@ -17,7 +17,7 @@ fn g(x: [HyperDual64; 2], u: HyperDual64, p: HyperDual64, t: f64) -> [HyperDual6
 }
 
 #[test]
-fn equations_are_exchanged_and_scaled() {
+fn permuted_and_scaled_equations() {
     assert_eq!(Oscillator::ROWS, [(1, 0.5), (0, -2.0)]);
 }
 
@@ -29,7 +29,7 @@ const H: f64 = 0.9;
 const STEPS: usize = 3;
 
 /// Runge-Kutta steps from the textbook, over hyper-dual numbers.
-fn oracle<const S: usize>(tableau: &Tableau<S>, w: [HyperDual64; 4]) -> [HyperDual64; 2] {
+fn textbook_steps<const S: usize>(tableau: &Tableau<S>, w: [HyperDual64; 4]) -> [HyperDual64; 2] {
     let [x0, x1, u, p] = w;
     let mut x = [x0, x1];
     let h = H / STEPS as f64;
@@ -54,7 +54,7 @@ fn derivatives<const S: usize>(tableau: &Tableau<S>) -> Derivatives {
             let w = [X0[0], X0[1], U, P];
             let w =
                 core::array::from_fn(|m| HyperDual64::new(w[m], f64::from(m == i), f64::from(m == j), 0.0));
-            for (r, x) in oracle(tableau, w).iter().enumerate() {
+            for (r, x) in textbook_steps(tableau, w).iter().enumerate() {
                 result.0[r] = x.re;
                 result.1[(r, i)] = x.eps1;
                 result.2[r][(i, j)] = x.eps1eps2;
@@ -89,7 +89,7 @@ macro_rules! for_methods {
 }
 
 #[test]
-fn all_calls_agree_with_dual_numbers() {
+fn agreement_with_dual_numbers() {
     let (x0, u, lambda) = (SVector::from(X0), vector![U], vector![0.9, -1.7]);
     for_methods!(|Method_, erk| {
         let (x, jacobian, hessians) = derivatives(&<Method_ as Method<_>>::TABLEAU);
@@ -143,7 +143,7 @@ fn all_calls_agree_with_dual_numbers() {
 }
 
 #[test]
-fn directions_are_products_with_the_jacobian() {
+fn directional_derivatives() {
     let (x0, u) = (SVector::from(X0), vector![U]);
     for_methods!(|Method_, erk| {
         let (_, jacobian, _) = derivatives(&<Method_ as Method<_>>::TABLEAU);
@@ -163,7 +163,7 @@ fn no_seeds() -> casados::result::Seeds<Oscillator, f64, 7> {
 }
 
 #[test]
-fn repeated_calls_give_the_same_bits() {
+fn repeated_calls() {
     let (x0, u, lambda) = (SVector::from(X0), vector![U], vector![0.9, -1.7]);
     for_methods!(|Method_, erk| {
         let _: Option<Method_> = None;
@@ -175,7 +175,7 @@ fn repeated_calls_give_the_same_bits() {
 }
 
 #[test]
-fn statistics_count_evaluations() {
+fn evaluations_in_statistics() {
     let (x0, u, lambda) = (SVector::from(X0), vector![U], vector![0.9, -1.7]);
     for_methods!(|Method_, erk| {
         let stages = <Method_ as Method<_>>::TABLEAU.c().len();
@@ -196,7 +196,7 @@ fn statistics_count_evaluations() {
 }
 
 #[test]
-fn failures_are_values_and_leave_the_integrator_usable() {
+fn errors_of_failed_calls() {
     let (x0, u) = (SVector::from(X0), vector![U]);
     let mut erk = Erk::<Oscillator, Rk4>::new(Options::default()).unwrap();
     assert!(matches!(erk.solve(&x0, &u, H), Err(Error::ParametersNotSet)));
@@ -237,7 +237,7 @@ fn failures_are_values_and_leave_the_integrator_usable() {
 }
 
 #[test]
-fn a_tableau_of_the_user() {
+fn custom_tableau() {
     let tableau = <Rk4 as Method<4>>::TABLEAU;
     let own = Tableau::new(*tableau.a(), *tableau.b(), *tableau.c()).unwrap();
     let mut erk = Erk::<Oscillator, Custom<4>>::with_tableau(Options::default(), own).unwrap();
@@ -255,7 +255,7 @@ fn a_tableau_of_the_user() {
 }
 
 #[test]
-fn memory_inside_the_integrator() {
+fn inline_memory() {
     let options = Options { steps: STEPS, ..Default::default() };
     let mut heap = Erk::<Oscillator, Rk4>::new(options).unwrap();
     let mut inline = Erk::<Oscillator, Rk4, f64, Inline<mode::Hessian, STEPS>>::inline(options).unwrap();

@@ -6,7 +6,7 @@
 //! of a conductance to the air, asks for `2 sin(Nθ) sin(θ/2) = β cos((N − ½) θ)`: one root in each
 //! of the intervals `(j π/N, (j + ½) π/N)`.
 
-use crate::interval::{check, options};
+use crate::interval::{check_interval, options};
 use crate::models::heat::rod::{self, Rod};
 use casados::prelude::*;
 use nalgebra::{SMatrix, SVector, vector};
@@ -17,7 +17,7 @@ type Test = Result<(), Box<dyn std::error::Error>>;
 const AIR: f64 = 20.0;
 
 /// The zero of an increasing function between these ends.
-fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+fn bisection(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
         *(if f(middle) < 0.0 { &mut low } else { &mut high }) = middle;
@@ -35,7 +35,7 @@ fn modes<const N: usize>() -> (SVector<f64, N>, SMatrix<f64, N, N>) {
     for j in 0..N {
         let (low, high) = (j as f64 * PI / n, (j as f64 + 0.5) * PI / n);
         let sign = -of(low).signum();
-        let theta = bisect(low, high, |t| sign * of(t));
+        let theta = bisection(low, high, |t| sign * of(t));
         // 1 − cos θ loses digits where θ is small.
         values[j] = -4.0 * rate * (0.5 * theta).sin().powi(2);
         let column = SVector::<f64, N>::from_fn(|i, _| (theta * (i as f64 + 0.5)).cos());
@@ -45,13 +45,13 @@ fn modes<const N: usize>() -> (SVector<f64, N>, SMatrix<f64, N, N>) {
 }
 
 /// Where the rod rests under a flow in kW/m².
-fn at_rest<const N: usize>(u: f64) -> SVector<f64, N> {
+fn steady_state<const N: usize>(u: f64) -> SVector<f64, N> {
     let flow = 1e3 * u;
     SVector::from_fn(|i, _| AIR + flow / rod::loss(N) + flow * (N - 1 - i) as f64 / rod::conductance(N))
 }
 
 /// The stability function of Radau IIA of two stages.
-fn radau(z: f64) -> f64 {
+fn radau_stability_function(z: f64) -> f64 {
     (1.0 + z / 3.0) / (1.0 - z * (2.0 / 3.0) + z * z / 6.0)
 }
 
@@ -59,7 +59,7 @@ fn radau(z: f64) -> f64 {
 fn rod_sensitivities() {
     let x0 = SVector::<f64, 5>::from_fn(|i, _| 80.0 - 7.0 * i as f64);
     let (u, p) = (vector![4.0], vector![AIR]);
-    check::<Rod<5>, _, 5, 1, 1>(
+    check_interval::<Rod<5>, _, 5, 1, 1>(
         Irk::<Rod<5>, RadauIIA<3>>::new(options(2)).expect("valid"),
         &x0,
         &u,
@@ -71,18 +71,18 @@ fn rod_sensitivities() {
 /// Each mode is multiplied by the stability function of the method: state and derivatives are known
 /// to rounding, from modes that decay within a hundredth of a step to those that hardly move.
 #[test]
-fn rod_by_modes() -> Test {
+fn modal_solution_of_a_rod() -> Test {
     const N: usize = 20;
     const STEPS: usize = 4;
     let (h, u) = (600.0, 6.0);
     let (values, vectors) = modes::<N>();
-    let factors = values.map(|lambda| radau(h / STEPS as f64 * lambda).powi(STEPS as i32));
+    let factors = values.map(|lambda| radau_stability_function(h / STEPS as f64 * lambda).powi(STEPS as i32));
     let transition = vectors * SMatrix::from_diagonal(&factors) * vectors.transpose();
     // Of a flow: the state at rest under one, less what the start is off by it.
-    let one = at_rest::<N>(1.0).add_scalar(-AIR);
+    let one = steady_state::<N>(1.0).add_scalar(-AIR);
     let by_flow = one - transition * one;
     let x0 = SVector::<f64, N>::from_fn(|i, _| 90.0 + 30.0 * (i as f64).cos());
-    let end = at_rest::<N>(u) + transition * (x0 - at_rest::<N>(u));
+    let end = steady_state::<N>(u) + transition * (x0 - steady_state::<N>(u));
 
     let mut irk = Irk::<Rod<N>, RadauIIA<2>>::new(options(STEPS))?;
     irk.set_parameters(&vector![AIR])?;
@@ -105,13 +105,13 @@ fn rod_by_modes() -> Test {
 
 /// With a method of order nine, what is left beside the exponential of the matrix is rounding.
 #[test]
-fn rod_by_the_exponential() -> Test {
+fn exponential_solution_of_a_rod() -> Test {
     const N: usize = 10;
     let (h, u) = (60.0, 6.0);
     let (values, vectors) = modes::<N>();
     let exponential = vectors * SMatrix::from_diagonal(&values.map(|l| (h * l).exp())) * vectors.transpose();
     let x0 = SVector::<f64, N>::from_fn(|i, _| 90.0 + 30.0 * (i as f64).cos());
-    let end = at_rest::<N>(u) + exponential * (x0 - at_rest::<N>(u));
+    let end = steady_state::<N>(u) + exponential * (x0 - steady_state::<N>(u));
     let mut irk = Irk::<Rod<N>, RadauIIA<5>>::new(options(40))?;
     irk.set_parameters(&vector![AIR])?;
     let forward = irk.forward(&x0, &vector![u], h)?;
@@ -135,7 +135,7 @@ fn mean(t: f64, u: f64) -> f64 {
     for j in 0..50 {
         let low = f64::from(j) * PI;
         let theta =
-            bisect(low, low + 0.5 * PI, |t| f64::from(1 - 2 * (j % 2)) * (t * t.sin() - biot * t.cos()));
+            bisection(low, low + 0.5 * PI, |t| f64::from(1 - 2 * (j % 2)) * (t * t.sin() - biot * t.cos()));
         let part = flow * length / (k * theta * theta) / (0.5 + 0.25 * (2.0 * theta).sin() / theta);
         let decay = (-k / rod::CAPACITY * (theta / length).powi(2) * t).exp();
         mean -= part * decay * theta.sin() / theta;
@@ -160,7 +160,7 @@ where
 
 /// Cells of half the width have a quarter of the error.
 #[test]
-fn cells_are_of_order_two() -> Test {
+fn order_of_the_spatial_discretisation() -> Test {
     // Nothing has flowed yet: the series is the state at rest, to its 50 terms.
     assert!((mean(0.0, 6.0) - AIR).abs() < 1e-3);
     let errors = [

@@ -84,7 +84,9 @@ fn jacobian<M: Dae<Shape = <Points<0> as Dae>::Shape>>(of: &Forward<M>) -> SMatr
     })
 }
 
-fn second<M: Dae<Shape = <Points<0> as Dae>::Shape>>(of: &Hessian<M>) -> SMatrix<f64, 10, 10> {
+fn second_order_differences<M: Dae<Shape = <Points<0> as Dae>::Shape>>(
+    of: &Hessian<M>,
+) -> SMatrix<f64, 10, 10> {
     SMatrix::from_fn(|r, c| match (r.min(c), r.max(c)) {
         (r, c @ 0..6) => of.h_xx[(r, c)],
         (r @ 0..6, c @ 6..8) => of.h_xu[(r, c - 6)],
@@ -121,12 +123,12 @@ where
         let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
         Ok(W::from_iterator(parts.concat()))
     })?;
-    close(&second(&hessian), &expected, expected.amax().max(1.0));
+    close(&second_order_differences(&hessian), &expected, expected.amax().max(1.0));
     Ok(())
 }
 
 /// The kinematic states of a model, none of which has a pivot.
-fn kinematic<M: Dae>() -> Vec<usize> {
+fn kinematic_states<M: Dae>() -> Vec<usize> {
     let plan = &M::STRUCTURE.elimination;
     let is_kinematic = |&state: &usize| plan.kinematic[state].equation != Kinematic::NONE;
     let found: Vec<usize> = (0..plan.kinematic.len()).filter(is_kinematic).collect();
@@ -136,8 +138,8 @@ fn kinematic<M: Dae>() -> Vec<usize> {
 }
 
 #[test]
-fn derivatives_are_those_of_the_solution() -> Test {
-    assert_eq!(kinematic::<Points<0>>(), [0, 1, 2]);
+fn derivatives_by_differences() -> Test {
+    assert_eq!(kinematic_states::<Points<0>>(), [0, 1, 2]);
     assert_eq!(<Points<1> as Dae>::STRUCTURE.diagonal_controls.len(), 1);
     check(steps::<Points<0>, Gauss<2>, 2>()?, false)?;
     check(steps::<Points<0>, Gauss<1>, 1>()?, false)?;
@@ -148,7 +150,7 @@ fn derivatives_are_those_of_the_solution() -> Test {
 
 /// The whole matrix pivoted.
 #[test]
-fn without_the_plan() -> Test {
+fn dense_fallback() -> Test {
     check(steps::<Lost<Points<0>>, Gauss<2>, 2>()?, true)?;
     check(steps::<Lost<Points<1>>, Gauss<2>, 2>()?, true)
 }
@@ -171,11 +173,13 @@ fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2
 
 /// No iteration finds kinematic states: the solution is that of the whole matrix, whose iterations
 /// go on until every equation is satisfied.
-fn same_as_whole<B: Method<S>, const S: usize, const CURVED: usize>(options: Options) -> Test
+fn check_against_dense_elimination<B: Method<S>, const S: usize, const CURVED: usize>(
+    options: Options,
+) -> Test
 where
     Led<CURVED>: Dae<Shape = <Led<0> as Dae>::Shape>,
 {
-    assert_eq!(kinematic::<Led<CURVED>>(), [0, 1, 2]);
+    assert_eq!(kinematic_states::<Led<CURVED>>(), [0, 1, 2]);
     let (at, whole) = (W::from(BEGIN), Options { newton: Newton::default(), ..options });
     let (x, u, p) = split(&at);
     let mut led = Integrator::<Led<CURVED>, B, S, f64, Heap>::new(options)?;
@@ -192,26 +196,26 @@ where
 }
 
 #[test]
-fn kinematic_states_follow_in_every_iteration() -> Test {
+fn kinematic_states_in_every_iteration() -> Test {
     let ordinary = Options { steps: 3, ..Default::default() };
     let fixed = |count| Newton { fixed_iterations: Some(count), ..Default::default() };
     let by = |jacobian| Options { newton: Newton { jacobian, ..Default::default() }, ..ordinary };
     for options in
         [ordinary, Options { compensated: true, ..ordinary }, by(Jacobian::Full), by(Jacobian::Frozen)]
     {
-        same_as_whole::<Gauss<1>, 1, 1>(options)?;
-        same_as_whole::<Gauss<2>, 2, 1>(options)?;
-        same_as_whole::<RadauIIA<3>, 3, 1>(options)?;
-        same_as_whole::<Gauss<4>, 4, 1>(options)?;
-        same_as_whole::<RadauIIA<3>, 3, 0>(options)?;
+        check_against_dense_elimination::<Gauss<1>, 1, 1>(options)?;
+        check_against_dense_elimination::<Gauss<2>, 2, 1>(options)?;
+        check_against_dense_elimination::<RadauIIA<3>, 3, 1>(options)?;
+        check_against_dense_elimination::<Gauss<4>, 4, 1>(options)?;
+        check_against_dense_elimination::<RadauIIA<3>, 3, 0>(options)?;
     }
-    same_as_whole::<Gauss<2>, 2, 1>(Options { newton: fixed(12), ..ordinary })?;
+    check_against_dense_elimination::<Gauss<2>, 2, 1>(Options { newton: fixed(12), ..ordinary })?;
     // Linear equations take one iteration, from wherever it starts.
     for newton in [fixed(1), Newton::default()] {
         let options = Options { newton, ..ordinary };
-        same_as_whole::<Gauss<1>, 1, 0>(options)?;
-        same_as_whole::<Gauss<2>, 2, 0>(options)?;
-        same_as_whole::<Gauss<4>, 4, 0>(options)?;
+        check_against_dense_elimination::<Gauss<1>, 1, 0>(options)?;
+        check_against_dense_elimination::<Gauss<2>, 2, 0>(options)?;
+        check_against_dense_elimination::<Gauss<4>, 4, 0>(options)?;
     }
     Ok(())
 }
@@ -254,7 +258,9 @@ fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1
 
 /// Newton's method finds the solution of linear equations in one iteration if columns of kinematic
 /// states are part of the right ones, and its systems are solved.
-fn one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(x: SVector<f64, NX>) -> Test
+fn check_linear_equations_in_one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(
+    x: SVector<f64, NX>,
+) -> Test
 where
     M: Dae<
         Shape: Shape<
@@ -298,40 +304,40 @@ where
 }
 
 #[test]
-fn columns_of_kinematic_states_are_part_of_those_of_their_velocities() -> Test {
+fn columns_of_kinematic_states() -> Test {
     // Two follow one.
-    assert_eq!(kinematic::<Gone>(), [0, 1, 2, 3]);
+    assert_eq!(kinematic_states::<Gone>(), [0, 1, 2, 3]);
     let x = vector![0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7];
-    one_iteration::<Gone, Gauss<1>, 1, 7>(x)?;
-    one_iteration::<Gone, Gauss<2>, 2, 7>(x)?;
-    one_iteration::<Gone, RadauIIA<3>, 3, 7>(x)?;
-    one_iteration::<Gone, Gauss<4>, 4, 7>(x)
+    check_linear_equations_in_one_iteration::<Gone, Gauss<1>, 1, 7>(x)?;
+    check_linear_equations_in_one_iteration::<Gone, Gauss<2>, 2, 7>(x)?;
+    check_linear_equations_in_one_iteration::<Gone, RadauIIA<3>, 3, 7>(x)?;
+    check_linear_equations_in_one_iteration::<Gone, Gauss<4>, 4, 7>(x)
 }
 
 /// Points are supernodes, in straight lines and in loops.
 #[test]
-fn supernodes_are_solved_together() -> Test {
+fn supernodes() -> Test {
     let plan = &<Knots<61> as Dae>::STRUCTURE.elimination;
     for count in 1..=4 {
         assert!(plan.supernodes.iter().any(|of| of.count == count), "{count} in {:?}", plan.supernodes);
     }
     let total: u32 = plan.supernodes.iter().map(|of| of.count).sum();
     assert_eq!(total as usize, plan.pivots.len());
-    assert_eq!(kinematic::<Knots<61>>(), [60]);
+    assert_eq!(kinematic_states::<Knots<61>>(), [60]);
     let (few, many) = (SVector::from_fn(|i, _| (i as f64).sin()), SVector::from_fn(|i, _| (i as f64).sin()));
-    one_iteration::<Knots<11>, RadauIIA<3>, 3, 11>(few)?;
-    one_iteration::<Knots<11>, Gauss<4>, 4, 11>(few)?;
-    one_iteration::<Knots<61>, Gauss<2>, 2, 61>(many)?;
-    one_iteration::<Knots<61>, RadauIIA<3>, 3, 61>(many)?;
-    one_iteration::<Knots<61>, Gauss<4>, 4, 61>(many)?;
-    one_iteration::<Knots<61>, Gauss<5>, 5, 61>(many)
+    check_linear_equations_in_one_iteration::<Knots<11>, RadauIIA<3>, 3, 11>(few)?;
+    check_linear_equations_in_one_iteration::<Knots<11>, Gauss<4>, 4, 11>(few)?;
+    check_linear_equations_in_one_iteration::<Knots<61>, Gauss<2>, 2, 61>(many)?;
+    check_linear_equations_in_one_iteration::<Knots<61>, RadauIIA<3>, 3, 61>(many)?;
+    check_linear_equations_in_one_iteration::<Knots<61>, Gauss<4>, 4, 61>(many)?;
+    check_linear_equations_in_one_iteration::<Knots<61>, Gauss<5>, 5, 61>(many)
 }
 
 /// From zero, positions are where they follow to in the first evaluation, so that its Jacobian is
 /// one within the step; and the Jacobian after it is not taken anew because of an increment of the
 /// first. (With positions at the start of the step 7 masses had three factorisations.)
 #[test]
-fn jacobians_from_zero_do_for_several_iterations() -> Test {
+fn jacobians_from_zero_guesses() -> Test {
     let newton = Newton { tolerance: 1e-8, ..Default::default() };
     let mut irk = Irk::<Chain<33>, Gauss<2>>::new(Options { newton, ..Default::default() })?;
     irk.solve(&stretched(), &vector![-1.0, 1.0, 1.0], 0.2)?;
@@ -372,8 +378,8 @@ macro_rules! side_by_side {
 }
 
 #[test]
-fn registers_meet_the_same_pivots() -> Test {
-    assert_eq!(kinematic::<Swing>(), [0]);
+fn pivots_in_registers() -> Test {
+    assert_eq!(kinematic_states::<Swing>(), [0]);
     side_by_side!(Swing, Gauss<1>, 2);
     side_by_side!(Swing, Gauss<2>, 2);
     side_by_side!(Swing, RadauIIA<3>, 2);

@@ -46,7 +46,7 @@ impl Inputs {
 }
 
 /// What is said of each interval, or of all of them.
-fn answers(batch: &mut Made, inputs: &Inputs) -> Result<Vec<Answer>, String> {
+fn assert_answers(batch: &mut Made, inputs: &Inputs) -> Result<Vec<Answer>, String> {
     let Inputs { count, x0, u, p, h, t0, lambda, nu, call } = inputs;
     let intervals = Intervals { x0, u, p, h, t0 };
     macro_rules! call {
@@ -92,12 +92,12 @@ fn batches() {
                 start = Some(given);
             }
             let inputs = Inputs::new(&mut source);
-            let found = answers(&mut batch, &inputs);
+            let found = assert_answers(&mut batch, &inputs);
             let mut fresh = Made::new(options).expect("as before");
             if let Some((xdot, z)) = &start {
                 fresh.set_start(xdot, z).expect("as before");
             }
-            let again = answers(&mut fresh, &inputs);
+            let again = assert_answers(&mut fresh, &inputs);
             match (found, again) {
                 (Ok(found), Ok(again)) => {
                     for (found, again) in found.iter().zip(again) {

@@ -83,7 +83,7 @@ macro_rules! run {
 }
 
 #[test]
-fn problems() {
+fn random_problems() {
     let mut counts = Counts::new("problems of optimal control");
     for seed in seeds(200) {
         let mut source = Source::new(seed);
@@ -108,13 +108,13 @@ fn problems() {
         match found {
             Ok((Outcome { status: Status::Converged | Status::Acceptable, .. }, _)) => counts.count("Ok"),
             Ok((outcome, _)) => {
-                if shows() {
+                if prints_verdicts() {
                     println!("seed {seed}: {outcome}");
                 }
                 let text = format!("{:?}", outcome.status);
                 counts.count(text.split([' ', '(', '{']).next().unwrap_or_default());
             }
-            Err(error) => counts.result::<(), _>(&Err(error)),
+            Err(error) => counts.count_result::<(), _>(&Err(error)),
         }
     }
     enough(&counts, 15);
@@ -122,7 +122,7 @@ fn problems() {
 
 /// A reduced model from any start and by any options: also where `x` is on no circle.
 #[test]
-fn reduced() {
+fn index_reduced_models() {
     let mut counts = Counts::new("reduced index");
     for seed in seeds(INTEGRATORS) {
         let mut source = Source::new(seed);

@@ -63,10 +63,26 @@ fn length(pattern: *const c_longlong) -> usize {
 #[test]
 fn exported() {
     let functions: [(Evaluate, [c_longlong; 2], [Pattern; 2]); 4] = [
-        (fuzzed, [fuzzed_n_in(), fuzzed_n_out()], [as_rust(0), as_rust(1)]),
-        (jac_fuzzed, [jac_fuzzed_n_in(), jac_fuzzed_n_out()], [as_rust(2), as_rust(3)]),
-        (adj1_fuzzed, [adj1_fuzzed_n_in(), adj1_fuzzed_n_out()], [as_rust(4), as_rust(5)]),
-        (jac_adj1_fuzzed, [jac_adj1_fuzzed_n_in(), jac_adj1_fuzzed_n_out()], [as_rust(6), as_rust(7)]),
+        (
+            fuzzed,
+            [fuzzed_n_in(), fuzzed_n_out()],
+            [patterns_as_rust_functions(0), patterns_as_rust_functions(1)],
+        ),
+        (
+            jac_fuzzed,
+            [jac_fuzzed_n_in(), jac_fuzzed_n_out()],
+            [patterns_as_rust_functions(2), patterns_as_rust_functions(3)],
+        ),
+        (
+            adj1_fuzzed,
+            [adj1_fuzzed_n_in(), adj1_fuzzed_n_out()],
+            [patterns_as_rust_functions(4), patterns_as_rust_functions(5)],
+        ),
+        (
+            jac_adj1_fuzzed,
+            [jac_adj1_fuzzed_n_in(), jac_adj1_fuzzed_n_out()],
+            [patterns_as_rust_functions(6), patterns_as_rust_functions(7)],
+        ),
     ];
     fuzzed_incref();
     let mut counts = Counts::new("exported");
@@ -113,7 +129,7 @@ fn exported() {
 }
 
 /// The patterns of inputs and outputs, as functions of Rust's type.
-fn as_rust(which: usize) -> Pattern {
+fn patterns_as_rust_functions(which: usize) -> Pattern {
     extern "C" fn of<const WHICH: usize>(index: c_longlong) -> *const c_longlong {
         match WHICH {
             0 => fuzzed_sparsity_in(index),

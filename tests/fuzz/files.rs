@@ -13,14 +13,14 @@ fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
     [x[1], u]
 }
 
-fn sound() -> Result<Value, Box<dyn std::error::Error>> {
+fn is_consistent() -> Result<Value, Box<dyn std::error::Error>> {
     let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?).on(Horizon::uniform(3, 0.5))?;
     ocp.fix_initial_state(&[0.0, 1.0])?.bound("u", .., -1.0, 1.0)?.guess(&[0.0; 2], &[0.5])?;
     Ok(serde_json::to_value(ocp.solution()?)?)
 }
 
 /// Changes something somewhere: numbers, lengths, names, kinds.
-fn spoil(value: &mut Value, source: &mut Source) {
+fn corrupt(value: &mut Value, source: &mut Source) {
     match value {
         Value::Array(list) => match source.below(8) {
             0 => drop(list.pop()),
@@ -29,7 +29,7 @@ fn spoil(value: &mut Value, source: &mut Source) {
             _ if list.is_empty() => {}
             _ => {
                 let at = source.below(list.len());
-                spoil(&mut list[at], source);
+                corrupt(&mut list[at], source);
             }
         },
         Value::Object(map) => {
@@ -38,7 +38,7 @@ fn spoil(value: &mut Value, source: &mut Source) {
             if source.below(30) == 0 {
                 map.remove(key);
             } else {
-                spoil(&mut map[key.as_str()], source);
+                corrupt(&mut map[key.as_str()], source);
             }
         }
         Value::Number(_) => {
@@ -54,14 +54,14 @@ fn spoil(value: &mut Value, source: &mut Source) {
 
 /// What is read can be asked for anything, drawn and written: no panic, and the picture is XML.
 #[test]
-fn trajectories_that_are_read() -> Result<(), Box<dyn std::error::Error>> {
-    let sound = sound()?;
+fn trajectories_from_corrupted_files() -> Result<(), Box<dyn std::error::Error>> {
+    let sound = is_consistent()?;
     let mut counts = Counts::new("trajectories that are read");
     for seed in seeds(2_000) {
         let mut source = Source::new(seed);
         let mut value = sound.clone();
         for _ in 0..=source.below(3) {
-            spoil(&mut value, &mut source);
+            corrupt(&mut value, &mut source);
         }
         let read = serde_json::from_value::<Trajectory>(value);
         if let Ok(trajectory) = &read {

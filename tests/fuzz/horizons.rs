@@ -154,20 +154,20 @@ fn free_parameters_and_ends() {
         match found {
             Ok(Outcome { status: Status::Converged | Status::Acceptable, .. }) => counts.count("Ok"),
             Ok(outcome) => {
-                if shows() {
+                if prints_verdicts() {
                     println!("seed {seed}: {outcome}");
                 }
                 let text = format!("{:?}", outcome.status);
                 counts.count(text.split([' ', '(', '{']).next().unwrap_or_default());
             }
-            Err(error) => counts.result::<(), _>(&Err(error)),
+            Err(error) => counts.count_result::<(), _>(&Err(error)),
         }
     }
     enough(&counts, 5);
 }
 
 /// A quadratic program of a few stages with anything in it.
-fn program(source: &mut Source) -> Result<HeapQp, casados::qp::QpError> {
+fn random_program(source: &mut Source) -> Result<HeapQp, casados::qp::QpError> {
     let count = 1 + source.below(4);
     let dims: Vec<_> = (0..count)
         .map(|k| StageDims::new(2, if k + 1 < count { source.below(3) } else { 0 }, source.below(2)))
@@ -210,7 +210,7 @@ fn batches_of_quadratic_programs() -> Result<(), casados::qp::QpError> {
         let mut source = Source::new(seed);
         let mut instances = Vec::new();
         for _ in 0..source.below(20) {
-            let qp = program(&mut source)?;
+            let qp = random_program(&mut source)?;
             let solution = HeapSolution::new(qp.dims())?;
             instances.push(QpInstance { qp, solution });
         }
@@ -220,7 +220,7 @@ fn batches_of_quadratic_programs() -> Result<(), casados::qp::QpError> {
         let others = batch.solve(&mut reversed, start)?;
         for (status, other) in statuses.iter().zip(others.iter().rev()) {
             assert_eq!(format!("{status:?}"), format!("{other:?}"), "seed {seed}");
-            counts.result(status);
+            counts.count_result(status);
         }
         for (status, instance) in statuses.iter().zip(&instances) {
             let mut stages = (0..instance.qp.dims().len()).filter_map(|k| instance.solution.stage(k));

@@ -16,7 +16,7 @@ mod control;
 mod events;
 mod exported;
 mod files;
-mod fixed;
+mod fixed_step;
 mod horizons;
 mod source;
 mod tables;
@@ -24,7 +24,7 @@ mod tables;
 use casados::Error;
 use casados::{Real, dae, ode};
 use nalgebra::SVector;
-use runs::{Counts, seeds, shows, times};
+use runs::{Counts, case_multiplier, prints_verdicts, seeds};
 
 /// Poles, roots and powers of anything.
 #[ode]
@@ -95,8 +95,8 @@ fn judge(counts: &mut Counts, seed: u64, found: &Answer, again: Option<Answer>) 
         // Shortest digits that give the number back: as good as bits.
         assert_eq!(format!("{found:?}"), format!("{again:?}"), "seed {seed}");
     }
-    counts.result(found);
-    if shows() && found.is_err() {
+    counts.count_result(found);
+    if prints_verdicts() && found.is_err() {
         println!("{counts} {seed}: {found:?}");
     }
 }
@@ -111,5 +111,5 @@ const CALLS: usize = 8;
 fn enough(counts: &Counts, answers: u64) {
     println!("{counts}");
     let one = seeds(1).start > 0;
-    assert!(one || counts.of("Ok") >= answers * times(), "{counts}");
+    assert!(one || counts.count_of("Ok") >= answers * case_multiplier(), "{counts}");
 }

@@ -12,14 +12,14 @@ use std::fmt::Write;
 pub const MODELS: usize = 12;
 
 /// The file `tests/generated/models.rs`.
-pub fn file() -> String {
+pub fn generated_file() -> String {
     let mut text = String::from(
         "//! Random models, written by `tests/generator`: not to be edited by hand.\n\n\
          use casados::{dae, ode};\n",
     );
     let mut turn = 0;
     for number in 0..MODELS {
-        model(&mut text, number, &mut turn);
+        generate_model(&mut text, number, &mut turn);
     }
     text
 }
@@ -85,7 +85,7 @@ const BINARY: &[&str] = &[
 
 /// One model: bindings that use variables and earlier bindings, then equations that use the
 /// bindings.
-fn model(text: &mut String, number: usize, turn: &mut usize) {
+fn generate_model(text: &mut String, number: usize, turn: &mut usize) {
     let mut random = Random::new(1000 + number as u64);
     let explicit = number.is_multiple_of(3);
     let nx = 1 + random.below(4);
@@ -134,10 +134,10 @@ fn model(text: &mut String, number: usize, turn: &mut usize) {
             }
         };
         let (a, b) = (recent(&mut random), recent(&mut random));
-        let inner = fill(template(*turn % total), &a, &b);
+        let inner = fill_placeholders(template(*turn % total), &a, &b);
         let c = recent(&mut random);
         let outer = BINARY[random.below(6)];
-        let expression = fill(outer, "inner", &c);
+        let expression = fill_placeholders(outer, "inner", &c);
         *turn += 1;
         let _ = write!(text, "    let inner = {inner};\n    let a{binding} = {expression};\n");
         operands.push(format!("a{binding}"));
@@ -148,7 +148,7 @@ fn model(text: &mut String, number: usize, turn: &mut usize) {
         let used: Vec<String> =
             (0..bindings).filter(|b| b % length == row).map(|b| format!("a{b}")).collect();
         let (a, b) = (used.join(" + "), &operands[random.below(operands.len())]);
-        let right = fill(BINARY[random.below(6)], &a, b);
+        let right = fill_placeholders(BINARY[random.below(6)], &a, b);
         // Index 1: the unknown of the row with a coefficient that is never zero.
         let left = match (explicit, row < nx) {
             (true, _) => String::new(),
@@ -161,7 +161,7 @@ fn model(text: &mut String, number: usize, turn: &mut usize) {
     text.push_str("    ]\n}\n");
 }
 
-fn fill(template: &str, a: &str, b: &str) -> String {
+fn fill_placeholders(template: &str, a: &str, b: &str) -> String {
     // Names of methods are lower case, so that the placeholders are the only capital letters.
     template.replace('A', a).replace('B', b)
 }

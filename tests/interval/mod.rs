@@ -8,7 +8,7 @@ use nalgebra::SVector;
 
 /// All checks of one interval; of the comparisons with differences at most a tenth may be unable to
 /// tell.
-pub fn check<M, I, const NX: usize, const NU: usize, const NP: usize>(
+pub fn check_interval<M, I, const NX: usize, const NU: usize, const NP: usize>(
     mut integrator: I,
     x0: &SVector<f64, NX>,
     u: &SVector<f64, NU>,

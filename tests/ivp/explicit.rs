@@ -50,7 +50,7 @@ macro_rules! follows {
 /// Where a force jumps between two stages the difference of the two methods may be an eightieth of
 /// the error. After a refusal by much it counts eight times.
 #[test]
-fn differences_over_a_jump_are_doubted() {
+fn error_estimates_across_jumps() {
     follows!(Friction, DormandPrince5, FRICTION);
     follows!(Friction, DormandPrince8, FRICTION);
     follows!(Stop, DormandPrince5, STOP);
@@ -74,7 +74,7 @@ macro_rules! stiff {
 }
 
 #[test]
-fn too_many_steps_of_stiff_models() {
+fn stiffness_detection() {
     assert!(stiff!(DormandPrince5, 1e4) && stiff!(DormandPrince8, 1e4));
     assert!(!stiff!(DormandPrince5, 0.0) && !stiff!(DormandPrince8, 0.0));
     assert!(!stiff!(Radau, 0.0));
@@ -84,7 +84,7 @@ fn too_many_steps_of_stiff_models() {
 /// SciPy's `DOP853` takes 6,894 steps (`benches/error_control/dop853.py`). Half as many more are
 /// allowed; if rounding errors counted like errors of the method, there would be over 100,000.
 #[test]
-fn rounding_errors_count_once() {
+fn accumulation_of_rounding_errors() {
     let options = AdaptiveOptions { rtol: 1e-12, atol: 1e-12, keep_steps: false, ..Default::default() };
     let mut adaptive = Adaptive::<ExplicitBeam<80>, DormandPrince8>::new(options).expect("valid");
     adaptive.solve(&SVector::zeros(), &SVector::zeros(), PI).expect("a solution");

@@ -91,7 +91,7 @@ fn rubbed(x: [f64; 2]) -> [f64; 2] {
 }
 
 /// From rest at `x₀ > 0`: half a turn about 0.3, half a turn about −0.3, and so on.
-fn rubbed_exactly(x0: SVector<f64, 2>, end: f64) -> [f64; 2] {
+fn exact_rubbed(x0: SVector<f64, 2>, end: f64) -> [f64; 2] {
     let half = (end / PI).floor();
     let at = |n: f64| x0[0] - 0.6 * n;
     let sign = if half % 2.0 == 0.0 { 1.0 } else { -1.0 };
@@ -101,13 +101,13 @@ fn rubbed_exactly(x0: SVector<f64, 2>, end: f64) -> [f64; 2] {
 }
 
 #[test]
-fn friction_that_changes_its_sign() -> Result<(), Error> {
+fn friction_reversals() -> Result<(), Error> {
     let cases = (0..10).map(|case| (vector![5.0 + 0.1 * f64::from(case), 0.0], 7.0 + 1.3 * f64::from(case)));
-    within_thirty_tolerances!(Rubbed, cases, rubbed_exactly);
+    within_thirty_tolerances!(Rubbed, cases, exact_rubbed);
     Ok(())
 }
 
-const FAST: f64 = 1e4;
+const FAST_RATE: f64 = 1e4;
 
 /// `x` follows a parabola at once from above, and slowly from below.
 #[ode]
@@ -117,17 +117,17 @@ fn followed(x: [f64; 1], t: f64) -> [f64; 1] {
 }
 
 /// `gap = (1 − t)/k + 1/k²` until that is zero, at `1 + 1/k`; behind it that of a rate of one.
-fn followed_exactly(_: SVector<f64, 1>, end: f64) -> [f64; 1] {
-    let border = 1.0 + 1.0 / FAST;
-    [0.5 * (end - 1.0) * (end - 1.0) + 2.0 - end + (1.0 / FAST - 1.0) * (border - end).exp()]
+fn exact_followed(_: SVector<f64, 1>, end: f64) -> [f64; 1] {
+    let border = 1.0 + 1.0 / FAST_RATE;
+    [0.5 * (end - 1.0) * (end - 1.0) + 2.0 - end + (1.0 / FAST_RATE - 1.0) * (border - end).exp()]
 }
 
 /// With the Jacobian of the fast side increments on the slow one are small, and their rate is
 /// nearly one.
 #[test]
-fn a_rate_that_falls_by_four_orders_of_magnitude() -> Result<(), Error> {
-    let x0 = vector![0.5 + 1.0 / FAST + 1.0 / (FAST * FAST)];
+fn rate_reduced_by_four_orders_of_magnitude() -> Result<(), Error> {
+    let x0 = vector![0.5 + 1.0 / FAST_RATE + 1.0 / (FAST_RATE * FAST_RATE)];
     let cases = (0..10).map(|case| (x0, 1.5 + 0.17 * f64::from(case)));
-    within_thirty_tolerances!(Followed, cases, followed_exactly);
+    within_thirty_tolerances!(Followed, cases, exact_followed);
     Ok(())
 }

@@ -36,7 +36,7 @@ fn two_springs(x: [f64; 2], t: f64) -> [f64; 2] {
 /// On either side the equations are linear: Newton's method converges at once, and that ended the
 /// iteration of the step over a kink after one increment. Errors were up to 1e5 tolerances.
 #[test]
-fn rates_do_not_carry_over_a_kink() {
+fn contraction_rates_across_kinks() {
     let radau = largest_error!(TwoSprings, Radau, vector![1.0, 0.0], TWO_SPRINGS);
     let gauss = largest_error!(TwoSprings, Gauss<3>, vector![1.0, 0.0], TWO_SPRINGS);
     assert!(radau <= 30.0 && gauss <= 30.0, "{radau} and {gauss} tolerances");
@@ -58,7 +58,7 @@ fn rod(x: [f64; 10]) -> [f64; 10] {
 /// Increments that are small and do not shrink are rounding errors, or those of a Jacobian that is
 /// out of date. With it, Gauss's method was off by 1800 tolerances of 1e-10 and 140 of 1e-9.
 #[test]
-fn slow_iterations_are_no_rounding_errors() {
+fn slow_newton_iterations() {
     let error = largest_error!(Rod, Gauss<3>, SVector::<f64, 10>::zeros(), ROD);
     assert!(error <= 30.0, "{error} tolerances");
 }
@@ -80,7 +80,7 @@ fn converter(x: [f64; 2], t: f64) -> [f64; 2] {
 /// was an error of 4e6 tolerances of 1e-7. SciPy's `DOP853` is off by 27 to 170 tolerances, its
 /// `Radau` by 2 to 6, and by 3800 of 1e-4.
 #[test]
-fn pulses_between_nodes() {
+fn pulses_between_collocation_nodes() {
     let error = largest_error!(Converter, Gauss<4>, vector![0.0, 0.0], CONVERTER);
     assert!(error <= 100.0, "{error} tolerances");
 }

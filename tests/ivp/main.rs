@@ -6,13 +6,13 @@ mod models {
 }
 
 mod algebraic;
-mod ends;
+mod end_values;
 mod explicit;
-mod far_below;
 mod jumps;
 mod kinks;
-mod rough;
+mod nonsmooth_forces;
 mod sensitivities;
+mod small_states;
 mod test_set;
 mod tolerances;
 mod vibrations;

@@ -30,7 +30,7 @@ mod tank {
 }
 
 /// Compares with the text that is stored.
-fn check<M: Dae>(file: &str) {
+fn assert_stored_text<M: Dae>(file: &str) {
     let text = M::describe().to_string();
     for line in text.lines() {
         assert!(line.chars().count() <= 96, "{line}");
@@ -45,27 +45,27 @@ fn check<M: Dae>(file: &str) {
 }
 
 #[test]
-fn of_a_pendulum() {
-    check::<Pendulum>("pendulum.txt");
+fn description_of_a_pendulum() {
+    assert_stored_text::<Pendulum>("pendulum.txt");
 }
 
 #[test]
-fn of_a_chain() {
-    check::<Chain<21>>("chain.txt");
+fn description_of_a_chain() {
+    assert_stored_text::<Chain<21>>("chain.txt");
 }
 
 #[test]
-fn of_an_aircraft() {
-    check::<Awe>("awe.txt");
+fn description_of_an_aircraft() {
+    assert_stored_text::<Awe>("awe.txt");
 }
 
 #[test]
-fn of_a_tank() {
+fn description_of_a_tank() {
     let structure = Tank::describe();
     assert!(structure.linear_in_state && !structure.is_explicit());
     // The valve may change from interval to interval, but not within one.
     assert!(structure.constant_matrix);
-    check::<Tank>("tank.txt");
+    assert_stored_text::<Tank>("tank.txt");
 }
 
 thread_local! {
@@ -90,7 +90,7 @@ macro_rules! counted {
 counted!(Add add +, Sub sub -, Mul mul *, Div div /);
 
 /// Operations of a computation.
-fn count<T>(computation: impl FnOnce() -> T) -> (T, u64) {
+fn count_operations<T>(computation: impl FnOnce() -> T) -> (T, u64) {
     OPERATIONS.set(0);
     let result = computation();
     (result, OPERATIONS.get())
@@ -99,14 +99,14 @@ fn count<T>(computation: impl FnOnce() -> T) -> (T, u64) {
 type Matrix = Vec<Vec<Counted>>;
 
 /// `a b`, without an addition to zero.
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
+fn product_without_addition(a: &Matrix, b: &Matrix) -> Matrix {
     let column =
         |row: &Vec<Counted>, j: usize| (1..row.len()).fold(row[0] * b[0][j], |sum, k| sum + row[k] * b[k][j]);
     a.iter().map(|row| (0..b[0].len()).map(|j| column(row, j)).collect()).collect()
 }
 
 /// `t − a b`
-fn subtract(t: &mut Matrix, a: &Matrix, b: &Matrix) {
+fn subtract_product(t: &mut Matrix, a: &Matrix, b: &Matrix) {
     for (t, a) in t.iter_mut().zip(a) {
         for (j, t) in t.iter_mut().enumerate() {
             *t = a.iter().zip(b).fold(*t, |t, (a, b)| t - *a * b[j]);
@@ -115,7 +115,7 @@ fn subtract(t: &mut Matrix, a: &Matrix, b: &Matrix) {
 }
 
 /// Gauss-Jordan elimination in place; the blocks here need no pivoting.
-fn inverse(a: &Matrix) -> Matrix {
+fn block_inverse(a: &Matrix) -> Matrix {
     let mut a = a.clone();
     for k in 0..a.len() {
         let pivot = Counted(1.0) / a[k][k];
@@ -135,7 +135,7 @@ fn inverse(a: &Matrix) -> Matrix {
 
 /// Any matrix of the pattern of a model, eliminated by its plan: operations of the factorisation
 /// and of a solve, and the largest error of a solution of which every element is one.
-fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
+fn eliminate_by_plan(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let plan = &structure.elimination;
     let n = plan.slot_of_equation.len();
     let mut blocks = vec![vec![vec![Counted(0.0); s]; s]; plan.slots.len()];
@@ -169,38 +169,40 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
         pivot.upper().for_each(|upper| add(pivot.slot as usize, &blocks[upper]));
     }
 
-    let ((), factorisation) = count(|| {
+    let ((), factorisation) = count_operations(|| {
         let mut updates = plan.updates.iter();
         for pivot in plan.pivots {
             if !pivot.identity {
-                let inverse = inverse(&blocks[pivot.block as usize]);
-                pivot.lower().for_each(|lower| blocks[lower] = product(&blocks[lower], &inverse));
+                let inverse = block_inverse(&blocks[pivot.block as usize]);
+                pivot
+                    .lower()
+                    .for_each(|lower| blocks[lower] = product_without_addition(&blocks[lower], &inverse));
                 blocks[pivot.block as usize] = inverse;
             }
             for lower in pivot.lower() {
                 for (upper, target) in pivot.upper().zip(&mut updates) {
                     let (left, right) = (blocks[lower].clone(), blocks[upper].clone());
-                    subtract(&mut blocks[target.block as usize], &left, &right);
+                    subtract_product(&mut blocks[target.block as usize], &left, &right);
                 }
             }
         }
         assert!(updates.next().is_none());
     });
-    let ((), solve) = count(|| {
+    let ((), solve) = count_operations(|| {
         for pivot in plan.pivots {
             let packet = rows[pivot.slot as usize].clone();
             pivot.lower().for_each(|lower| {
-                subtract(&mut rows[plan.slots[lower] as usize], &blocks[lower], &packet);
+                subtract_product(&mut rows[plan.slots[lower] as usize], &blocks[lower], &packet);
             });
         }
         for pivot in plan.pivots.iter().rev() {
             for upper in pivot.upper() {
                 let other = rows[plan.slots[upper] as usize].clone();
-                subtract(&mut rows[pivot.slot as usize], &blocks[upper], &other);
+                subtract_product(&mut rows[pivot.slot as usize], &blocks[upper], &other);
             }
             if !pivot.identity {
                 rows[pivot.slot as usize] =
-                    product(&blocks[pivot.block as usize], &rows[pivot.slot as usize]);
+                    product_without_addition(&blocks[pivot.block as usize], &rows[pivot.slot as usize]);
             }
         }
     });
@@ -211,11 +213,11 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
 
 /// Costs of factors and solves are what an elimination by the plan takes, operation by operation.
 #[test]
-fn costs_are_those_of_the_plan() {
+fn costs_of_the_plan() {
     for structure in [Pendulum::describe(), Chain::<21>::describe(), Awe::describe(), Tank::describe()] {
         for s in 1..=5 {
             let Cost { factorisation, solve, .. } = structure.cost(s);
-            let (counted, counted_solve, error) = eliminate(structure, s);
+            let (counted, counted_solve, error) = eliminate_by_plan(structure, s);
             assert_eq!((factorisation, solve), (counted, counted_solve), "{} s = {s}", structure.name);
             // Dominant diagonals: a condition of some ten, some hundred roundings.
             assert!(error < 1e3 * f64::EPSILON, "{}: {error}", structure.name);
@@ -226,14 +228,14 @@ fn costs_are_those_of_the_plan() {
 /// LU factors of a matrix of `n` rows and a solve with them, operation by operation: the cost
 /// without a plan.
 #[test]
-fn costs_without_a_plan() {
+fn costs_of_dense_elimination() {
     let structure = Structure { elimination: casados::__private::Elimination::NONE, ..*Tank::describe() };
     for s in 1..=4 {
         let n = 3 * s;
         let mut a: Matrix = (0..n)
             .map(|i| (0..n).map(|j| Counted(if i == j { 8.0 } else { 1.0 / (1 + i + j) as f64 })).collect())
             .collect();
-        let ((), factorisation) = count(|| {
+        let ((), factorisation) = count_operations(|| {
             for k in 0..n {
                 for i in k + 1..n {
                     let factor = a[i][k] / a[k][k];
@@ -246,7 +248,7 @@ fn costs_without_a_plan() {
             }
         });
         let mut b = vec![Counted(1.0); n];
-        let ((), solve) = count(|| {
+        let ((), solve) = count_operations(|| {
             for i in 0..n {
                 b[i] = (0..i).fold(b[i], |sum, k| sum - a[i][k] * b[k]);
             }

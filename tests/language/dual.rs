@@ -85,8 +85,8 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
         G::jacobian_constants::<f64>(&mut sparse);
         M::residual_jacobian::<f64>(&v, &mut f, &mut jacobian);
         G::residual_jacobian::<f64>(&v, &mut g, &mut sparse);
-        close("residual", f.as_ref(), g.as_ref());
-        close(
+        assert_close("residual", f.as_ref(), g.as_ref());
+        assert_close(
             "Jacobian",
             &dense(&M::STRUCTURE.jacobian, jacobian.as_ref(), M::Shape::NV),
             &dense(&G::STRUCTURE.jacobian, sparse.as_ref(), M::Shape::NV),
@@ -105,25 +105,25 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
             f.as_ref().iter().map(|f| (f.value, f.derivative)).unzip()
         };
         assert_eq!(parts(&of_graph).0, g.as_ref());
-        close("values of duals", &parts(&of_dual).0, f.as_ref());
+        assert_close("values of duals", &parts(&of_dual).0, f.as_ref());
         let mut product = vec![0.0; M::Shape::NK];
         for (entry, value) in sparse.as_ref().iter().enumerate() {
             let (row, column) = G::STRUCTURE.jacobian.at(entry);
             product[row] += value * direction(column);
         }
-        close("tangent of duals", &parts(&of_dual).1, &product);
-        close("tangent of the graph", &parts(&of_graph).1, &product);
+        assert_close("tangent of duals", &parts(&of_dual).1, &product);
+        assert_close("tangent of the graph", &parts(&of_graph).1, &product);
 
         let (mut a, mut b) = (ArrayV::<M, f64>::from_fn(zero), ArrayV::<M, f64>::from_fn(zero));
         M::adjoint::<f64>(&v, &mu, &mut a);
         G::adjoint::<f64>(&v, &mu, &mut b);
-        close("adjoint", a.as_ref(), b.as_ref());
+        assert_close("adjoint", a.as_ref(), b.as_ref());
 
         let mut hessian = M::Hessian::<f64>::from_fn(|_| f64::NAN);
         let mut sparse = G::Hessian::<f64>::from_fn(|_| f64::NAN);
         M::hessian::<f64>(&v, &mu, &mut hessian);
         G::hessian::<f64>(&v, &mu, &mut sparse);
-        close(
+        assert_close(
             "Hessian",
             &dense(&M::STRUCTURE.hessian, hessian.as_ref(), M::Shape::NV),
             &dense(&G::STRUCTURE.hessian, sparse.as_ref(), M::Shape::NV),
@@ -140,7 +140,7 @@ fn dense(pattern: &Pattern, values: &[f64], columns: usize) -> Vec<f64> {
     matrix
 }
 
-fn close(what: &str, a: &[f64], b: &[f64]) {
+fn assert_close(what: &str, a: &[f64], b: &[f64]) {
     assert_eq!(a.len(), b.len());
     let scale = b.iter().fold(1.0, |scale: f64, value| scale.max(value.abs()));
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
@@ -157,7 +157,7 @@ fn points(length: usize, count: usize) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn derivatives_are_those_of_the_graph() {
+fn derivatives_of_dual_models() {
     compare::<Pendulum, graph::Pendulum>(&points(10, 20));
     compare::<Chain<12>, graph::Chain<12>>(&points(26, 20));
     // On both sides of every branch.
@@ -172,7 +172,7 @@ fn derivatives_are_those_of_the_graph() {
 
 /// The values are those of the function, bit by bit.
 #[test]
-fn values_are_those_of_the_function() {
+fn values_of_dual_models() {
     let v = [0.3, 0.1, -0.2, 0.5, 0.0, 0.4, 1.0, -1.5, 2.0, 0.0];
     let mut f = [0.0; 4];
     let expected = pendulum([0.3, 0.1, -0.2, 0.5], [0.0, 0.4, 1.0, -1.5], [2.0]);
@@ -193,7 +193,7 @@ fn values_are_those_of_the_function() {
 /// the control, which is no state of the second equation, three evaluations instead of 25. Three
 /// pairs of them have second derivatives.
 #[test]
-fn sparse_models_take_few_passes() {
+fn colouring_of_sparse_models() {
     Chain::<12>::residual_jacobian::<f64>(&[0.3; 26], &mut [0.0; 12], &mut [0.0; 300]);
     let passes = Chain::<12>::passes().get().unwrap();
     assert_eq!((passes.len(), passes.pairs().len()), (3, 3));
@@ -201,7 +201,7 @@ fn sparse_models_take_few_passes() {
 
 /// A model that looks at its state may depend on anything elsewhere.
 #[test]
-fn models_that_branch_take_a_pass_for_each_variable() {
+fn colouring_of_models_with_branches() {
     Spring::residual_jacobian::<f64>(&[0.3; 8], &mut [0.0; 2], &mut [0.0; 14]);
     let passes = Spring::passes().get().unwrap();
     assert_eq!((passes.len(), passes.pairs().len()), (7, 28));
@@ -250,7 +250,7 @@ mod doubled {
 }
 
 #[test]
-fn explicit_models_are_explicit() {
+fn explicit_dual_models() {
     assert_eq!(Doubled::STRUCTURE.x.len(), doubled::doubled([1.0]).len());
     assert_eq!(Spring::ROWS, [(0, 1.0), (1, 1.0)]);
     assert_eq!(Spring::STRUCTURE.u, ["u"]);

@@ -1,6 +1,6 @@
 //! Elementary functions and constants.
 
-use crate::{emitted, part, point, same_bits};
+use crate::{emitted_residual, same_bits, subarray, test_point};
 use casados::{Dae, dae, ode};
 
 #[dae]
@@ -82,17 +82,17 @@ fn fused(xdot: [f64; 1], x: [f64; 1], u: [f64; 2]) -> [f64; 1] {
 
 #[test]
 fn functions_of_one_argument() {
-    same_bits::<Unary>(|v| unary(part(v, 0), part(v, 27)).to_vec());
+    same_bits::<Unary>(|v| unary(subarray(v, 0), subarray(v, 27)).to_vec());
 }
 
 #[test]
 fn functions_of_two_arguments() {
-    same_bits::<Binary>(|v| binary(part(v, 0), part(v, 10), part(v, 20)).to_vec());
+    same_bits::<Binary>(|v| binary(subarray(v, 0), subarray(v, 10), subarray(v, 20)).to_vec());
 }
 
 #[test]
 fn named_constants() {
-    same_bits::<Constants>(|v| constants(part(v, 0), part(v, 3)).to_vec());
+    same_bits::<Constants>(|v| constants(subarray(v, 0), subarray(v, 3)).to_vec());
 }
 
 /// `mul_add` rounds once, the emitted `a * b + c` twice: each rounding is at most half an ulp of a
@@ -100,8 +100,9 @@ fn named_constants() {
 #[test]
 fn fused_multiplication() {
     for seed in 1..=20 {
-        let v = point(5, seed);
-        let (plain, found) = (fused(part(&v, 0), part(&v, 1), part(&v, 2))[0], emitted::<Fused>(&v)[0]);
+        let v = test_point(5, seed);
+        let (plain, found) =
+            (fused(subarray(&v, 0), subarray(&v, 1), subarray(&v, 2))[0], emitted_residual::<Fused>(&v)[0]);
         assert!((plain - found).abs() <= 3.0 * 8.0 * f64::EPSILON / 2.0, "{plain} {found}");
     }
     assert_eq!(Fused::STRUCTURE.u, ["u[0]", "u[1]"]);
@@ -115,12 +116,12 @@ fn structural_zeros(x: [f64; 2]) -> [f64; 2] {
 
 /// They are left out, NaN or not; what has any other factor keeps its NaN.
 #[test]
-fn structural_zeros_are_zeros() {
+fn elimination_of_structural_zeros() {
     let x = [-0.3, -0.7];
     let [first, second] = structural_zeros(x);
     assert!(first.is_nan() && second.is_nan());
     // v = (ẋ, x, t)
-    let found = crate::emitted::<StructuralZeros>(&[0.0, 0.0, x[0], x[1], 0.0]);
+    let found = crate::emitted_residual::<StructuralZeros>(&[0.0, 0.0, x[0], x[1], 0.0]);
     assert_eq!(found[0], 0.7);
     assert!(found[1].is_nan());
     // Of ẋ₀ and x₁, of ẋ₁ and x₀.

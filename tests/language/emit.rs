@@ -29,7 +29,7 @@ fn long(xdot: [f64; 3], x: [f64; 3]) -> [f64; 3] {
 }
 
 #[test]
-fn values_are_those_of_the_function() {
+fn emitted_values() {
     for x in [-1.5, -0.0, 0.0, 0.3, 2.0] {
         let mut f = [0.0; 2];
         Valve::residual::<f64>(&[0.3, x, 1.7, -0.4, 0.9], &mut f);
@@ -43,6 +43,6 @@ fn values_are_those_of_the_function() {
 }
 
 #[test]
-fn derivatives_agree_with_dual_numbers() {
+fn emitted_derivatives() {
     check_derivatives::<Valve>(&Points::random(10).x(0, 0.2..=1.0)).assert();
 }

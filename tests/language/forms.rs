@@ -1,6 +1,6 @@
 //! Forms of a model: arguments in any order, references, structs, modules, const parameters.
 
-use crate::{part, same_bits};
+use crate::{same_bits, subarray};
 use casados::Shape;
 use casados::{Dae, Ode, dae, ode};
 
@@ -103,7 +103,9 @@ fn range_of_sizes<const K: usize>(x: [f64; K]) -> [f64; K] {
 #[test]
 fn arguments_in_any_order() {
     // v = (ẋ, x, z, u, p, t)
-    same_bits::<AnyOrder>(|v| any_order(v[7], [v[6]], [v[4]], &part(v, 2), &v[5], &part(v, 0)).to_vec());
+    same_bits::<AnyOrder>(|v| {
+        any_order(v[7], [v[6]], [v[4]], &subarray(v, 2), &v[5], &subarray(v, 0)).to_vec()
+    });
     assert_eq!(AnyOrder::STRUCTURE.z, ["z[0]"]);
     assert_eq!(AnyOrder::STRUCTURE.u, ["u"]);
     assert_eq!(AnyOrder::STRUCTURE.p, ["p[0]"]);
@@ -116,7 +118,7 @@ fn scalars_and_another_name() {
 }
 
 #[test]
-fn structs_in_a_module() {
+fn structs_of_a_module() {
     let body = |v: &[f64]| crane::Body { position: v[0], velocity: v[1] };
     let state = |v: &[f64]| crane::Full { cart: body(v), loads: [body(&v[2..]), body(&v[4..])] };
     same_bits::<Crane>(|v| {
@@ -138,16 +140,16 @@ fn structs_in_a_module() {
 }
 
 #[test]
-fn a_marked_function() {
+fn marked_functions() {
     same_bits::<TwoCandidates>(|v| vec![v[0] - two_candidates::right([v[1]])[0]]);
 }
 
 #[test]
-fn one_text_for_many_sizes() {
-    same_bits::<Ladder<1>>(|v| ladder::<1>(part(v, 0), part(v, 1), part(v, 2)).to_vec());
-    same_bits::<Ladder<3>>(|v| ladder::<3>(part(v, 0), part(v, 3), part(v, 6)).to_vec());
+fn size_parameters() {
+    same_bits::<Ladder<1>>(|v| ladder::<1>(subarray(v, 0), subarray(v, 1), subarray(v, 2)).to_vec());
+    same_bits::<Ladder<3>>(|v| ladder::<3>(subarray(v, 0), subarray(v, 3), subarray(v, 6)).to_vec());
     same_bits::<Grid<2, 3>>(|v| {
-        let g = grid([part::<3>(v, 6), part(v, 9)]);
+        let g = grid([subarray::<3>(v, 6), subarray(v, 9)]);
         (0..6).map(|i| v[i] - g[i / 3][i % 3]).collect()
     });
     same_bits::<RangeOfSizes<3>>(|v| (0..3).map(|i| v[i] + v[3 + i]).collect());

@@ -18,7 +18,10 @@ const NV: usize = 9;
 const NY: usize = 4;
 
 /// `f` with a seed in each variable in turn: a matrix with a column for each.
-fn columns<const N: usize>(v: &[f64; NV], f: impl Fn(&[f64; NV], usize) -> [f64; N]) -> [[f64; NV]; N] {
+fn tangent_columns<const N: usize>(
+    v: &[f64; NV],
+    f: impl Fn(&[f64; NV], usize) -> [f64; N],
+) -> [[f64; NV]; N] {
     let mut matrix = [[0.0; NV]; N];
     // The last variable is the time.
     for column in 0..NV - 1 {
@@ -39,7 +42,7 @@ fn seeded<S: Scalar>(v: &[f64; NV], column: usize) -> [Forward<S>; NV] {
 /// A step so small that its square is nothing beside one.
 const STEP: f64 = 1e-100;
 
-fn stepped(v: &[f64; NV], column: usize) -> [Complex<f64>; NV] {
+fn complex_step_columns(v: &[f64; NV], column: usize) -> [Complex<f64>; NV] {
     core::array::from_fn(|i| Complex::new(v[i], if i == column { STEP } else { 0.0 }))
 }
 
@@ -90,7 +93,7 @@ fn points() -> impl Iterator<Item = ([f64; NV], [f64; NY])> {
 }
 
 #[test]
-fn values_are_those_of_the_function() {
+fn values_of_functions() {
     for (v, _) in points() {
         let mut y = [0.0; NY];
         Outputs::value::<f64>(&v, &mut y);
@@ -99,18 +102,18 @@ fn values_are_those_of_the_function() {
 }
 
 #[test]
-fn first_derivatives_three_ways() {
+fn first_derivatives_by_three_methods() {
     for (v, mu) in points() {
         let own = jacobian(&v);
-        let forward = columns(&v, |v, column| {
+        let forward = tangent_columns(&v, |v, column| {
             let mut y = [Forward { re: 0.0, d: 0.0 }; NY];
             Outputs::value_of(&seeded::<f64>(v, column), &mut y);
             y.map(|y| y.d)
         });
         assert_close(&own, &forward);
-        let complex = columns(&v, |v, column| {
+        let complex = tangent_columns(&v, |v, column| {
             let mut y = [Complex::new(0.0, 0.0); NY];
-            Outputs::value_of(&stepped(v, column), &mut y);
+            Outputs::value_of(&complex_step_columns(v, column), &mut y);
             y.map(|y| y.im / STEP)
         });
         assert_close(&own, &complex);
@@ -140,7 +143,7 @@ fn derivatives_by_the_time() {
         let mut rate = [f64::NAN; NY];
         Outputs::time_derivative::<f64>(&v, &mut rate);
         let mut y = [Complex::new(0.0, 0.0); NY];
-        Outputs::value_of(&stepped(&v, NV - 1), &mut y);
+        Outputs::value_of(&complex_step_columns(&v, NV - 1), &mut y);
         for (rate, y) in rate.iter().zip(y) {
             assert!((rate - y.im / STEP).abs() <= 1e-15);
         }
@@ -149,20 +152,20 @@ fn derivatives_by_the_time() {
 }
 
 #[test]
-fn second_derivatives_three_ways() {
+fn second_derivatives_by_three_methods() {
     for (v, mu) in points() {
         let own = hessian(&v, &mu);
-        let forward = columns(&v, |v, column| {
+        let forward = tangent_columns(&v, |v, column| {
             let mut gradient = [Forward { re: 0.0, d: 0.0 }; NV];
             let mu = mu.map(|mu| Forward { re: mu, d: 0.0 });
             Outputs::adjoint_of(&seeded::<f64>(v, column), &mu, &mut gradient);
             gradient.map(|g| g.d)
         });
         assert_close(&own, &forward);
-        let complex = columns(&v, |v, column| {
+        let complex = tangent_columns(&v, |v, column| {
             let mut gradient = [Complex::new(0.0, 0.0); NV];
             let mu = mu.map(|mu| Complex::new(mu, 0.0));
-            Outputs::adjoint_of(&stepped(v, column), &mu, &mut gradient);
+            Outputs::adjoint_of(&complex_step_columns(v, column), &mu, &mut gradient);
             gradient.map(|g| g.im / STEP)
         });
         assert_close(&own, &complex);
@@ -184,7 +187,7 @@ fn second_derivatives_three_ways() {
 }
 
 #[test]
-fn the_structure_is_known() {
+fn structure_of_functions() {
     let FunctionStructure { name, x, z, u, p, jacobian, blocks, constant, linear, variables, .. } =
         Outputs::STRUCTURE;
     assert_eq!(name, "Outputs");

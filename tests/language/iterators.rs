@@ -1,6 +1,6 @@
 //! Iterators and methods of arrays.
 
-use crate::{part, same_bits};
+use crate::{same_bits, subarray};
 use casados::dae;
 
 #[dae]
@@ -78,15 +78,17 @@ fn integers(xdot: [f64; 2], x: [f64; 2]) -> [f64; 2] {
 
 #[test]
 fn iterators() {
-    same_bits::<Adaptors>(|v| adaptors(part(v, 0), part(v, 8), part(v, 16)).to_vec());
+    same_bits::<Adaptors>(|v| adaptors(subarray(v, 0), subarray(v, 8), subarray(v, 16)).to_vec());
 }
 
 #[test]
 fn methods_of_arrays() {
-    same_bits::<Arrays>(|v| arrays(part(v, 0), part(v, 6), [part(v, 12), part(v, 15)]).to_vec());
+    same_bits::<Arrays>(|v| {
+        arrays(subarray(v, 0), subarray(v, 6), [subarray(v, 12), subarray(v, 15)]).to_vec()
+    });
 }
 
 #[test]
 fn methods_of_integers() {
-    same_bits::<Integers>(|v| integers(part(v, 0), part(v, 2)).to_vec());
+    same_bits::<Integers>(|v| integers(subarray(v, 0), subarray(v, 2)).to_vec());
 }

@@ -85,13 +85,13 @@ mod tested {
 }
 
 #[test]
-fn operations_keep_their_precedence() {
+fn operator_precedence() {
     same_bits::<Precedence>(|v| vec![v[0] - precedence(v[1])]);
     assert_eq!(precedence(2.0), 6.0);
 }
 
 #[test]
-fn variables_of_a_macro_are_its_own() {
+fn macro_hygiene() {
     same_bits::<RawNames>(|v| vec![v[0] - raw_names(v[1])]);
     same_bits::<Hygiene>(|v| {
         let rate = hygiene([v[2], v[3]]);
@@ -101,7 +101,7 @@ fn variables_of_a_macro_are_its_own() {
 }
 
 #[test]
-fn constants_may_be_called_like_emitted_code() {
+fn names_of_constants() {
     same_bits::<some::Some>(|v| {
         let rate = some::some([v[2], v[3]]);
         vec![v[0] - rate[0], v[1] - rate[1]]
@@ -109,11 +109,11 @@ fn constants_may_be_called_like_emitted_code() {
 }
 
 #[test]
-fn names_without_upper_case_have_a_type() {
+fn names_without_upper_case() {
     same_bits::<M模型>(|v| vec![v[0] - 模型(v[1])]);
 }
 
 #[test]
-fn modules_of_tests_are_left_out() {
+fn modules_of_tests() {
     same_bits::<tested::Tested>(|v| vec![v[0] - tested::tested(v[1])]);
 }

@@ -43,7 +43,7 @@ use casados::{__private::Array, Shape};
 use casados::{__private::ArrayV, Dae};
 
 /// The residual that was emitted for a model.
-pub fn emitted<M: Dae>(v: &[f64]) -> Vec<f64> {
+pub fn emitted_residual<M: Dae>(v: &[f64]) -> Vec<f64> {
     assert_eq!(v.len(), M::Shape::NV, "number of variables of {}", M::STRUCTURE.name);
     let v = <ArrayV<M, f64>>::from_fn(|i| v[i]);
     let mut f = Array::from_fn(|_| f64::NAN);
@@ -52,7 +52,7 @@ pub fn emitted<M: Dae>(v: &[f64]) -> Vec<f64> {
 }
 
 /// Numbers between −2 and 2 that no two variables share, a different row for each `seed`.
-pub fn point(length: usize, seed: u64) -> Vec<f64> {
+pub fn test_point(length: usize, seed: u64) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x1234_5678_9abc_def1);
     (0..length)
         .map(|_| {
@@ -67,8 +67,8 @@ pub fn point(length: usize, seed: u64) -> Vec<f64> {
 /// Compares the emitted residual of a model with the plain function at several points, bit by bit.
 pub fn same_bits<M: Dae>(plain: impl Fn(&[f64]) -> Vec<f64>) {
     for seed in 1..=20 {
-        let v = point(M::Shape::NV, seed);
-        let (expected, found) = (plain(&v), emitted::<M>(&v));
+        let v = test_point(M::Shape::NV, seed);
+        let (expected, found) = (plain(&v), emitted_residual::<M>(&v));
         assert_eq!(expected.len(), M::Shape::NK);
         for (row, (e, f)) in expected.iter().zip(&found).enumerate() {
             // The sign of a zero apart: structural zeros have none.
@@ -79,6 +79,6 @@ pub fn same_bits<M: Dae>(plain: impl Fn(&[f64]) -> Vec<f64>) {
 }
 
 /// `v[start..start + N]`
-pub fn part<const N: usize>(v: &[f64], start: usize) -> [f64; N] {
+pub fn subarray<const N: usize>(v: &[f64], start: usize) -> [f64; N] {
     v[start..start + N].try_into().unwrap()
 }

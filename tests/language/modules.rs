@@ -52,7 +52,7 @@ mod crane {
 }
 
 #[test]
-fn parts_of_a_module_share_its_names() {
+fn names_in_a_module() {
     assert_eq!(Crane::STRUCTURE.x, ["x.cart", "x.swing", "x.rates[0]", "x.rates[1]"]);
     assert_eq!(Load::STRUCTURE.x, Crane::STRUCTURE.x);
     assert_eq!(Energy::STRUCTURE.p, ["p.rope"]);
@@ -67,7 +67,7 @@ fn parts_of_a_module_share_its_names() {
 
 /// Half the pace for twice the time.
 #[test]
-fn several_models_stand_in_one_module() -> Result<(), casados::Error> {
+fn several_models_in_one_module() -> Result<(), casados::Error> {
     let options = Options { steps: 40, ..Default::default() };
     let mut irk = Irk::<Crane, Gauss<3>>::new(options)?;
     let mut slow = Erk::<SlowCrane, Rk4>::new(Options { steps: 4000, ..options })?;
@@ -81,7 +81,7 @@ fn several_models_stand_in_one_module() -> Result<(), casados::Error> {
 
 /// A cost of the module's own fits to its model.
 #[test]
-fn functions_of_a_module_are_costs() -> Result<(), Box<dyn std::error::Error>> {
+fn costs_in_a_module() -> Result<(), Box<dyn std::error::Error>> {
     let mut ocp = Problem::new(Irk::<Crane, Gauss<2>>::new(Options::default())?)
         .running_cost(LeastSquaresCost::<Load>::new(&Matrix2::identity()))
         .on(Horizon::uniform(10, 0.1))?;
@@ -110,7 +110,7 @@ mod outputs {
 }
 
 #[test]
-fn a_module_need_not_have_a_model_of_its_own() {
+fn modules_without_a_main_model() {
     let v = [0.0, 0.5, 2.0, 0.0];
     let mut y = [0.0];
     Doubled::value::<f64>(&v, &mut y);

@@ -1,6 +1,6 @@
 //! Small nalgebra values.
 
-use crate::{part, same_bits};
+use crate::{same_bits, subarray};
 use casados::dae;
 use nalgebra::{
     Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6, matrix, vector,
@@ -54,15 +54,15 @@ fn matrices(xdot: Matrix3<f64>, x: Matrix3<f64>, u: Matrix2<f64>) -> Matrix3<f64
 }
 
 #[test]
-fn vectors_have_the_bits_of_nalgebra() {
+fn vector_operations() {
     same_bits::<Vectors>(|v| {
-        let [xdot, x] = [Vector6::from(part::<6>(v, 0)), Vector6::from(part::<6>(v, 6))];
-        vectors(xdot, x, Vector3::from(part::<3>(v, 12))).as_slice().to_vec()
+        let [xdot, x] = [Vector6::from(subarray::<6>(v, 0)), Vector6::from(subarray::<6>(v, 6))];
+        vectors(xdot, x, Vector3::from(subarray::<3>(v, 12))).as_slice().to_vec()
     });
 }
 
 #[test]
-fn matrices_have_the_bits_of_nalgebra() {
+fn matrix_operations() {
     same_bits::<Matrices>(|v| {
         let xdot = Matrix3::from_column_slice(&v[..9]);
         let x = Matrix3::from_column_slice(&v[9..18]);

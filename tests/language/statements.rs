@@ -1,6 +1,6 @@
 //! Patterns, assignments, loops, branches, functions, closures, structs and enums in a body.
 
-use crate::{part, same_bits};
+use crate::{same_bits, subarray};
 use casados::{dae, ode};
 
 #[dae]
@@ -188,30 +188,32 @@ fn structures(xdot: [f64; 2], x: [f64; 2], u: f64) -> [f64; 2] {
 #[test]
 fn patterns_and_assignments() {
     same_bits::<Patterns>(|v| {
-        let (f, g) = patterns(part(v, 0), part(v, 4), part(v, 9), v[8], v[11]);
+        let (f, g) = patterns(subarray(v, 0), subarray(v, 4), subarray(v, 9), v[8], v[11]);
         f.into_iter().chain([g]).collect()
     });
 }
 
 #[test]
-fn loops_of_every_kind() {
-    same_bits::<Loops>(|v| loops(part(v, 0), part(v, 6), [part(v, 12), part(v, 14), part(v, 16)]).to_vec());
+fn kinds_of_loops() {
+    same_bits::<Loops>(|v| {
+        loops(subarray(v, 0), subarray(v, 6), [subarray(v, 12), subarray(v, 14), subarray(v, 16)]).to_vec()
+    });
 }
 
 #[test]
 fn branches_at_run_time_and_compile_time() {
-    same_bits::<Branches>(|v| branches(part(v, 0), part(v, 4), part(v, 8)).to_vec());
+    same_bits::<Branches>(|v| branches(subarray(v, 0), subarray(v, 4), subarray(v, 8)).to_vec());
 }
 
 #[test]
 fn functions_and_closures() {
     same_bits::<Functions>(|v| {
-        let g = functions(part(v, 3), v[6]);
+        let g = functions(subarray(v, 3), v[6]);
         (0..3).map(|i| v[i] - g[i]).collect()
     });
 }
 
 #[test]
 fn structs_and_enums() {
-    same_bits::<Structures>(|v| structures(part(v, 0), part(v, 2), v[4]).to_vec());
+    same_bits::<Structures>(|v| structures(subarray(v, 0), subarray(v, 2), v[4]).to_vec());
 }

@@ -1,7 +1,7 @@
 //! Tables in models: bits of the function, derivatives three ways, integrators, batches, a problem
 //! of optimal control.
 
-use crate::{part, same_bits};
+use crate::{same_bits, subarray};
 use casados::ocp::{Exact, GeneralCost, HeapSqp, Horizon, Problem};
 use casados::prelude::*;
 use casados::tables::{Spline, Spline2};
@@ -62,17 +62,17 @@ fn outside(x: [f64; 2], u: f64) -> [f64; 2] {
 }
 
 #[test]
-fn emitted_code_has_the_bits_of_the_function() {
-    same_bits::<Seen>(|v| seen::seen(part(v, 0), part(v, 2), v[4]).to_vec());
+fn emitted_values_of_tables() {
+    same_bits::<Seen>(|v| seen::seen(subarray(v, 0), subarray(v, 2), v[4]).to_vec());
     same_bits::<Outside>(|v| {
-        let rates = outside(part(v, 2), v[4]);
+        let rates = outside(subarray(v, 2), v[4]);
         vec![v[0] - rates[0], v[1] - rates[1]]
     });
 }
 
 /// Away from the points, where third derivatives jump: differences know nothing of them.
 #[test]
-fn derivatives_are_exact_three_ways() {
+fn derivatives_of_tables_by_three_methods() {
     let list = |points: &[[f64; 3]]| -> Vec<_> {
         points.iter().map(|&[x, y, u]| [0.1, -0.2, x, y, u, 0.0]).collect()
     };
@@ -84,7 +84,7 @@ fn derivatives_are_exact_three_ways() {
 
 /// What is known to be linear has no second derivatives.
 #[test]
-fn linear_tables_have_no_hessian() {
+fn hessian_of_linear_tables() {
     #[ode]
     fn line(x: f64) -> f64 {
         const LINE: casados::tables::Linear<2> = casados::tables::Linear::new([0.0, 1.0], [1.0, 3.0]);
@@ -107,7 +107,7 @@ mod tank {
 }
 
 #[test]
-fn integrators_take_tables() -> Result<(), casados::Error> {
+fn integrators_of_models_with_tables() -> Result<(), casados::Error> {
     // The slope is one half everywhere.
     let mut irk = Irk::<Tank, Gauss<4>>::new(Options { steps: 4, ..Default::default() })?;
     let end = irk.forward(&vector![3.0], &vector![], 1.0)?;
@@ -147,7 +147,7 @@ mod bead {
 }
 
 #[test]
-fn tables_are_differentiated_in_time() -> Result<(), casados::Error> {
+fn index_reduction_of_tables() -> Result<(), casados::Error> {
     let x0 = vector![0.6, bead::WIRE.value(0.6), 0.0, 0.0];
     let mut irk = Irk::<Bead, Gauss<3>>::new(Options { steps: 100, ..Default::default() })?;
     let x = irk.solve(&x0, &vector![], 1.0)?.x;
@@ -162,7 +162,7 @@ fn tables_are_differentiated_in_time() -> Result<(), casados::Error> {
 
 /// Registers look up lane by lane, inside of the points and outside.
 #[test]
-fn batches_take_tables() -> Result<(), Box<dyn std::error::Error>> {
+fn batches_of_models_with_tables() -> Result<(), Box<dyn std::error::Error>> {
     let options = Options { steps: 2, ..Default::default() };
     let mut batch = Batch::<Seen, Gauss<2>>::new(options)?;
     let mut irk = Irk::<Seen, Gauss<2>>::new(options)?;
@@ -206,7 +206,7 @@ fn effort(x: f64, u: f64) -> f64 {
 }
 
 #[test]
-fn problems_take_tables() -> Result<(), Box<dyn std::error::Error>> {
+fn problems_with_tables() -> Result<(), Box<dyn std::error::Error>> {
     fn controls<M: casados::Dae<Shape = casados::Dims<1, 0, 1, 0, 1, 4, 2, 8>>>()
     -> Result<Vec<f64>, Box<dyn std::error::Error>> {
         let mut ocp = Problem::new(Irk::<M, Gauss<2>>::new(Options::default())?)

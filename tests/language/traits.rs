@@ -152,7 +152,7 @@ mod hidden {
 }
 
 #[test]
-fn own_methods_hide_those_of_traits() {
+fn method_resolution() {
     same_bits::<hidden::Hidden>(|v| {
         let rates = hidden::hidden(nalgebra::Vector3::new(v[3], v[4], v[5]));
         (0..3).map(|i| v[i] - rates[i]).collect()
@@ -168,7 +168,7 @@ fn conversions_between_types() {
 }
 
 #[test]
-fn implementations_for_several_arguments() {
+fn trait_implementations_for_several_types() {
     same_bits::<Overloads>(|v| {
         let g = overloads::overloads([v[2], v[3]]);
         vec![v[0] - g[0], v[1] - g[1]]
@@ -176,6 +176,6 @@ fn implementations_for_several_arguments() {
 }
 
 #[test]
-fn defaults_and_matches() {
+fn defaults_and_matches_macro() {
     same_bits::<Defaults>(|v| vec![defaults::defaults(v[0], v[1])]);
 }

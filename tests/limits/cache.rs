@@ -13,17 +13,17 @@ use nalgebra::SVector;
 type Test = Result<(), Box<dyn std::error::Error>>;
 
 /// One interval is left over in a register of four, three in one of eight.
-const COUNT: usize = 11;
+const INTERVAL_COUNT: usize = 11;
 
 /// The stages of two steps of a chain of five masses fit for as many lanes as there are, its
 /// columns for none.
-const CACHE: usize = 40 << 10;
+const CACHE_SIZE: usize = 40 << 10;
 
 /// Both solve the same stages to rounding; the condition of the Newton matrix is of order ten, and
 /// two steps add up.
 const TOLERANCE: f64 = 2.0 * 100.0 * f64::EPSILON;
 
-fn close(what: &str, found: &[f64], expected: &[f64]) {
+fn assert_close(what: &str, found: &[f64], expected: &[f64]) {
     let size = expected.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
     for (found, expected) in found.iter().zip(expected) {
         let error = (found - expected).abs();
@@ -46,58 +46,58 @@ fn check(statistics: &BatchStatistics, alone: usize, redone: usize) {
 }
 
 #[test]
-fn stages_side_by_side_derivatives_alone() -> Test {
-    let _turn = crate::turn();
-    limit_cache(CACHE);
+fn derivatives_beyond_the_cache() -> Test {
+    let _turn = crate::serialise();
+    limit_cache(CACHE_SIZE);
     let wave = |k: usize| SVector::from_fn(|i, _| 0.01 * ((k * (i + 3)) as f64).sin());
-    let mut x0: Vec<SVector<f64, 21>> = (0..COUNT).map(|k| stretched() + wave(k)).collect();
+    let mut x0: Vec<SVector<f64, 21>> = (0..INTERVAL_COUNT).map(|k| stretched() + wave(k)).collect();
     let u: Vec<SVector<f64, 3>> =
-        (0..COUNT).map(|k| SVector::from_fn(|i, _| (k + i) as f64 / 20.0 - 1.0)).collect();
+        (0..INTERVAL_COUNT).map(|k| SVector::from_fn(|i, _| (k + i) as f64 / 20.0 - 1.0)).collect();
     let lambda: Vec<SVector<f64, 21>> =
-        (0..COUNT).map(|k| SVector::from_fn(|i, _| ((k + 2 * i) as f64).cos())).collect();
+        (0..INTERVAL_COUNT).map(|k| SVector::from_fn(|i, _| ((k + 2 * i) as f64).cos())).collect();
     let h = 0.2;
     for start in [Start::Zero, Start::Warm] {
         let options = Options { steps: 2, start, ..Default::default() };
         let mut batch = Batch::<Chain<21>, Gauss<2>>::new(options)?;
         let mut single = Irk::<Chain<21>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;
-        let mut nominal = vec![Nominal::default(); COUNT];
-        let mut forward = vec![Forward::default(); COUNT];
-        let mut adjoint = vec![Adjoint::default(); COUNT];
-        let mut both = vec![ForwardAdjoint::default(); COUNT];
-        let mut hessian = vec![Hessian::default(); COUNT];
+        let mut nominal = vec![Nominal::default(); INTERVAL_COUNT];
+        let mut forward = vec![Forward::default(); INTERVAL_COUNT];
+        let mut adjoint = vec![Adjoint::default(); INTERVAL_COUNT];
+        let mut both = vec![ForwardAdjoint::default(); INTERVAL_COUNT];
+        let mut hessian = vec![Hessian::default(); INTERVAL_COUNT];
         let intervals = Intervals { x0: &x0, u: &u, h: &[h], ..Default::default() };
         batch.solve(&intervals, &mut nominal)?;
         batch.adjoint(&intervals, &lambda, &mut adjoint)?;
         batch.forward(&intervals, &mut forward)?;
-        check(batch.statistics(), COUNT, 0);
+        check(batch.statistics(), INTERVAL_COUNT, 0);
         batch.forward_adjoint(&intervals, &lambda, &mut both)?;
-        check(batch.statistics(), COUNT, 0);
+        check(batch.statistics(), INTERVAL_COUNT, 0);
         batch.hessian(&intervals, &lambda, &mut hessian)?;
-        check(batch.statistics(), COUNT, 0);
-        for k in 0..COUNT {
+        check(batch.statistics(), INTERVAL_COUNT, 0);
+        for k in 0..INTERVAL_COUNT {
             let expected = single.hessian(&x0[k], &u[k], h, &lambda[k])?;
-            close("x", nominal[k].x.as_slice(), expected.x.as_slice());
+            assert_close("x", nominal[k].x.as_slice(), expected.x.as_slice());
             for found in [&forward[k], &both[k].forward, &hessian[k].first.forward] {
-                close("x", found.x.as_slice(), expected.x.as_slice());
-                close("dx/dx0", found.dx_dx0.as_slice(), expected.dx_dx0.as_slice());
-                close("dx/du", found.dx_du.as_slice(), expected.dx_du.as_slice());
+                assert_close("x", found.x.as_slice(), expected.x.as_slice());
+                assert_close("dx/dx0", found.dx_dx0.as_slice(), expected.dx_dx0.as_slice());
+                assert_close("dx/du", found.dx_du.as_slice(), expected.dx_du.as_slice());
             }
             for found in [&adjoint[k].grad_x0, &both[k].grad_x0, &hessian[k].grad_x0] {
-                close("gradient", found.as_slice(), expected.grad_x0.as_slice());
+                assert_close("gradient", found.as_slice(), expected.grad_x0.as_slice());
             }
-            close("h_xx", hessian[k].h_xx.as_slice(), expected.h_xx.as_slice());
-            close("h_xu", hessian[k].h_xu.as_slice(), expected.h_xu.as_slice());
-            close("h_uu", hessian[k].h_uu.as_slice(), expected.h_uu.as_slice());
+            assert_close("h_xx", hessian[k].h_xx.as_slice(), expected.h_xx.as_slice());
+            assert_close("h_xu", hessian[k].h_xu.as_slice(), expected.h_xu.as_slice());
+            assert_close("h_uu", hessian[k].h_uu.as_slice(), expected.h_uu.as_slice());
         }
     }
 
     // Where masses lie at one point springs have no direction. Others hear nothing of it.
     let mut batch = Batch::<Chain<21>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;
     let mut single = Irk::<Chain<21>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;
-    let mut expected = vec![Forward::default(); COUNT];
+    let mut expected = vec![Forward::default(); INTERVAL_COUNT];
     batch.forward(&Intervals { x0: &x0, u: &u, h: &[h], ..Default::default() }, &mut expected)?;
     x0[4] = SVector::zeros();
-    let mut found = vec![Forward::default(); COUNT];
+    let mut found = vec![Forward::default(); INTERVAL_COUNT];
     let outcome = batch.forward(&Intervals { x0: &x0, u: &u, h: &[h], ..Default::default() }, &mut found);
     let error = single.forward(&x0[4], &u[4], h).expect_err("no solution");
     match outcome {
@@ -106,9 +106,9 @@ fn stages_side_by_side_derivatives_alone() -> Test {
         }
         other => panic!("{other:?}"),
     }
-    check(batch.statistics(), COUNT - 1, 1);
-    for k in (0..COUNT).filter(|&k| k != 4) {
-        close("dx/dx0", found[k].dx_dx0.as_slice(), expected[k].dx_dx0.as_slice());
+    check(batch.statistics(), INTERVAL_COUNT - 1, 1);
+    for k in (0..INTERVAL_COUNT).filter(|&k| k != 4) {
+        assert_close("dx/dx0", found[k].dx_dx0.as_slice(), expected[k].dx_dx0.as_slice());
     }
     assert_eq!(found[4], Forward::default());
     Ok(())

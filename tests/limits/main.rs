@@ -11,22 +11,22 @@ mod models {
 mod cache;
 mod registers;
 
-use casados::testing::{Level, limit, limit_cache};
+use casados::testing::{Level, limit_cache, limit_level};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The turn of a test. Whatever becomes of it, the next one finds the machine as it is.
-struct Turn {
+struct SerialTest {
     _guard: MutexGuard<'static, ()>,
 }
 
-fn turn() -> Turn {
+fn serialise() -> SerialTest {
     static TURN: Mutex<()> = Mutex::new(());
-    Turn { _guard: TURN.lock().unwrap_or_else(PoisonError::into_inner) }
+    SerialTest { _guard: TURN.lock().unwrap_or_else(PoisonError::into_inner) }
 }
 
-impl Drop for Turn {
+impl Drop for SerialTest {
     fn drop(&mut self) {
-        limit(Level::Avx512);
+        limit_level(Level::Avx512);
         limit_cache(0);
     }
 }

@@ -42,7 +42,7 @@ fn none() -> SVector<f64, 0> {
 
 /// No states, no inputs, no time.
 #[test]
-fn t37_nothing() {
+fn t37_empty_models() {
     let mut irk = Irk::<Algebra, RadauIIA<2>>::new(Options::default()).expect("valid");
     let hessian = irk.hessian(&none(), &vector![10.0], 0.3, &none()).expect("a root");
     // 2 + 8 = 10, and dz/du = 1/(1 + 3 z²).
@@ -118,7 +118,7 @@ fn error_constant(nodes: &[f64], end: bool) -> f64 {
 
 /// Polynomials of degree `p − 1` are integrated exactly, and `t^p` with the error of the formula.
 #[test]
-fn t40_polynomials_are_exact() {
+fn t40_exact_polynomials() {
     macro_rules! check {
         ($($method:ident $s:literal)*) => {$(
             let tableau = <$method<$s> as Method<$s>>::TABLEAU;

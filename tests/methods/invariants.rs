@@ -72,7 +72,7 @@ fn creep(_x: f64, u: f64) -> f64 {
 }
 
 #[test]
-fn t09_what_is_carried_along() {
+fn t09_compensation_between_calls() {
     let (x0, u) = (vector![1.0], vector![f64::EPSILON / 4.0]);
     macro_rules! check {
         ($integrator:ident, $method:ty) => {
@@ -112,7 +112,7 @@ fn t10_reversibility() {
 
 /// Mass: the sum of the concentrations, the sums of their derivatives.
 #[test]
-fn t11_linear_invariants() {
+fn t11_linear_invariants_of_reactions() {
     let options = AdaptiveOptions { rtol: 1e-8, atol: 1e-16, ..Default::default() };
     let mut adaptive = Adaptive::<Robertson, Radau>::new(options).expect("valid");
     adaptive.set_parameters(&vector![0.04, 3e7, 1e4]).expect("finite");

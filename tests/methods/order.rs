@@ -63,7 +63,7 @@ fn steps(first: f64, ratio: f64, count: i32) -> Vec<usize> {
 ///
 /// The last terms are those of the next orders of the expansion, `m = 2` for symmetric methods.
 /// Methods of high order are at rounding long before these are negligible.
-fn slope(report: &Convergence, m: i32) -> f64 {
+fn fitted_order(report: &Convergence, m: i32) -> f64 {
     let rows: Vec<_> = report.rows.iter().filter(|row| row.1 > 1e-12 && row.1 < 0.03).collect();
     let rows = &rows[rows.len().saturating_sub(9)..];
     if rows.len() < 5 {
@@ -80,7 +80,7 @@ fn slope(report: &Convergence, m: i32) -> f64 {
 /// reach rounding.
 #[track_caller]
 fn check(name: &str, order: usize, m: i32, visible: usize, report: &Convergence) {
-    let found = slope(report, m);
+    let found = fitted_order(report, m);
     assert!(report.failure.is_none(), "{name}\n{report}");
     assert!(order > visible || (found - order as f64).abs() <= 0.1, "{name}: {found}\n{report}");
     assert!(order < 8 || report.best() <= 1e-14, "{name}\n{report}");
@@ -129,7 +129,7 @@ const PENDULUM_ANGLE: f64 = 2.0;
 
 /// Elliptic functions `(sn, cn, dn)(u, k)` by descending Landen transformations (Abramowitz and
 /// Stegun 16.4).
-fn jacobi(u: f64, k: f64) -> (f64, f64, f64) {
+fn jacobi_elliptic_functions(u: f64, k: f64) -> (f64, f64, f64) {
     let (mut a, mut c) = (vec![1.0], vec![k]);
     let mut b = (1.0 - k * k).sqrt();
     while c[c.len() - 1].abs() > 1e-16 {
@@ -155,7 +155,7 @@ fn pendulum_start() -> SVector<f64, 4> {
 /// `θ = 2 asin(k cd(ω t))` for a pendulum that is released at rest, `k = sin(θ₀/2)`.
 fn pendulum() -> [f64; 4] {
     let (k, omega) = ((PENDULUM_ANGLE / 2.0).sin(), GRAVITY.sqrt());
-    let (sn, cn, dn) = jacobi(omega * PENDULUM_TIME, k);
+    let (sn, cn, dn) = jacobi_elliptic_functions(omega * PENDULUM_TIME, k);
     let half = k * cn / dn;
     let angle = 2.0 * half.asin();
     // d cd/du = −(1 − k²) sn/dn²

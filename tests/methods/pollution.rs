@@ -63,7 +63,7 @@ pub const START: [f64; 20] = {
 };
 
 /// At t = 60, as published there.
-pub const END: [f64; 20] = [
+pub const END_VALUES: [f64; 20] = [
     0.5646255480022769e-1,
     0.1342484130422339,
     0.4139734331099427e-8,

@@ -67,7 +67,7 @@ macro_rules! for_stages {
 }
 
 #[test]
-fn t03_gauss_is_the_diagonal_pade_approximant() {
+fn t03_stability_function_of_gauss() {
     macro_rules! check {
         ($method:ident, $s:literal) => {
             for (z, exact) in reference("gauss", $s) {
@@ -86,7 +86,7 @@ fn t03_gauss_is_the_diagonal_pade_approximant() {
 }
 
 #[test]
-fn t03_radau_is_the_subdiagonal_pade_approximant() {
+fn t03_stability_function_of_radau() {
     macro_rules! check {
         ($method:ident, $s:literal) => {
             for (z, exact) in reference("radauIIA", $s) {
@@ -118,7 +118,7 @@ fn polynomial<const S: usize>(tableau: &Tableau<S>, z: Complex<f64>) -> (Complex
 }
 
 #[test]
-fn explicit_methods_are_polynomials() {
+fn stability_functions_of_explicit_methods() {
     macro_rules! check {
         ($($method:ident)*) => {$(
             let tableau = <$method as Method<_>>::TABLEAU;

@@ -80,7 +80,7 @@ fn relative(found: &[f64], expected: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn ends(name: &str) -> (Vec<f64>, Vec<f64>, Vec<Record>) {
+fn end_values(name: &str) -> (Vec<f64>, Vec<f64>, Vec<Record>) {
     let set = Record::load("ivp/ends.json").expect("the reference is there");
     let problem = set.record(name).expect("a problem");
     (
@@ -104,7 +104,7 @@ where
     M::Shape: Shape<VectorU<f64> = SVector<f64, 0>>,
 {
     use slices::Filled;
-    let (x0, p, ends) = ends(name);
+    let (x0, p, ends) = end_values(name);
     let mut adaptive = Adaptive::<M, Radau>::new(AdaptiveOptions { rtol, atol, ..Default::default() })?;
     if M::Shape::NP > 0 {
         adaptive.set_parameters(&Filled::from_slice(&p))?;
@@ -180,7 +180,7 @@ fn t12_relative_accuracy_over_decades() {
         let options = AdaptiveOptions { rtol, atol: 1e-20 * rtol, ..Default::default() };
         let mut adaptive = Adaptive::<Pollution, Radau>::new(options).expect("valid");
         let x = adaptive.solve(&pollution::START.into(), &SVector::zeros(), 60.0).expect("a solution").x;
-        let error = relative(x.as_slice(), &pollution::END);
+        let error = relative(x.as_slice(), &pollution::END_VALUES);
         println!("pollution, {rtol:e}: {error:e}");
         assert!(error <= 100.0 * rtol, "{rtol:e}: {error:e}");
     }
@@ -190,7 +190,7 @@ fn t12_relative_accuracy_over_decades() {
 /// Oregonator, 1.9e-15 of HIRES. That, and the rounding errors of some hundred steps, is what is
 /// left at the tightest tolerance.
 #[test]
-fn t39_data_rounding_floor() {
+fn t39_rounding_of_constants() {
     let tight = 1e-14;
     let robertson = errors::<Robertson>("robertson", 3, [tight, 1e-8 * tight], states).expect("a solution");
     let oregonator =

@@ -12,13 +12,13 @@ pub trait Equations: Dae {
 }
 
 /// Number of variables of each block of the Jacobian, `(ẋ, x, z, u, p)`.
-pub const fn widths<D: Shape>() -> [usize; 5] {
+pub const fn block_widths<D: Shape>() -> [usize; 5] {
     [D::NX, D::NX, D::NZ, D::NU, D::NP]
 }
 
 /// Where each block of a dense Jacobian begins, and the end.
 pub const fn blocks<D: Shape>() -> [usize; 6] {
-    let (widths, mut begin, mut block) = (widths::<D>(), [0; 6], 0);
+    let (widths, mut begin, mut block) = (block_widths::<D>(), [0; 6], 0);
     while block < 5 {
         begin[block + 1] = begin[block] + D::NK * widths[block];
         block += 1;
@@ -28,7 +28,8 @@ pub const fn blocks<D: Shape>() -> [usize; 6] {
 
 /// Rows and columns of a dense Jacobian with `N` entries: by block, row, column.
 pub const fn dense<D: Shape, const N: usize>() -> [[u32; N]; 2] {
-    let (widths, mut positions, mut entry, mut first, mut block) = (widths::<D>(), [[0; N]; 2], 0, 0, 0);
+    let (widths, mut positions, mut entry, mut first, mut block) =
+        (block_widths::<D>(), [[0; N]; 2], 0, 0, 0);
     while block < 5 {
         let mut row = 0;
         while row < D::NK {
@@ -63,7 +64,7 @@ pub const fn triangle<const N: usize>() -> [[u32; N]; 2] {
     positions
 }
 
-fn lane<S: Lanes>(values: &[S::Cell], lane: usize) -> Vec<f64> {
+fn scalar_of_lane<S: Lanes>(values: &[S::Cell], lane: usize) -> Vec<f64> {
     values.iter().map(|value| S::lane(value, lane)).collect()
 }
 
@@ -77,7 +78,7 @@ pub fn residual<M: Equations, S: Lanes>(v: &ArrayV<M, S::Cell>, f: &mut ArrayK<M
 pub fn jacobian<M: Equations, S: Lanes>(v: &ArrayV<M, S::Cell>, jacobian: &mut [S::Cell]) {
     let pattern = M::STRUCTURE.jacobian;
     for l in 0..S::LANES {
-        let v = lane::<S>(v.as_ref(), l);
+        let v = scalar_of_lane::<S>(v.as_ref(), l);
         for variable in 0..v.len() - 1 {
             let v: Vec<_> = (0..v.len()).map(|i| Dual64::new(v[i], f64::from(i == variable))).collect();
             let mut f = vec![Dual64::from(0.0); M::Shape::NK];
@@ -112,7 +113,7 @@ pub fn hessian<M: Equations, S: Lanes>(
     hessian: &mut [S::Cell],
 ) {
     for l in 0..S::LANES {
-        let (v, mu) = (lane::<S>(v.as_ref(), l), lane::<S>(mu.as_ref(), l));
+        let (v, mu) = (scalar_of_lane::<S>(v.as_ref(), l), scalar_of_lane::<S>(mu.as_ref(), l));
         for (entry, value) in hessian.iter_mut().enumerate() {
             let (a, b) = M::STRUCTURE.hessian.at(entry);
             let one = |i: usize, j: usize| f64::from(i == j);

@@ -53,7 +53,7 @@ fn from_hex(value: &Value) -> f64 {
 }
 
 #[test]
-fn t01_constants_are_correct_to_the_last_bit() {
+fn t01_constants() {
     let reference = reference();
     let mut compared = 0;
     for_collocation!(|tableau, family| {
@@ -101,7 +101,7 @@ fn simplifying_assumptions<const S: usize>(t: &Tableau<S>, [p, q, r]: [usize; 3]
 }
 
 #[test]
-fn t02_simplifying_assumptions_hold_to_rounding() {
+fn t02_simplifying_assumptions() {
     for_collocation!(|t, family| {
         let s = t.c().len();
         let orders = if family == "gauss" { [2 * s, s, s] } else { [2 * s - 1, s, s - 1] };
@@ -119,7 +119,7 @@ fn t02_simplifying_assumptions_hold_to_rounding() {
 }
 
 #[test]
-fn published_orders_are_the_computed_ones() {
+fn published_orders() {
     for_collocation!(|t, _family| {
         let own = Tableau::new(*t.a(), *t.b(), *t.c()).unwrap();
         assert_eq!((own.order(), own.stage_order()), (t.order(), t.stage_order()), "{}", t.name());
@@ -131,7 +131,7 @@ fn published_orders_are_the_computed_ones() {
 }
 
 #[test]
-fn properties() {
+fn properties_of_tableaux() {
     for_collocation!(|t, family| {
         assert!(!t.is_explicit() && t.is_collocation());
         assert_eq!(t.is_symplectic(), family == "gauss", "{}", t.name());
@@ -188,7 +188,7 @@ fn orders_of_other_published_methods() {
 }
 
 #[test]
-fn wrong_tableaux_are_refused() {
+fn invalid_tableaux() {
     let kutta = [[0.0, 0.0], [0.5, 0.0]];
     assert_eq!(
         Tableau::new([[f64::NAN, 0.0], [0.5, 0.0]], [0.0, 1.0], [0.0, 0.5]),
@@ -208,7 +208,7 @@ fn wrong_tableaux_are_refused() {
 }
 
 #[test]
-fn weights_at_the_nodes_are_the_tableau() {
+fn weights_at_the_nodes() {
     for_collocation!(|t, _family| {
         let s = t.c().len();
         // The condition of interpolation is the Lebesgue constant Σ|ℓ_i|, below 4 in [0, 1] for s ≤
@@ -230,7 +230,7 @@ fn weights_at_the_nodes_are_the_tableau() {
 }
 
 #[test]
-fn interpolation_is_exact_for_polynomials() {
+fn interpolation_of_polynomials() {
     for_collocation!(|t, _family| {
         let s = t.c().len();
         for theta in [-0.5, 0.0, 1e-9, 0.3, 0.77, 1.0, 1.25] {
@@ -263,7 +263,7 @@ fn interpolation_is_exact_for_polynomials() {
 /// `c_i = Σ_j a_ij` makes `t` an ordinary state: the end of a step of a quadrature of degree
 /// `p − 1` is exact.
 #[test]
-fn explicit_weights_integrate_polynomials() {
+fn interpolation_of_explicit_methods() {
     for_explicit!(|t| {
         let s = t.c().len();
         for k in 1..=t.order() {

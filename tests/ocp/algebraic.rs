@@ -116,7 +116,7 @@ macro_rules! at_a_point {
 /// To rounding: all derivatives of `z`, second ones in exact Hessians too, are those that are
 /// written down in the other problem.
 #[test]
-fn the_same_quadratic_programs() -> Test {
+fn quadratic_programs_with_algebraic_states() -> Test {
     let exact = Exact { convexification: Convexification::None };
     let gauss_newton = GaussNewton::default();
     let batch = || Batch::<implicit::Cart, Gauss<2>>::new(Options::default());
@@ -154,7 +154,7 @@ fn the_same_quadratic_programs() -> Test {
 /// The same solution, by line search too, with a constraint on `z` that is active, and the same
 /// derivatives of it.
 #[test]
-fn the_same_solutions() -> Test {
+fn solutions_with_algebraic_states() -> Test {
     macro_rules! solved {
         ($ocp:expr) => {{
             let mut ocp = $ocp;
@@ -231,7 +231,7 @@ fn speed(x: [f64; 3], _z: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> f64 {
 /// Nothing more is simulated where nothing depends on algebraic states, or where Hessians are not
 /// exact.
 #[test]
-fn what_nobody_needs() -> Test {
+fn evaluations_of_unused_algebraic_states() -> Test {
     macro_rules! count {
         ($cost:ty, $constraint:ty, $curvature:expr) => {{
             let dynamics = Counted { inner: implicit_irk()?, simulations: 0, weighted: [0; 2] };
@@ -266,7 +266,7 @@ fn last(_x: [f64; 3], z: [f64; 1], _u: [f64; 1], _p: [f64; 1]) -> f64 {
 
 /// A map has none, and nothing has any at the end of the horizon.
 #[test]
-fn where_there_are_none() -> Test {
+fn problems_without_algebraic_states() -> Test {
     let problem = Problem::new(Map::<Next, f64>::new())
         .path_constraints(Constraint::<Hidden>::new([0.0], [1.0]))
         .on(Horizon::uniform(3, 0.1));

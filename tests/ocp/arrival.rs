@@ -34,7 +34,7 @@ fn measurement(k: usize) -> f64 {
 }
 
 /// The estimate of the last state from all measurements.
-fn kalman(mean: Vector2<f64>) -> Result<Vector2<f64>, &'static str> {
+fn kalman_filter(mean: Vector2<f64>) -> Result<Vector2<f64>, &'static str> {
     let (noise, variance, mut covariance) = covariances();
     let (a, c) = (matrix![1.0, 0.2; -0.1, 0.95], Matrix1x2::new(1.0, 0.0));
     let mut x = mean;
@@ -52,10 +52,10 @@ fn kalman(mean: Vector2<f64>) -> Result<Vector2<f64>, &'static str> {
 }
 
 #[test]
-fn estimates_are_those_of_kalmans_filter() -> Test {
+fn kalman_filter_estimates() -> Test {
     let (noise, variance, covariance) = covariances();
     let mean = vector![0.7, -0.4];
-    let expected = kalman(mean)?;
+    let expected = kalman_filter(mean)?;
     for by_ipm in [true, false] {
         let weights = [1.0 / variance, 1.0 / noise[(0, 0)], 1.0 / noise[(1, 1)]];
         let problem = Problem::new(Map::<Walk, f64>::new())
@@ -91,7 +91,7 @@ fn estimates_are_those_of_kalmans_filter() -> Test {
 }
 
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let mut ocp = Problem::new(Map::<Walk, f64>::new()).on(Horizon::uniform(2, 1.0))?;
     let short = ocp.set_arrival_cost(&[0.0; 2], &[1.0; 3]).err();
     assert!(matches!(short, Some(OcpError::Length { part: Part::Arrival, expected: 4, found: 3, .. })));

@@ -2,7 +2,7 @@
 //! bit; derivatives against differences of solutions.
 
 use crate::Test;
-use crate::runs::{Counts, kind, seeds};
+use crate::runs::{Counts, error_kind, seeds};
 use casados::ocp::{
     BatchOcp, BatchRealTime, ConvexCost, Exact, ExactFormulation, GeneralCost, HeapIpm, HeapOcp,
     HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, OcpError, OcpSolver, Outcome, Problem, PseudoHuber,
@@ -43,22 +43,25 @@ impl Numbers {
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
-    fn chance(&mut self, share: f64) -> bool {
+    fn with_probability(&mut self, share: f64) -> bool {
         0.5 * (self.next() + 1.0) < share
     }
 }
 
 /// A problem as nobody asks for it: far away, with NaN, without a way.
-fn spoil<P: ExactFormulation<f64>>(ocp: &mut HeapOcp<P>, random: &mut Numbers) -> Result<(), OcpError> {
+fn spoil_problem<P: ExactFormulation<f64>>(
+    ocp: &mut HeapOcp<P>,
+    random: &mut Numbers,
+) -> Result<(), OcpError> {
     let x0 = [2.0 * random.next(), 2.0 * random.next()];
     let p = [3.0 + 2.0 * random.next(), 0.3 + 0.2 * random.next(), 0.1 + 0.1 * random.next()];
     ocp.fix_initial_state(&x0)?.set_parameters(.., &p)?.guess(&x0, &[0.0])?;
-    if random.chance(0.1) {
+    if random.with_probability(0.1) {
         ocp.iterate_mut().stage_mut(3).into_iter().for_each(|stage| stage.x[0] = f64::NAN);
-    } else if random.chance(0.1) {
+    } else if random.with_probability(0.1) {
         // No torque is enough.
         ocp.bound("x[0]", 2.., 3.0, 4.0)?;
-    } else if random.chance(0.1) {
+    } else if random.with_probability(0.1) {
         // Angles are rewarded: the QP is not convex.
         ocp.set_parameters(.., &[-30.0, 0.1, 0.0])?;
     }
@@ -77,7 +80,7 @@ fn said(outcome: &Result<Outcome, OcpError>) -> String {
 }
 
 /// The bits of states, controls and multipliers.
-fn bits(point: &HeapSolution<f64>) -> Vec<u64> {
+fn bits_of_iterate(point: &HeapSolution<f64>) -> Vec<u64> {
     let parts = point.stages().flat_map(|at| {
         [at.x, at.u, at.dynamics, at.x_lower, at.x_upper, at.u_lower, at.u_upper].into_iter().flatten()
     });
@@ -95,7 +98,7 @@ fn weights(instance: usize, seed: &mut HeapSolution<f64>) {
 }
 
 /// Solves and differentiates batches, and each problem alone with memory that nobody used before.
-fn as_if_alone<P, S>(ocp: &HeapOcp<P>, solver: &S, counts: &mut Counts) -> Test
+fn check_against_single_solves<P, S>(ocp: &HeapOcp<P>, solver: &S, counts: &mut Counts) -> Test
 where
     P: ExactFormulation<f64> + Send + Sync,
     S: OcpSolver<P, f64>,
@@ -104,7 +107,7 @@ where
         let mut random = Numbers(seed);
         let mut batch = BatchOcp::new(ocp, 1 + 9 * seed as usize, solver.clone())?;
         for instance in batch.instances_mut() {
-            spoil(instance, &mut random)?;
+            spoil_problem(instance, &mut random)?;
         }
         let mut alone = batch.instances().to_vec();
         // Derivatives that are smoothed, or not.
@@ -116,8 +119,8 @@ where
         for ((together, said_of_it), alone) in batch.instances().iter().zip(&outcomes).zip(&mut alone) {
             let outcome = solver.clone().solve(alone);
             assert_eq!(&said(&outcome), said_of_it);
-            assert_eq!(bits(together.iterate()), bits(alone.iterate()));
-            counts.count(&outcome.as_ref().map_or_else(kind, |outcome| kind(&outcome.status)));
+            assert_eq!(bits_of_iterate(together.iterate()), bits_of_iterate(alone.iterate()));
+            counts.count(&outcome.as_ref().map_or_else(error_kind, |outcome| error_kind(&outcome.status)));
             solved.push(outcome);
         }
         let gradients = batch.adjoint(Exact::default(), |i, _, seed| weights(i, seed))?;
@@ -145,21 +148,21 @@ where
 }
 
 #[test]
-fn instances_are_solved_as_if_alone() -> Test {
+fn batches_and_single_solves() -> Test {
     let ocp = problem()?;
     let mut counts = Counts::new("batches of optimal control problems, some NaN, infeasible or not convex");
     let (mut sqp, mut ipm) = (HeapSqp::new(&ocp)?, HeapIpm::new(&ocp)?);
     (sqp.options.max_iterations, ipm.options.max_iterations) = (60, 60);
-    as_if_alone(&ocp, &sqp, &mut counts)?;
-    as_if_alone(&ocp, &ipm, &mut counts)?;
+    check_against_single_solves(&ocp, &sqp, &mut counts)?;
+    check_against_single_solves(&ocp, &ipm, &mut counts)?;
     println!("{counts}");
-    let failures = ["InvalidValue", "Infeasible"].map(|verdict| counts.of(verdict));
-    assert!(failures.iter().all(|&count| count > 0) && counts.of("Converged") > 10, "{counts}");
+    let failures = ["InvalidValue", "Infeasible"].map(|verdict| counts.count_of(verdict));
+    assert!(failures.iter().all(|&count| count > 0) && counts.count_of("Converged") > 10, "{counts}");
     Ok(())
 }
 
 #[test]
-fn a_limit_is_that_of_an_instance() -> Test {
+fn iteration_limit_of_an_instance() -> Test {
     let ocp = problem()?;
     let mut batch = BatchOcp::new(&ocp, 4, HeapSqp::new(&ocp)?)?;
     batch.solve()?;
@@ -183,7 +186,7 @@ fn a_limit_is_that_of_an_instance() -> Test {
 /// differences of solutions, in each parameter and each initial state. With `h = 1e-5` these are
 /// off by `h²` times third derivatives and `1e-11 / h` of the tolerance: 1e-5 is above both.
 #[test]
-fn derivatives_are_those_of_solutions() -> Test {
+fn derivatives_of_solutions() -> Test {
     let ocp = problem()?;
     let h = 1e-5;
     let starts = [[0.3, 0.1], [-0.4, 0.5], [0.1, -0.2]];
@@ -250,7 +253,7 @@ fn rest(x: [f64; 2], _u: [f64; 1], _p: [f64; 3]) -> [f64; 2] {
 /// Gradients by references against central differences, as above: of least squares with coupled
 /// weights, of a convex function beside it, and of the terminal cost.
 #[test]
-fn derivatives_by_references() -> Test {
+fn derivatives_by_reference_values() -> Test {
     let weights = nalgebra::matrix![2.0, 0.5; 0.5, 1.0];
     let huber = PseudoHuber { weights: [1.0], delta: [0.7] };
     let mut ocp = Problem::new(Erk::<Pendulum, Rk4>::new(Options::default())?)
@@ -298,7 +301,7 @@ fn derivatives_by_references() -> Test {
 /// Many plants at once: controls and statuses are those of controllers alone, and one that is
 /// broken leaves the others alone.
 #[test]
-fn many_plants_in_real_time() -> Test {
+fn real_time_iterations_of_many_plants() -> Test {
     let ocp = problem()?;
     let mut together = BatchRealTime::new(&ocp, 7)?.with_curvature(Exact::default());
     let mut alone: Vec<_> = (0..7).map(|_| HeapRealTime::exact(ocp.clone())).collect::<Result<_, _>>()?;
@@ -329,7 +332,7 @@ fn many_plants_in_real_time() -> Test {
 /// A controller that solves to the end gives the closed loop that was planned: nothing disturbs it,
 /// the plant is the model, and the horizon is long.
 #[test]
-fn a_closed_loop_goes_as_planned() -> Test {
+fn closed_loop_of_converged_controllers() -> Test {
     let mut ocp = problem()?;
     ocp.guess(&[0.0; 2], &[0.0])?;
     let mut plan = ocp.clone();
@@ -368,7 +371,7 @@ fn a_closed_loop_goes_as_planned() -> Test {
 }
 
 #[test]
-fn no_instance_is_no_mistake() -> Test {
+fn empty_batches() -> Test {
     let ocp = problem()?;
     let mut batch = BatchOcp::new(&ocp, 0, HeapIpm::new(&ocp)?)?;
     assert!(batch.solve()?.is_empty() && batch.outcomes().is_empty());

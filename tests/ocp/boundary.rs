@@ -2,7 +2,7 @@
 //! the short form of periodic states, closed forms, and mistakes by name.
 
 use crate::Test;
-use crate::free_parameters::numbers;
+use crate::free_parameters::stage_numbers;
 use casados::ocp::{
     Boundary, Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, OcpError,
     Problem, SecondOrder,
@@ -63,7 +63,7 @@ mod pendulums {
 /// At the last stage the columns of a copy are those of a state in its place; where the conditions
 /// are a pair, each has copies of its own.
 #[test]
-fn derivatives_are_those_of_copies_that_are_states() -> Test {
+fn derivatives_by_copied_states() -> Test {
     const N: usize = 3;
     let (lower, upper) = ([-1.0, 0.2], [2.0, 0.3]);
     let erk = Options { steps: 2, ..Options::default() };
@@ -95,7 +95,7 @@ fn derivatives_are_those_of_copies_that_are_states() -> Test {
     ocp.linearise(none)?;
     other.linearise(none)?;
     pair.linearise(none)?;
-    let (one, two) = (&numbers(&ocp, 2)[N], &numbers(&other, 4)[N]);
+    let (one, two) = (&stage_numbers(&ocp, 2)[N], &stage_numbers(&other, 4)[N]);
     assert_eq!(one.len(), two.len());
     for (i, (a, b)) in one.iter().zip(two).enumerate() {
         assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{i}: {a} {b}");
@@ -115,7 +115,7 @@ fn derivatives_are_those_of_copies_that_are_states() -> Test {
     Ok(())
 }
 
-fn solve_both<P: Formulation<f64, Dynamics: SecondOrder<f64>> + Clone>(
+fn solve_both_forms<P: Formulation<f64, Dynamics: SecondOrder<f64>> + Clone>(
     ocp: &HeapOcp<P>,
 ) -> Result<[HeapOcp<P>; 2], Box<dyn std::error::Error>> {
     let (mut a, mut b) = (ocp.clone(), ocp.clone());
@@ -128,7 +128,7 @@ fn solve_both<P: Formulation<f64, Dynamics: SecondOrder<f64>> + Clone>(
 
 /// `x_N − x₀ = 0` is the short form's solution.
 #[test]
-fn periodic_states_have_a_short_form() -> Test {
+fn periodic_states() -> Test {
     let erk = || Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Options::default() });
     let cost = GeneralCost::<Effort>::new;
     let horizon = Horizon::uniform(12, 0.2);
@@ -149,9 +149,9 @@ fn periodic_states_have_a_short_form() -> Test {
     }
     let text = general.to_string();
     assert!(text.contains("Closed[0] = 0 at stage 12") && !text.contains("free parameter"), "{text}");
-    let [reference, _] = solve_both(&short)?;
+    let [reference, _] = solve_both_forms(&short)?;
     assert!((reference.stage(0)?.x[0] - reference.stage(6)?.x[0]).abs() > 1e-3);
-    for ocp in solve_both(&general)? {
+    for ocp in solve_both_forms(&general)? {
         for k in 0..=12 {
             let (a, b) = (ocp.stage(k)?, reference.stage(k)?);
             for (a, b) in a.x.iter().chain(a.u).zip(b.x.iter().chain(b.u)) {
@@ -160,7 +160,7 @@ fn periodic_states_have_a_short_form() -> Test {
         }
     }
     // It is in solutions by its name; a solution is a start again.
-    let [mut solved, _] = solve_both(&general)?;
+    let [mut solved, _] = solve_both_forms(&general)?;
     let solution = solved.solution()?;
     assert!(solution.terminal("Closed[1]")?[0].abs() < 1e-8);
     general.restore(&solution)?;
@@ -199,7 +199,7 @@ mod wheel {
 }
 
 #[test]
-fn a_part_of_a_period_with_a_free_end_time() -> Test {
+fn partial_period_with_free_end_time() -> Test {
     let irk = Irk::<Wheel, Gauss<4>>::new(Options::default())?;
     let mut ocp = Problem::new(irk)
         .terminal_cost(GeneralCost::<Radius>::new())
@@ -213,7 +213,7 @@ fn a_part_of_a_period_with_a_free_end_time() -> Test {
         let (s, c) = (1.8 * k as f64 / 6.0).sin_cos();
         ocp.guess_stage(k, &[0.9 * c, 0.9 * s], &[])?;
     }
-    for mut ocp in solve_both(&ocp)? {
+    for mut ocp in solve_both_forms(&ocp)? {
         let solution = ocp.solution()?;
         let expected = 1.0 / (2.0 * std::f64::consts::PI);
         assert!((solution.end_time() - expected).abs() < 1e-6, "{}", solution.end_time());
@@ -225,7 +225,7 @@ fn a_part_of_a_period_with_a_free_end_time() -> Test {
 
 /// An inequality that holds a solution back, soft and hard, and its multiplier.
 #[test]
-fn inequalities_are_hard_or_soft() -> Test {
+fn hard_and_soft_inequalities() -> Test {
     let problem = |boundary: Boundary<Speed>| {
         let erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Options::default() })?;
         let mut ocp = Problem::new(erk)
@@ -236,14 +236,14 @@ fn inequalities_are_hard_or_soft() -> Test {
         Ok::<_, Box<dyn std::error::Error>>(ocp)
     };
     let speed = || Boundary::<Speed>::new([1.0], [f64::INFINITY]);
-    for mut ocp in solve_both(&problem(speed())?)? {
+    for mut ocp in solve_both_forms(&problem(speed())?)? {
         let solution = ocp.solution()?;
         let (value, force) = (solution.terminal("Speed")?[0], solution.multiplier("Speed")?[0]);
         assert!((value - 1.0).abs() < 1e-6 && force < -0.1, "{value} {force}");
         let (x0, x) = (ocp.stage(0)?.x[1], ocp.stage(5)?.x[1]);
         assert!((x - x0 + 0.2 - value).abs() < 1e-7);
     }
-    for mut ocp in solve_both(&problem(speed().soft(0.05, 0.0))?)? {
+    for mut ocp in solve_both_forms(&problem(speed().soft(0.05, 0.0))?)? {
         let solution = ocp.solution()?;
         let (value, force) = (solution.terminal("Speed")?[0], solution.multiplier("Speed")?[0]);
         assert!(value < 0.99 && (force + 0.05).abs() < 1e-5, "{value} {force}");
@@ -253,7 +253,7 @@ fn inequalities_are_hard_or_soft() -> Test {
 }
 
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let erk = || Erk::<Pendulum, Rk4>::new(Options::default());
     let everywhere = Problem::new(erk()?)
         .path_constraints(Boundary::<Speed>::new([0.0], [0.0]))

@@ -68,7 +68,7 @@ fn layers_at_both_ends() -> Test {
 
 /// From −1 to 1 through `erf(t/√ε)/erf(1/√ε)`; references by Abramowitz and Stegun, table 7.1.
 #[test]
-fn a_shock_at_a_turning_point() -> Test {
+fn shock_at_a_turning_point() -> Test {
     let epsilon = 0.01_f64;
     let times = nodes(&[([-1.0, -0.3], 20), ([-0.3, 0.3], 60), ([0.3, 1.0], 20)]);
     let x = solution!(Shock, times, epsilon, [-1.0, 1.0]);

@@ -32,7 +32,7 @@ fn distance(x: [f64; 2], _u: [f64; 2]) -> f64 {
 /// One interval to a target at (3, 4) in a disc of radius one: the point of the disc that is
 /// nearest, (0.6, 0.8).
 #[test]
-fn a_constraint_at_the_end() -> Test {
+fn terminal_constraints() -> Test {
     let mut ocp = Problem::new(Map::<Go, f64>::new())
         .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]))
         .terminal_constraints(Constraint::<Distance>::new([f64::NEG_INFINITY], [1.0]))
@@ -144,7 +144,7 @@ fn plane(target: f64) -> Result<Plane, OcpError> {
 /// The same as constraints of the path, two at once, of which the second is soft: `x₀² + x₁² ≤ 4`
 /// and `u ≤ 0.5`.
 #[test]
-fn constraints_of_the_path() -> Test {
+fn path_constraints() -> Test {
     let n = 8;
     let infinity = f64::INFINITY;
     let mut ocp = Problem::new(Map::<Go, f64>::new())

@@ -61,7 +61,7 @@ solves!(seven_masses_order_eight, "ocp/chain_7.json", 33, 4 x 4, "objective_gl4x
 /// the Hessian, which is 0.004 for controls (`R Ts/2` twice) and 0.4 and more for states, that is
 /// 2.5e-8 and 2.5e-10; twice, as each has its own.
 #[test]
-fn explicit_methods_side_by_side() -> Test {
+fn batches_of_explicit_methods() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let options = Options { steps: 4, ..Default::default() };
     macro_rules! solution {
@@ -100,7 +100,7 @@ fn explicit_methods_side_by_side() -> Test {
 /// A solver of QPs whose own tolerances are relative, and larger than what is asked for: it is told
 /// what is needed.
 #[test]
-fn clarabel_is_as_accurate_as_needed() -> Test {
+fn accuracy_of_clarabel() -> Test {
     let record = Record::load("ocp/chain_6.json")?;
     let mut ocp = problem!(27, &record, batch!(27, 2, 2));
     let mut sqp = HeapSqp::with_solver(&ocp, casados::qp::Clarabel::new())?.gauss_newton();
@@ -147,7 +147,7 @@ follows!(trajectory_of_seven_masses, "ocp/chain_7.json", 33);
 /// The same solution with the Hessian of the Lagrangian, whichever way it is made convex, with and
 /// without line search.
 #[test]
-fn exact_hessians_lead_to_the_same_solution() -> Test {
+fn solution_with_exact_hessians() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let expected = record.number("objective_gl2x2")?;
     for (convexification, globalisation) in [
@@ -170,7 +170,7 @@ fn exact_hessians_lead_to_the_same_solution() -> Test {
 
 /// Gauss-Newton with line searches: the same solution.
 #[test]
-fn line_searches_lead_to_the_same_solution() -> Test {
+fn solution_with_line_searches() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let expected = record.number("objective_gl2x2")?;
     for globalisation in [Globalisation::Merit, Globalisation::Filter] {
@@ -187,7 +187,7 @@ fn line_searches_lead_to_the_same_solution() -> Test {
 
 /// Integrators of single intervals, on the heap and in static memory, give what a batch gives.
 #[test]
-fn single_intervals_give_the_same() -> Test {
+fn solution_with_single_intervals() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let expected = record.number("objective_gl2x2")?;
     let options = Options { steps: 2, ..Default::default() };
@@ -207,7 +207,7 @@ fn single_intervals_give_the_same() -> Test {
 /// At rest, velocities and accelerations are differences that cancel: all intervals are integrated
 /// side by side nevertheless.
 #[test]
-fn rest_is_not_a_special_case() -> Test {
+fn steady_states() -> Test {
     let record = Record::load("ocp/chain_5.json")?;
     let mut ocp = problem!(21, &record, batch!(21, 2, 2));
     ocp.linearise(casados::ocp::GaussNewton::default())?;
@@ -219,7 +219,7 @@ fn rest_is_not_a_special_case() -> Test {
 /// The conditions of optimality, with costs written by hand and derivatives of single integrations
 /// by differences.
 #[test]
-fn the_solution_satisfies_conditions_that_are_computed_independently() -> Test {
+fn independent_optimality_conditions() -> Test {
     const NX: usize = 9;
     let record = Record::load("ocp/chain_3.json")?;
     let mut ocp = problem!(9, &record, batch!(9, 2, 2));

@@ -75,7 +75,7 @@ fn regulator() -> Test {
 
 /// The same with exact Hessians: a least-squares cost of linear functions has no more.
 #[test]
-fn exact_hessians_of_quadratic_problems_are_those_of_gauss_and_newton() -> Test {
+fn exact_hessians_of_quadratic_problems() -> Test {
     let mut results = Vec::new();
     for exact in [false, true] {
         let mut ocp = Problem::new(Map::<Push, f64>::new())
@@ -204,7 +204,7 @@ fn input(_x: [f64; 1], u: [f64; 1], p: [f64; 1], t: f64) -> f64 {
 }
 
 #[test]
-fn parameters_and_times_are_those_of_the_stage() -> Test {
+fn parameters_and_times_of_stages() -> Test {
     let times = [0.0, 0.5, 0.7, 1.0];
     let mut ocp = Problem::new(Erk::<Drift, Rk4>::new(Options::default())?)
         .stage_cost(LeastSquaresCost::<Input>::diagonal(&[1.0]))
@@ -255,7 +255,7 @@ fn state(x: f64, _u: f64) -> f64 {
 /// where it is `x₀ − N/4`. The solver that is made without more words finds it; the Hessian of
 /// Gauss and Newton is zero, and has no minimum to go to.
 #[test]
-fn default_hessians_are_exact() -> Test {
+fn default_hessians() -> Test {
     const INTERVALS: usize = 4;
     let mut ocp = Problem::new(Map::<Squares, f64>::new())
         .terminal_cost(GeneralCost::<State>::new())

@@ -15,7 +15,7 @@ type Failure = Box<dyn std::error::Error>;
 /// Both solve to this, which is a tenth of the stiffness of the least control (`h R = 0.004`) below
 /// what solutions are held against.
 const TOLERANCE: f64 = 1e-13;
-const SAME: f64 = 1e-9;
+const SOLUTION_TOLERANCE: f64 = 1e-9;
 
 /// Solves by the interior point; states and controls, and how many iterations it took.
 fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
@@ -32,10 +32,10 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     Ok((solution.collect(), outcome.iterations))
 }
 
-fn assert_same(found: &[f64], expected: &[f64]) {
+fn assert_same_solution(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
-        assert!((found - expected).abs() <= SAME, "{i}: {found} {expected}");
+        assert!((found - expected).abs() <= SOLUTION_TOLERANCE, "{i}: {found} {expected}");
     }
 }
 
@@ -55,7 +55,7 @@ fn chain_of_masses() -> Test {
     let (mut shooting, mut collocation) = chain!(record, Options { steps: 2, ..Default::default() });
     let (expected, iterations) = solve(&mut shooting)?;
     let (found, more) = solve(&mut collocation)?;
-    assert_same(&found, &expected);
+    assert_same_solution(&found, &expected);
     assert!(more <= iterations + 3, "{more} {iterations}");
     assert_eq!(collocation.problem().dynamics.iterations(), 2);
     Ok(())
@@ -64,7 +64,7 @@ fn chain_of_masses() -> Test {
 /// Stages are not those that the states lead to until the problem is solved: what is left of their
 /// equations counts as violation.
 #[test]
-fn equations_of_stages_count() -> Test {
+fn violations_of_stage_equations() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let (_, mut collocation) = chain!(record, Options { steps: 2, ..Default::default() });
     // At rest everything is satisfied, and with other velocities nothing is but continuity.
@@ -83,7 +83,7 @@ fn equations_of_stages_count() -> Test {
 
 /// A solver that does not know stages finds the same solution.
 #[test]
-fn gauss_newton() -> Test {
+fn gauss_newton_without_stages() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
     let (mut shooting, mut collocation) = chain!(record, Options { steps: 2, ..Default::default() });
     let (expected, _) = solve(&mut shooting)?;
@@ -93,7 +93,7 @@ fn gauss_newton() -> Test {
     assert!(outcome.is_converged() && outcome.iterations <= 15, "{outcome}\n{}", sqp.log());
     let found: Vec<f64> =
         collocation.iterate().stages().flat_map(|stage| [stage.x, stage.u].concat()).collect();
-    assert_same(&found, &expected);
+    assert_same_solution(&found, &expected);
     Ok(())
 }
 
@@ -120,7 +120,7 @@ fn power(x: [f64; 3], z: [f64; 1], _u: [f64; 1], p: [f64; 1]) -> f64 {
     x[1] * z[0] + 0.2 * p[0] * z[0]
 }
 
-fn carts() -> Result<[Vec<f64>; 2], Failure> {
+fn cart_problem() -> Result<[Vec<f64>; 2], Failure> {
     let irk = || Irk::<Cart, RadauIIA<3>>::new(Options::default());
     macro_rules! solved {
         ($dynamics:expr) => {{
@@ -141,7 +141,7 @@ fn carts() -> Result<[Vec<f64>; 2], Failure> {
 
 #[test]
 fn algebraic_states_in_costs_and_constraints() -> Test {
-    let [shooting, collocation] = carts()?;
-    assert_same(&collocation, &shooting);
+    let [shooting, collocation] = cart_problem()?;
+    assert_same_solution(&collocation, &shooting);
     Ok(())
 }

@@ -41,7 +41,7 @@ fn datum(k: usize) -> f64 {
 }
 
 /// A square loss of disturbances, as that of Huber with a `δ` that is never reached.
-const PSEUDO: PseudoHuber<f64, 2> = PseudoHuber { weights: [1.0, 1.0], delta: [DELTA, 1e6] };
+const SQUARE_LOSS_DELTA: PseudoHuber<f64, 2> = PseudoHuber { weights: [1.0, 1.0], delta: [DELTA, 1e6] };
 
 macro_rules! estimation {
     ($cost:expr) => {{
@@ -62,8 +62,8 @@ fn states<P: casados::ocp::Formulation<f64>>(ocp: &HeapOcp<P>) -> Vec<f64> {
 /// Least squares of the root of a pseudo-Huber cost have too much curvature where residuals are
 /// large, and converge slowly; `Jᵀ φ″ J` has what there is.
 #[test]
-fn generalised_gauss_newton_is_fast_where_the_plain_one_is_slow() -> Test {
-    let mut convex = estimation!(ConvexCost::<Distance, _>::new(PSEUDO));
+fn generalised_gauss_newton() -> Test {
+    let mut convex = estimation!(ConvexCost::<Distance, _>::new(SQUARE_LOSS_DELTA));
     let mut sqp = HeapSqp::new(&convex)?.gauss_newton();
     (sqp.options.tolerance, sqp.options.max_iterations) = (1e-8, 500);
     let fast = sqp.solve(&mut convex)?;
@@ -104,7 +104,7 @@ impl Convex<f64> for LogSumExp {
         let sum: f64 = r.iter().map(|r| r.exp()).sum();
         for (i, (slope, r)) in gradient.iter_mut().zip(r).enumerate() {
             *slope = r.exp() / sum;
-            hessian[i * r_len(hessian.len()) + i] = *slope;
+            hessian[i * matrix_side(hessian.len()) + i] = *slope;
         }
         for (i, a) in gradient.iter().enumerate() {
             for (j, b) in gradient.iter().enumerate() {
@@ -116,7 +116,7 @@ impl Convex<f64> for LogSumExp {
 }
 
 /// The side of a square matrix with so many elements.
-fn r_len(elements: usize) -> usize {
+fn matrix_side(elements: usize) -> usize {
     (1..).find(|n| n * n >= elements).unwrap_or(1)
 }
 
@@ -129,7 +129,7 @@ fn written_sum(x: [f64; 2], u: [f64; 1], p: [f64; 1]) -> f64 {
 /// Value, gradient, Hessian, and what parameters change, are those of the same function written
 /// out, with exact derivatives by the macro.
 #[test]
-fn exact_derivatives_are_those_of_the_function_written_out() -> Test {
+fn derivatives_of_convex_costs() -> Test {
     macro_rules! all {
         ($cost:expr, $references:expr) => {{
             let mut ocp =
@@ -209,7 +209,7 @@ type Location<C> = Problem<Map<Stays, f64>, ConvexCost<Both, C>, ConvexCost<Stat
 /// Huber's estimate of a location: of data 0, 0.2, 0.4 and 10 the last one pulls with `w δ` alone,
 /// `3 x = 0.6 + w δ`. Mistakes have names.
 #[test]
-fn location_of_data_with_an_outlier() -> Test {
+fn huber_estimate_with_an_outlier() -> Test {
     let stage = Huber { weights: [1.0, 1.0], delta: [1.0, 1.0] };
     for (weight, delta) in [(1.0, 1.0), (2.0, 0.25), (0.0, 1.0)] {
         let mut ocp = location(stage, Huber { weights: [weight], delta: [delta] })?;

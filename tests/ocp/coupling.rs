@@ -17,7 +17,7 @@ enum By {
     Sqp,
 }
 
-const BOTH: [By; 2] = [By::Ipm, By::Sqp];
+const BOTH_SOLVERS: [By; 2] = [By::Ipm, By::Sqp];
 
 /// Solves, and checks the conditions of optimality by code that is not the solver's: the QP at the
 /// iterate, element by element.
@@ -58,7 +58,7 @@ fn place(x: [f64; 2], u: [f64; 3]) -> [f64; 5] {
 /// which LU solves: with any of its controls shared, any of its states periodic, the first state
 /// given or free.
 #[test]
-fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
+fn couplings_of_linear_systems() -> Test {
     const N: usize = 9;
     let reference = |k: usize| [if k < 5 { 1.0 } else { -0.4 }, 0.3, 0.1 * k as f64, -0.5, 0.2];
     let cases: [(&[usize], &[usize], bool); 7] = [
@@ -71,7 +71,7 @@ fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
         (&[1], &[1], true),
     ];
     for (periodic, shared, fixed) in cases {
-        for by in BOTH {
+        for by in BOTH_SOLVERS {
             let problem = Problem::new(Map::<Drift, f64>::new());
             let problem = problem.stage_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 5]));
             let mut ocp = problem.on(Horizon::uniform(N, 1.0))?;
@@ -91,7 +91,8 @@ fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
             let outcome = solve(by, &mut ocp)?;
             assert!(outcome.iterations <= 2, "{periodic:?} {shared:?} {by:?} {outcome}");
 
-            let solution = by_one_system(N, periodic, shared, fixed.then_some([0.4, -0.2]), reference)?;
+            let solution =
+                solution_of_one_system(N, periodic, shared, fixed.then_some([0.4, -0.2]), reference)?;
             for k in 0..=N {
                 let stage = ocp.stage(k)?;
                 for (i, value) in stage.x.iter().chain(stage.u).enumerate() {
@@ -119,7 +120,7 @@ fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
 }
 
 /// Variables (x, u) of every stage, then multipliers.
-fn by_one_system(
+fn solution_of_one_system(
     intervals: usize,
     periodic: &[usize],
     shared: &[usize],
@@ -190,8 +191,8 @@ const PERIOD: f64 = 6.66328685932;
 const AMPLITUDE: f64 = 2.00861986087;
 
 #[test]
-fn limit_cycle_has_the_period_and_amplitude_of_a_simulation() -> Test {
-    for by in BOTH {
+fn limit_cycle() -> Test {
+    for by in BOTH_SOLVERS {
         // Order eight over 60 intervals: errors are below 1e-10.
         let erk = Erk::<Cycle, DormandPrince8>::new(Options { steps: 4, ..Default::default() })?;
         let problem = Problem::new(erk).running_cost(GeneralCost::<Period>::new());
@@ -233,11 +234,11 @@ fn distance(x: [f64; 4], _u: [f64; 3]) -> f64 {
 
 /// Objective of the same problem with the duration as a state (RK4, 40 intervals) by IPOPT 3.14
 /// through CasADi 3.8.2, tolerance 1e-12, bounds not relaxed.
-const FASTEST: f64 = 2.826135876986;
+const REFERENCE_OBJECTIVE: f64 = 2.826135876986;
 
 #[test]
-fn a_free_end_time_is_a_shared_control() -> Test {
-    for by in BOTH {
+fn free_end_time_as_shared_control() -> Test {
+    for by in BOTH_SOLVERS {
         let erk = Erk::<Car, Rk4>::new(Options::default())?;
         let problem = Problem::new(erk)
             .running_cost(GeneralCost::<Duration>::new())
@@ -253,7 +254,7 @@ fn a_free_end_time_is_a_shared_control() -> Test {
             ocp.guess_stage(k, &[along, 0.0, 0.0, 1.0], controls)?;
         }
         let outcome = solve(by, &mut ocp)?;
-        assert!((outcome.objective - FASTEST).abs() < 1e-6, "{by:?} {outcome}");
+        assert!((outcome.objective - REFERENCE_OBJECTIVE).abs() < 1e-6, "{by:?} {outcome}");
         // Twice as many as IPOPT takes, with the duration as a state, at most.
         assert!(outcome.iterations <= 2 * 21, "{by:?} {outcome}");
         let of_first = ocp.stage(0)?.u[2];
@@ -274,7 +275,7 @@ fn angle(x: [f64; 2], _u: [f64; 2]) -> f64 {
 }
 
 #[test]
-fn parameters_are_found_from_exact_data() -> Test {
+fn parameters_from_exact_data() -> Test {
     let (length, damping, n) = (0.8, 0.3, 30);
     let mut truth = Erk::<Pendulum, Rk4>::new(Options::default())?;
     let mut x = nalgebra::vector![1.2, 0.0];
@@ -283,7 +284,7 @@ fn parameters_are_found_from_exact_data() -> Test {
         angles.push(x[0]);
         x = truth.solve(&x, &nalgebra::vector![length, damping], 0.1)?.x;
     }
-    for by in BOTH {
+    for by in BOTH_SOLVERS {
         let erk = Erk::<Pendulum, Rk4>::new(Options::default())?;
         let problem = Problem::new(erk).stage_cost(LeastSquaresCost::<Angle>::diagonal(&[1.0]));
         let mut ocp = problem.on(Horizon::uniform(n, 0.1))?;
@@ -301,7 +302,7 @@ fn parameters_are_found_from_exact_data() -> Test {
 }
 
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let problem = Problem::new(Map::<Drift, f64>::new());
     let problem = problem.stage_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 5]));
     let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;

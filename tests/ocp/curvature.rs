@@ -63,7 +63,7 @@ fn power(x: [f64; 2], z: [f64; 1], _u: [f64; 1]) -> [f64; 2] {
 }
 
 /// A point with multipliers where nothing is zero.
-fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) -> Test {
+fn random_iterate<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) -> Test {
     for k in 0..=ocp.intervals() {
         let wave = |i: usize| ((3 * k + i + 1) as f64).sin();
         let stage = ocp.iterate_mut().stage_mut(k).ok_or("no stage")?;
@@ -112,7 +112,7 @@ fn gradient<P: Formulation<f64>>(
 
 fn check<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) -> Test {
     ocp.free_initial_state();
-    disturb(ocp)?;
+    random_iterate(ocp)?;
     ocp.linearise(Exact { convexification: Convexification::None })?;
     let n = ocp.intervals();
     for k in [0, 1, n] {

@@ -11,7 +11,7 @@ use casados::qp::{Condensing, HeapInteriorPoint, HeapSolution, QpError, QpSolver
 
 /// The clock ends a run wherever it is, with the best iterate: more time leaves no worse one.
 #[test]
-fn interior_points_leave_the_best_iterate() -> Test {
+fn best_iterate_of_the_interior_point() -> Test {
     let mut least = f64::INFINITY;
     for time in [0, 1, 2, 5, 9, 14] {
         let mut ocp = swing_up()?;
@@ -34,7 +34,7 @@ fn interior_points_leave_the_best_iterate() -> Test {
 /// The same of sequential quadratic programming, down to iterations of its QPs: the clock is asked
 /// until it is late, and not again.
 #[test]
-fn quadratic_programs_leave_the_best_iterate() -> Test {
+fn best_iterate_of_sequential_programming() -> Test {
     let (mut least, mut late) = (f64::INFINITY, 0);
     for time in 0.. {
         let mut ocp = swing_up()?;
@@ -78,7 +78,7 @@ fn upright(x0: &[f64; 4]) -> Result<HeapOcp<impl Formulation<f64>>, Box<dyn std:
 
 /// A sample that is late leaves the plan as it was, bit by bit, and the next one is in time.
 #[test]
-fn late_samples_leave_the_plan() -> Test {
+fn plan_after_late_samples() -> Test {
     let x0 = [0.0, 0.1, 0.0, 0.0];
     let mut controller = HeapRealTime::new(upright(&x0)?)?;
     controller.prepare()?.feedback(&x0)?;
@@ -99,7 +99,7 @@ fn late_samples_leave_the_plan() -> Test {
 
 /// Condensing hands the clock on.
 #[test]
-fn condensed_problems_are_late_too() -> Test {
+fn deadlines_of_condensed_problems() -> Test {
     let mut ocp = upright(&[0.0, 0.1, 0.0, 0.0])?;
     ocp.linearise(GaussNewton::default())?;
     let (mut solver, mut solution) =

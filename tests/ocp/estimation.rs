@@ -23,12 +23,12 @@ const SAMPLES: [f64; 31] = [
     0.5481, 0.5377, 0.4983, 0.5045, 0.4888, 0.46, 0.4559, 0.4349, 0.4015, 0.4136, 0.3789, 0.3679, 0.3476,
     0.3193, 0.3204, 0.2985, 0.2839, 0.2806,
 ];
-const MEAN: [f64; 5] = [1.0, 0.0, -2.0, -3.0, 0.0];
+const PRIOR_MEAN: [f64; 5] = [1.0, 0.0, -2.0, -3.0, 0.0];
 /// Standard deviations of the mean.
-const BEFORE: [f64; 5] = [2.0, 0.2, 2.0, 2.0, 2.0];
+const PRIOR_DEVIATIONS: [f64; 5] = [2.0, 0.2, 2.0, 2.0, 2.0];
 /// The minimum, by an implementation that has nothing in common with this one: Gauss's and Newton's
 /// steps by dense factorisations in NumPy, on the closed form of the solution of the reaction.
-const MINIMUM: f64 = 7.228_872_257;
+const REFERENCE_MINIMUM: f64 = 7.228_872_257;
 
 type Seen = LeastSquaresCost<Deviation>;
 type Estimation = HeapOcp<Problem<Irk<Reaction, Gauss<3>>, Seen, Seen>>;
@@ -40,14 +40,14 @@ fn estimation() -> Result<Estimation, Box<dyn std::error::Error>> {
         .terminal_cost(Seen::diagonal(&[1.0]))
         .on(Horizon::nodes(&times))?;
     let mut weight = [0.0; 25];
-    for (i, sigma) in BEFORE.iter().enumerate() {
+    for (i, sigma) in PRIOR_DEVIATIONS.iter().enumerate() {
         weight[6 * i] = 1.0 / (sigma * sigma);
     }
-    ocp.set_arrival_cost(&MEAN, &weight)?;
+    ocp.set_arrival_cost(&PRIOR_MEAN, &weight)?;
     for (k, sample) in SAMPLES.iter().enumerate() {
         ocp.set_parameters(k..=k, &[if k % 4 == 3 { 0.0 } else { 100.0 }, *sample])?;
     }
-    ocp.free_initial_state().guess(&MEAN, &[])?;
+    ocp.free_initial_state().guess(&PRIOR_MEAN, &[])?;
     Ok(ocp)
 }
 
@@ -55,7 +55,7 @@ fn estimation() -> Result<Estimation, Box<dyn std::error::Error>> {
 /// the amount, while the gain grows, and multipliers grow by as much. Short steps stay on that way;
 /// damped ones leave it.
 #[test]
-fn gaps_do_not_vanish_with_the_amount() -> Test {
+fn unidentifiable_product() -> Test {
     let mut ocp = estimation()?;
     let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     let outcome = sqp.solve(&mut ocp)?;
@@ -63,6 +63,6 @@ fn gaps_do_not_vanish_with_the_amount() -> Test {
     assert!(outcome.is_converged(), "{outcome}");
     // A residual of 1e-6 beside the least curvature, which is that of the mean: 1/4. Integration
     // with three stages adds less.
-    assert!((outcome.objective - MINIMUM).abs() < 1e-5, "{}", outcome.objective);
+    assert!((outcome.objective - REFERENCE_MINIMUM).abs() < 1e-5, "{}", outcome.objective);
     Ok(())
 }

@@ -62,7 +62,7 @@ mod pumps {
 }
 
 #[test]
-fn quadratic_programs_are_those_of_time_scaled_by_hand() -> Test {
+fn quadratic_programs_by_scaled_time() -> Test {
     const N: usize = 4;
     let parts = [0.0, 0.1, 0.4, 0.7, 1.0];
     let options = Options { steps: 2, ..Options::default() };
@@ -98,7 +98,7 @@ fn quadratic_programs_are_those_of_time_scaled_by_hand() -> Test {
     let none = casados::ocp::Convexification::None;
     free.linearise(Exact { convexification: none })?;
     by_hand.linearise(Exact { convexification: none })?;
-    for (k, (a, b)) in numbers(&free, 2).iter().zip(numbers(&by_hand, 3)).enumerate() {
+    for (k, (a, b)) in stage_numbers(&free, 2).iter().zip(stage_numbers(&by_hand, 3)).enumerate() {
         assert_eq!(a.len(), b.len(), "{k}");
         for (i, (a, b)) in a.iter().zip(b).enumerate() {
             assert!((a - b).abs() < 1e-10 * (1.0 + b.abs()), "stage {k}, {i}: {a} {b}");
@@ -113,8 +113,8 @@ fn quadratic_programs_are_those_of_time_scaled_by_hand() -> Test {
 }
 
 /// As in the tests of free parameters.
-fn numbers<P: Formulation<f64>>(ocp: &HeapOcp<P>, states: usize) -> Vec<Vec<f64>> {
-    crate::free_parameters::numbers(ocp, states)
+fn stage_numbers<P: Formulation<f64>>(ocp: &HeapOcp<P>, states: usize) -> Vec<Vec<f64>> {
+    crate::free_parameters::stage_numbers(ocp, states)
 }
 
 /// A car that goes a distance from rest to rest, with bounded acceleration: `2 √(s/a)`.
@@ -146,7 +146,7 @@ mod car {
 }
 
 #[test]
-fn a_car_from_rest_to_rest() -> Test {
+fn minimum_time_car() -> Test {
     const N: usize = 20;
     let expected = 2.0 * (100.0_f64 / 2.0).sqrt();
     let irk = || Irk::<Car, Gauss<2>>::new(Options::default());
@@ -240,8 +240,8 @@ fn brachistochrone() -> Test {
     let cost = GeneralCost::<One>::new;
     let erk = Erk::<Bead, Rk4>::new(Options::default())?;
     let collocation = Collocation::new(Irk::<Bead, Gauss<2>>::new(Options::default())?)?;
-    let mut shooting = prepared(Problem::new(erk).running_cost(cost()).on(horizon)?)?;
-    let mut collocated = prepared(Problem::new(collocation).running_cost(cost()).on(horizon)?)?;
+    let mut shooting = prepared_problem(Problem::new(erk).running_cost(cost()).on(horizon)?)?;
+    let mut collocated = prepared_problem(Problem::new(collocation).running_cost(cost()).on(horizon)?)?;
     let mut by_sqp = shooting.clone();
     assert!(HeapIpm::new(&shooting)?.solve(&mut shooting)?.is_converged());
     assert!(HeapIpm::new(&collocated)?.solve(&mut collocated)?.is_converged());
@@ -253,7 +253,9 @@ fn brachistochrone() -> Test {
     Ok(())
 }
 
-fn prepared<P: Formulation<f64>>(mut ocp: HeapOcp<P>) -> Result<HeapOcp<P>, Box<dyn std::error::Error>> {
+fn prepared_problem<P: Formulation<f64>>(
+    mut ocp: HeapOcp<P>,
+) -> Result<HeapOcp<P>, Box<dyn std::error::Error>> {
     let n = ocp.intervals();
     ocp.fix_initial_state(&[0.0; 3])?.bound("u", .., 0.0, 3.2)?;
     ocp.bound("x[0]", n.., 10.0, 10.0)?.bound("x[1]", n.., 5.0, 5.0)?;
@@ -275,7 +277,7 @@ fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
 
 /// What cannot be is refused by name.
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let irk = || Irk::<Car, Gauss<2>>::new(Options::default());
     let none = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .stage_cost(LeastSquaresCost::<EffortOfNothing>::diagonal(&[1.0]))

@@ -41,7 +41,7 @@ const SAMPLES: [[f64; 2]; 10] = [
 
 /// Four rates from ten measurements (PSOPT, predator): a misfit of 2.753366e-2.
 #[test]
-fn rates_of_prey_and_predators() -> Test {
+fn estimated_rates_of_predators_and_prey() -> Test {
     let erk = Erk::<Lotka, Rk4>::new(Options { steps: 2, ..Options::default() })?;
     let mut ocp = Problem::new(erk)
         .stage_cost(GeneralCost::<Misfit>::new())
@@ -77,7 +77,7 @@ fn price_of_the_end(x: f64, _p: f64) -> f64 {
 /// Hull's problem with a constant control: `½ c x₀² / (1 + c T)`, with an integral of
 /// the parameter.
 #[test]
-fn an_integral_of_a_parameter() -> Test {
+fn integral_of_a_parameter() -> Test {
     let erk = Erk::<ConstantRate, Rk4>::new(Options::default())?;
     let dynamics = WithIntegral::new(erk, Quadrature::<PriceOfRates>::new());
     let mut ocp = Problem::new(dynamics)

@@ -77,7 +77,7 @@ mod pumps {
 
 /// What a stage of the QP says, over `(x₀, x₁, w, u)`: the Hessian, the gradient, rows of dynamics
 /// with their constants, rows of constraints with their bounds.
-pub fn numbers<P: Formulation<f64>>(ocp: &HeapOcp<P>, states: usize) -> Vec<Vec<f64>> {
+pub fn stage_numbers<P: Formulation<f64>>(ocp: &HeapOcp<P>, states: usize) -> Vec<Vec<f64>> {
     let of = |stage: casados::qp::Stage<'_, f64>| {
         let dims = stage.dims();
         let n = dims.nx + dims.nu;
@@ -114,7 +114,7 @@ pub fn numbers<P: Formulation<f64>>(ocp: &HeapOcp<P>, states: usize) -> Vec<Vec<
 /// rate in its place: exact Hessians and those of Gauss and Newton, of costs and constraints of
 /// algebraic states, by two methods.
 #[test]
-fn quadratic_programs_are_those_of_states_without_rates() -> Test {
+fn quadratic_programs_by_constant_states() -> Test {
     const N: usize = 4;
     let irk = Options { steps: 2, ..Options::default() };
     let weights = matrix![2.0, 0.3, 0.0; 0.3, 1.0, 0.1; 0.0, 0.1, 0.5];
@@ -170,7 +170,7 @@ fn quadratic_programs_are_those_of_states_without_rates() -> Test {
     }
     let none = casados::ocp::Convexification::None;
     let check = |free: &HeapOcp<_>, with_state: &HeapOcp<_>, what: &str| {
-        for (k, (a, b)) in numbers(free, 2).iter().zip(numbers(with_state, 3)).enumerate() {
+        for (k, (a, b)) in stage_numbers(free, 2).iter().zip(stage_numbers(with_state, 3)).enumerate() {
             assert_eq!(a.len(), b.len(), "{what} {k}");
             for (i, (a, b)) in a.iter().zip(b).enumerate() {
                 assert!((a - b).abs() < 1e-11 * (1.0 + b.abs()), "{what}, stage {k}, {i}: {a} {b}");
@@ -224,7 +224,7 @@ fn half_a_period<P: Formulation<f64, Dynamics: SecondOrder<f64>> + Clone>(
 
 /// The stiffness whose half period is the horizon, by every kind of dynamics.
 #[test]
-fn half_a_period_of_a_spring() -> Test {
+fn stiffness_of_a_spring() -> Test {
     let irk = || Irk::<Spring, Gauss<4>>::new(Options::default());
     let cost = GeneralCost::<Effort>::new;
     let horizon = Horizon::uniform(10, 0.1);
@@ -258,7 +258,7 @@ fn sizes(x: [f64; 2], u: f64, _p: [f64; 2]) -> [f64; 3] {
 /// Data of a map, whose factor is known: by both solvers, in real time, from a saved solution and
 /// from one of another grid.
 #[test]
-fn a_factor_from_data_by_name() -> Test {
+fn factor_from_data_by_name() -> Test {
     const N: usize = 6;
     let cost = || LeastSquaresCost::<Sizes>::diagonal(&[1.0; 3]);
     let problem = || {
@@ -309,7 +309,7 @@ fn a_factor_from_data_by_name() -> Test {
 
 /// What cannot be is refused by name, and nothing is changed.
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let mut ocp = Problem::new(Irk::<Spring, Gauss<2>>::new(Options::default())?)
         .running_cost(GeneralCost::<Effort>::new())
         .on(Horizon::uniform(4, 0.1))?;

@@ -18,7 +18,7 @@ fn barrier(x: [f64; 1], _u: [f64; 1]) -> f64 {
 /// Newton's step from three goes to `3 - 3 (3 - 1) = -3`, where there is no logarithm: a line
 /// search shortens it.
 #[test]
-fn full_steps_to_nowhere_are_shortened() -> Test {
+fn full_steps_outside_of_the_domain() -> Test {
     for globalisation in [Globalisation::FullStep, Globalisation::Merit, Globalisation::Filter] {
         let mut ocp = Problem::new(Map::<Step, f64>::new())
             .terminal_cost(GeneralCost::<Barrier>::new())

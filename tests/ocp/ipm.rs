@@ -44,7 +44,7 @@ pub fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
 
 /// Objective of the same problem (RK4 with two steps, 40 intervals of 0.05 s) by IPOPT 3.14 through
 /// CasADi 3.8.2, tolerance 1e-12, bounds not relaxed.
-const SWING_UP: f64 = 21.742138737256;
+const SWING_UP_OBJECTIVE: f64 = 21.742138737256;
 
 pub fn swing_up()
 -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>> {
@@ -70,7 +70,11 @@ fn cart_pole_swings_up_from_a_straight_line() -> Test {
         let outcome = ipm.solve(&mut ocp)?;
         println!("{barrier:?} {outcome}");
         // The barrier leaves `μ` for each of 158 bounds, of which the tolerance allows 1e-9.
-        assert!((outcome.objective - SWING_UP).abs() < 1e-6, "{barrier:?} {outcome}\n{}", ipm.log());
+        assert!(
+            (outcome.objective - SWING_UP_OBJECTIVE).abs() < 1e-6,
+            "{barrier:?} {outcome}\n{}",
+            ipm.log()
+        );
         assert!(outcome.is_converged() && residuals(ocp.qp(), ocp.iterate()).0.largest() <= 1e-8);
         // IPOPT takes 11.
         assert!(outcome.iterations <= 20, "{barrier:?} {outcome}");
@@ -80,7 +84,7 @@ fn cart_pole_swings_up_from_a_straight_line() -> Test {
 
 /// From its own solution a warm start has nothing to do; from that of a problem nearby little.
 #[test]
-fn warm_starts_are_short() -> Test {
+fn iterations_of_warm_starts() -> Test {
     let mut ocp = swing_up()?;
     let cold = solve(&mut ocp)?;
     let mut ipm = HeapIpm::new(&ocp)?;
@@ -95,10 +99,10 @@ fn warm_starts_are_short() -> Test {
 
 /// In memory that is given the run is the same, bit by bit; what is too short is refused.
 #[test]
-fn memory_may_be_given() -> Test {
+fn memory_of_the_caller() -> Test {
     let erk = Erk::<CartPole, Rk4>::new(Options { steps: 2, ..Default::default() })?;
     let problem = Problem::new(erk).stage_cost(GeneralCost::<Effort>::new());
-    let (numbers, (of_solver, of_indices), dims) = lengths(&problem);
+    let (numbers, (of_solver, of_indices), dims) = lengths_of_memory(&problem);
     let mut memory = vec![0.0; numbers];
     let mut ocp = problem.on_horizon(Horizon::uniform(10, 0.05), &dims, &mut memory)?;
     let (mut memory, mut indices) = (vec![0.0; of_solver], vec![0; of_indices]);
@@ -141,7 +145,7 @@ type Dims = [casados::qp::StageDims; 11];
 type GivenIpm<'a> = Ipm<f64, &'a [casados::qp::StageDims], &'a mut [f64], &'a mut [u32]>;
 
 /// Numbers of the problem, numbers and indices of the solver: 20 bounds and one equation.
-fn lengths<P: Formulation<f64> + InMemory>(_problem: &P) -> (usize, (usize, usize), Dims) {
+fn lengths_of_memory<P: Formulation<f64> + InMemory>(_problem: &P) -> (usize, (usize, usize), Dims) {
     let dims = P::DIMS;
     (P::numbers(&dims), GivenIpm::memory::<P>(&dims, 20, 1), dims)
 }
@@ -172,7 +176,7 @@ where
 
 /// Where rounding is in the way of the tolerance, what is acceptable is accepted.
 #[test]
-fn acceptable_points_are_accepted() -> Test {
+fn acceptable_points() -> Test {
     let mut ocp = swing_up()?;
     let mut ipm = HeapIpm::new(&ocp)?;
     ipm.options.tolerance = 1e-30;
@@ -184,7 +188,7 @@ fn acceptable_points_are_accepted() -> Test {
 
 /// A solver has the memory of the problem that it was made for.
 #[test]
-fn another_problem_is_an_error() -> Test {
+fn solver_of_another_problem() -> Test {
     let on = |intervals| -> Result<_, Box<dyn std::error::Error>> {
         let erk = Erk::<CartPole, Rk4>::new(Options { steps: 2, ..Default::default() })?;
         Ok(Problem::new(erk)
@@ -219,10 +223,10 @@ fn distance(x: [f64; 5], _u: [f64; 2]) -> f64 {
     (x[0] - 5.0) * (x[0] - 5.0) + (x[1] - 0.2) * (x[1] - 0.2)
 }
 
-/// As [`SWING_UP`], of the car (RK4, 40 intervals).
-const FASTEST: f64 = 2.826135876986;
+/// As [`SWING_UP_OBJECTIVE`], of the car (RK4, 40 intervals).
+const REFERENCE_OBJECTIVE: f64 = 2.826135876986;
 
-fn race(end: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, OcpError> {
+fn race_problem(end: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, OcpError> {
     let erk = Erk::<Car, Rk4>::new(Options::default())?;
     let problem = Problem::new(erk)
         .terminal_cost(GeneralCost::<Duration>::new())
@@ -244,14 +248,18 @@ fn race(end: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<
 }
 
 #[test]
-fn car_drives_around_a_disc_in_the_least_time() -> Test {
+fn minimum_time_car_around_a_disc() -> Test {
     for barrier in [Barrier::Monotone, Barrier::Adaptive] {
-        let mut ocp = race(50.0)?;
+        let mut ocp = race_problem(50.0)?;
         let mut ipm = HeapIpm::new(&ocp)?;
         ipm.options.barrier = barrier;
         let outcome = ipm.solve(&mut ocp)?;
         println!("{barrier:?} {outcome}");
-        assert!((outcome.objective - FASTEST).abs() < 1e-6, "{barrier:?} {outcome}\n{}", ipm.log());
+        assert!(
+            (outcome.objective - REFERENCE_OBJECTIVE).abs() < 1e-6,
+            "{barrier:?} {outcome}\n{}",
+            ipm.log()
+        );
         assert!(outcome.is_converged() && residuals(ocp.qp(), ocp.iterate()).0.largest() <= 1e-8);
         // IPOPT takes 21.
         assert!(outcome.iterations <= 30, "{barrier:?} {outcome}");
@@ -260,9 +268,9 @@ fn car_drives_around_a_disc_in_the_least_time() -> Test {
 }
 
 #[test]
-fn what_cannot_be_reached_is_infeasible_and_named() -> Test {
+fn infeasible_target() -> Test {
     // At most 5 m/s for one second do not make ten metres.
-    let mut ocp = race(1.0)?;
+    let mut ocp = race_problem(1.0)?;
     let mut ipm = HeapIpm::new(&ocp)?;
     let outcome = ipm.solve(&mut ocp)?;
     let Status::Infeasible { constraint, violation } = outcome.status else {
@@ -285,7 +293,7 @@ fn place(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 /// A linear system that is unstable, tracking a square wave around a period: the conditions of
 /// optimality are one linear system, which LU solves.
 #[test]
-fn periodic_orbits_of_linear_systems_are_those_of_one_linear_system() -> Test {
+fn periodic_orbits_of_linear_systems() -> Test {
     const N: usize = 12;
     let reference = |k: usize| if k < 5 { 1.0 } else { -0.4 };
     for tied in [&["x"][..], &["x[1]"]] {
@@ -340,7 +348,7 @@ fn periodic_orbits_of_linear_systems_are_those_of_one_linear_system() -> Test {
 }
 
 #[test]
-fn mistakes_are_named() -> Test {
+fn invalid_arguments() -> Test {
     let problem =
         Problem::new(Map::<Oscillate, f64>::new()).stage_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]));
     let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;

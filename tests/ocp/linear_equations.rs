@@ -23,7 +23,10 @@ fn end(x: [f64; 2], _u: f64) -> [f64; 2] {
 /// The first iteration goes all the way: refinement leaves equations `ε^(2/3)` of what their rows
 /// are. Multipliers change from zero by `24 d` and more; regularisation alone would leave `√ε` of
 /// that.
-fn holds<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(mut ocp: HeapOcp<P>, size: f64) -> Test {
+fn check_full_first_step<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+    mut ocp: HeapOcp<P>,
+    size: f64,
+) -> Test {
     ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0, 0.0], &[0.0])?;
     let mut ipm = HeapIpm::new(&ocp)?;
     let outcome = ipm.solve(&mut ocp)?;
@@ -45,22 +48,22 @@ macro_rules! problem {
 }
 
 #[test]
-fn ends_that_are_given() -> Test {
+fn given_terminal_states() -> Test {
     for distance in [1.0, 50.0] {
         let mut ocp = problem!().on(Horizon::uniform(20, 0.05))?;
         ocp.bound("x[0]", 20.., distance, distance)?.bound("x[1]", 20.., 0.0, 0.0)?;
-        holds(ocp, distance)?;
+        check_full_first_step(ocp, distance)?;
     }
     Ok(())
 }
 
 #[test]
-fn ends_by_constraints() -> Test {
+fn terminal_constraints() -> Test {
     for distance in [1.0, 50.0] {
         let to = [distance; 2];
         let ocp =
             problem!().terminal_constraints(Constraint::<End>::new(to, to)).on(Horizon::uniform(20, 0.05))?;
-        holds(ocp, distance)?;
+        check_full_first_step(ocp, distance)?;
     }
     Ok(())
 }

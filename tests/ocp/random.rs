@@ -4,7 +4,7 @@
 //! `CASADOS_RANDOM=100` makes a hundred times as many.
 
 use crate::Test;
-use crate::runs::{Counts, kind, seeds, shows};
+use crate::runs::{Counts, error_kind, prints_verdicts, seeds};
 use casados::ocp::{
     Constraint, GaussNewton, Globalisation, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map,
     OcpError, Outcome, Problem, Status,
@@ -161,10 +161,10 @@ macro_rules! numbers {
     }};
 }
 
-mod allowed;
+mod allowed_residuals;
 mod control;
 
-use allowed::Allowed;
+use allowed_residuals::AllowedResiduals;
 
 /// What is said of a run, without how long it took.
 fn said(found: &Result<Outcome, OcpError>) -> String {
@@ -193,15 +193,15 @@ macro_rules! judge {
                     assert!(judged.largest() <= 2.0 * $tolerance, "{}: {judged} {outcome}", $seed);
                     $counts.count("Ok");
                 } else {
-                    $counts.count(&kind(&outcome.status));
+                    $counts.count(&error_kind(&outcome.status));
                 }
-                if shows() && outcome.status != Status::Converged {
+                if prints_verdicts() && outcome.status != Status::Converged {
                     println!("{} {}: {outcome}", $counts, $seed);
                 }
             }
             Err(error) => {
-                $counts.count(&kind(error));
-                if shows() {
+                $counts.count(&error_kind(error));
+                if prints_verdicts() {
                     println!("{} {}: {error}", $counts, $seed);
                 }
             }
@@ -227,7 +227,7 @@ macro_rules! runs {
             $solver
         };
         let again = fresh.solve(&mut same);
-        let tolerance = solver.options.allowed($draw.forces());
+        let tolerance = solver.options.allowed($draw.objective_sensitivity());
         (judge!($counts, $seed, tolerance, (problem, found), (same, again)), problem)
     }};
 }
@@ -239,7 +239,10 @@ fn linear(draw: &Draw) -> Result<HeapOcp<SpringProblem>, OcpError> {
 }
 
 /// A problem of the same size whose start is nowhere.
-fn spoil<P>(ocp: Result<HeapOcp<P>, OcpError>, random: &mut Numbers) -> Result<HeapOcp<P>, OcpError>
+fn unreachable_problem<P>(
+    ocp: Result<HeapOcp<P>, OcpError>,
+    random: &mut Numbers,
+) -> Result<HeapOcp<P>, OcpError>
 where
     P: casados::ocp::Formulation<f64>,
 {
@@ -253,23 +256,24 @@ where
     Ok(ocp)
 }
 
-fn globalisation(random: &mut Numbers) -> Globalisation {
+fn random_globalisation(random: &mut Numbers) -> Globalisation {
     [Globalisation::Merit, Globalisation::Filter, Globalisation::FullStep][random.below(3)]
 }
 
 /// Linear equations and constraints, with a feasible trajectory: `Infeasible` is false.
 #[test]
-fn convex_problems() -> Test {
+fn random_convex_problems() -> Test {
     let (mut sqp, mut ipm) = (Counts::new("convex, SQP"), Counts::new("convex, interior point"));
     for seed in seeds(100) {
         let random = &mut Numbers(seed);
         let draw = Draw::new(random, spring_step);
-        let (globalisation, elastic) = (globalisation(random), random.below(2) == 0);
-        let (found, _) = runs!(sqp, seed, draw, spoil(linear(&draw), random), linear(&draw), |ocp| {
-            let mut solver = HeapSqp::new(ocp)?;
-            (solver.options.globalisation, solver.options.elastic) = (globalisation, elastic);
-            solver
-        });
+        let (globalisation, elastic) = (random_globalisation(random), random.below(2) == 0);
+        let (found, _) =
+            runs!(sqp, seed, draw, unreachable_problem(linear(&draw), random), linear(&draw), |ocp| {
+                let mut solver = HeapSqp::new(ocp)?;
+                (solver.options.globalisation, solver.options.elastic) = (globalisation, elastic);
+                solver
+            });
         let is_false = |found: &Result<Outcome, OcpError>| {
             found.as_ref().is_ok_and(|outcome| {
                 matches!(outcome.status, Status::Infeasible { .. } | Status::InfeasibleQp { .. })
@@ -277,12 +281,17 @@ fn convex_problems() -> Test {
         };
         assert!(!is_false(&found), "{seed}: {found:?}");
         let (found, _) =
-            runs!(ipm, seed, draw, spoil(linear(&draw), random), linear(&draw), |ocp| HeapIpm::new(ocp)?);
+            runs!(ipm, seed, draw, unreachable_problem(linear(&draw), random), linear(&draw), |ocp| {
+                HeapIpm::new(ocp)?
+            });
         assert!(!is_false(&found), "{seed}: {found:?}");
     }
     println!("{sqp}\n{ipm}");
     // Guesses of 1e200, one in ten, have no objective.
-    assert!(20 * sqp.of("Ok") >= 17 * sqp.all() && 20 * ipm.of("Ok") >= 17 * ipm.all(), "{sqp}\n{ipm}");
+    assert!(
+        20 * sqp.count_of("Ok") >= 17 * sqp.all() && 20 * ipm.count_of("Ok") >= 17 * ipm.all(),
+        "{sqp}\n{ipm}"
+    );
     Ok(())
 }
 
@@ -312,22 +321,22 @@ impl Violations {
         for (k, &(x, u)) in stages.iter().enumerate() {
             if k > 0 {
                 let known = draw.x[k];
-                found.note(known[0] - near_x - x[0]);
-                found.note(x[0] - known[0] - 2.0 * near_x);
-                found.note(known[1] - near_v - x[1]);
+                found.note_violation(known[0] - near_x - x[0]);
+                found.note_violation(x[0] - known[0] - 2.0 * near_x);
+                found.note_violation(known[1] - near_v - x[1]);
             }
             let Some(u) = u else { continue };
             let power = power_value(&draw.x[k], draw.u[k], &draw.p) + near_g;
-            found.note(f64::max(draw.u[k] - near_u, -1.2) - u);
-            found.note(u - f64::min(draw.u[k] + near_u, 1.2));
-            found.note(power_value(&x, u, &draw.p) - power);
+            found.note_violation(f64::max(draw.u[k] - near_u, -1.2) - u);
+            found.note_violation(u - f64::min(draw.u[k] + near_u, 1.2));
+            found.note_violation(power_value(&x, u, &draw.p) - power);
             let next = pendulum_step(&x, u, &draw.p).into_iter().zip(stages[k + 1].0);
             found.gaps += next.map(|(next, found)| (next - found).abs()).sum::<f64>();
         }
         found
     }
 
-    fn note(&mut self, violation: f64) {
+    fn note_violation(&mut self, violation: f64) {
         self.largest = self.largest.max(violation);
         self.sum += violation.max(0.0);
     }
@@ -335,7 +344,7 @@ impl Violations {
 
 /// What is said to be violated is, by so much, and no bound is by more; gaps are together no more
 /// than violations of bounds.
-fn infeasible_is_true(
+fn check_infeasibility(
     seed: u64,
     draw: &Draw,
     (found, ocp): (Result<Outcome, OcpError>, HeapOcp<PendulumProblem>),
@@ -350,35 +359,43 @@ fn infeasible_is_true(
 /// A pendulum with a bound on power. Near an iterate there may be no feasible point: `Infeasible`
 /// says no more than that.
 #[test]
-fn nonconvex_problems() -> Test {
+fn random_nonconvex_problems() -> Test {
     let mut sqp = Counts::new("pendulum with bounded power, SQP by Gauss and Newton");
     let mut exact = Counts::new("the same, exact Hessians");
     let mut ipm = Counts::new("the same, interior point");
     for seed in seeds(100) {
         let random = &mut Numbers(!seed);
         let draw = Draw::new(random, pendulum_step);
-        let globalisation = globalisation(random);
-        let run = runs!(sqp, seed, draw, spoil(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
-            let mut solver = HeapSqp::new(ocp)?.gauss_newton();
-            solver.options.globalisation = globalisation;
-            solver
-        });
-        infeasible_is_true(seed, &draw, run);
-        let run = runs!(exact, seed, draw, spoil(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
-            let mut solver = HeapSqp::new(ocp)?;
-            solver.options.globalisation = globalisation;
-            solver
-        });
-        infeasible_is_true(seed, &draw, run);
+        let globalisation = random_globalisation(random);
         let run =
-            runs!(ipm, seed, draw, spoil(nonlinear(&draw), random), nonlinear(&draw), |ocp| HeapIpm::new(
-                ocp
-            )?);
-        infeasible_is_true(seed, &draw, run);
+            runs!(sqp, seed, draw, unreachable_problem(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
+                let mut solver = HeapSqp::new(ocp)?.gauss_newton();
+                solver.options.globalisation = globalisation;
+                solver
+            });
+        check_infeasibility(seed, &draw, run);
+        let run = runs!(
+            exact,
+            seed,
+            draw,
+            unreachable_problem(nonlinear(&draw), random),
+            nonlinear(&draw),
+            |ocp| {
+                let mut solver = HeapSqp::new(ocp)?;
+                solver.options.globalisation = globalisation;
+                solver
+            }
+        );
+        check_infeasibility(seed, &draw, run);
+        let run =
+            runs!(ipm, seed, draw, unreachable_problem(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
+                HeapIpm::new(ocp)?
+            });
+        check_infeasibility(seed, &draw, run);
     }
     println!("{sqp}\n{exact}\n{ipm}");
     for counts in [sqp, exact, ipm] {
-        assert!(2 * counts.of("Ok") >= counts.all(), "{counts}");
+        assert!(2 * counts.count_of("Ok") >= counts.all(), "{counts}");
     }
     Ok(())
 }

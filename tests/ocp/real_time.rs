@@ -42,7 +42,7 @@ const X0: [f64; 2] = [0.8, 0.4];
 /// With the same state in every sample the plans are the iterates of sequential quadratic
 /// programming with full steps.
 #[test]
-fn converges_to_the_solution() -> Test {
+fn convergence_to_the_solution() -> Test {
     let mut ocp = problem()?;
     let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     sqp.options.globalisation = Globalisation::FullStep;
@@ -64,7 +64,7 @@ fn converges_to_the_solution() -> Test {
 /// Gains of the QP that gave the feedback: where the same bounds are active its solution is linear
 /// in the state.
 #[test]
-fn gains_are_those_of_the_qp() -> Test {
+fn feedback_gains() -> Test {
     // Where the bound is met at the start the first control does not move; where it is not, it
     // does.
     for (near, moves) in [(X0, false), ([0.1, 0.05], true)] {
@@ -92,7 +92,7 @@ fn gains_are_those_of_the_qp() -> Test {
 
 /// The control is the first of the QP that was prepared, for the state that was measured.
 #[test]
-fn feedback_solves_the_prepared_qp() -> Test {
+fn prepared_feedback() -> Test {
     use casados::qp::{HeapInteriorPoint, HeapSolution, QpSolver, QpStart};
     let measured = [0.7, 0.5];
     let mut controller = HeapRealTime::new(problem()?)?;
@@ -131,7 +131,7 @@ fn closed_loop() -> Test {
 
 /// After an error the plan is what it was.
 #[test]
-fn errors_leave_the_plan() -> Test {
+fn plan_after_errors() -> Test {
     let mut controller = HeapRealTime::new(problem()?)?;
     controller.prepare()?.feedback(&X0)?;
     let before = controller.ocp().stage(3)?.x.to_vec();
@@ -148,7 +148,7 @@ fn errors_leave_the_plan() -> Test {
 /// A QP that fails leaves the plan with its multipliers: the next one starts as warm as if it had
 /// not been.
 #[test]
-fn warm_after_an_error() -> Test {
+fn warm_start_after_errors() -> Test {
     let iterations = |fails: bool| -> Result<usize, Box<dyn std::error::Error>> {
         let mut controller = HeapRealTime::new(problem()?)?;
         for _ in 0..5 {

@@ -16,7 +16,7 @@ struct Units {
     row: f64,
 }
 
-const PLAIN: Units = Units { cost: 1.0, states: 1.0, row: 1.0 };
+const UNSCALED: Units = Units { cost: 1.0, states: 1.0, row: 1.0 };
 
 /// Each alone and all together; and a cost of 1e8 with masses in milligrams.
 fn others() -> impl Iterator<Item = Units> {
@@ -49,7 +49,7 @@ fn power(x: [f64; 2], u: f64, p: [f64; 3]) -> f64 {
 const N: usize = 30;
 
 /// From rest to rest in 1.5 s, with at most a power of 1.2 and a speed of 1.02.
-fn way(
+fn transfer_problem(
     units: Units,
     length: f64,
 ) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Box<dyn std::error::Error>> {
@@ -66,7 +66,7 @@ fn way(
 }
 
 /// Writes a solution, in the units of the plain problem, as the iterate of the plain one.
-fn write_plain<P: Formulation<f64>, Q: Formulation<f64>>(
+fn write_unscaled<P: Formulation<f64>, Q: Formulation<f64>>(
     from: &HeapOcp<P>,
     units: Units,
     plain: &mut HeapOcp<Q>,
@@ -132,7 +132,7 @@ impl Solver {
 /// the plain problem hold at each solution, judged element by element by code that is not the
 /// solver's.
 #[test]
-fn units_do_not_matter() -> Test {
+fn iterations_in_other_units() -> Test {
     for solver in [
         Solver::Ipm(Barrier::Adaptive),
         Solver::Ipm(Barrier::Monotone),
@@ -140,20 +140,20 @@ fn units_do_not_matter() -> Test {
         Solver::Sqp(Globalisation::Filter),
     ] {
         let solve = |units| -> Result<_, Box<dyn std::error::Error>> {
-            let mut ocp = way(units, 1.0)?;
+            let mut ocp = transfer_problem(units, 1.0)?;
             let (outcome, log) = solver.solve(&mut ocp)?;
             assert!(outcome.is_converged(), "{solver:?} {units:?}: {outcome}\n{log}");
             Ok((ocp, outcome))
         };
-        let (_, first) = solve(PLAIN)?;
+        let (_, first) = solve(UNSCALED)?;
         for units in others() {
             let (ocp, outcome) = solve(units)?;
             println!("{solver:?} {units:?}: {outcome}");
             // Gaps of a state of 1e6 are to be 1e-14 of it, which takes some more.
             let most = if units.states > 1e3 { 2.0 } else { 1.5 };
             assert!(outcome.iterations as f64 <= most * first.iterations as f64, "{outcome} {first}");
-            let mut plain = way(PLAIN, 1.0)?;
-            write_plain(&ocp, units, &mut plain)?;
+            let mut plain = transfer_problem(UNSCALED, 1.0)?;
+            write_unscaled(&ocp, units, &mut plain)?;
             plain.linearise(Exact { convexification: Convexification::None })?;
             let (judged, _) = residuals(plain.qp(), plain.iterate());
             // Residuals are relative to units, which are at most the sizes that the problem names:
@@ -172,11 +172,11 @@ fn units_do_not_matter() -> Test {
 
 /// What a run says of itself is in the units of the problem.
 #[test]
-fn residuals_are_those_of_the_problem() -> Test {
+fn residuals_in_other_units() -> Test {
     let cases = [Units { cost: 1e6, states: 1e3, row: 1e4 }, Units { cost: 1e-6, states: 1e-3, row: 1e-4 }];
     let solvers = [Solver::Ipm(Barrier::Adaptive), Solver::Sqp(Globalisation::Merit)];
     for (units, solver) in cases.into_iter().flat_map(|units| solvers.map(|solver| (units, solver))) {
-        let mut ocp = way(units, 1.0)?;
+        let mut ocp = transfer_problem(units, 1.0)?;
         let (outcome, _) = solver.solve(&mut ocp)?;
         let (judged, _) = residuals(ocp.qp(), ocp.iterate());
         // Sums in another order: roundings of terms as large as these.
@@ -196,9 +196,9 @@ fn residuals_are_those_of_the_problem() -> Test {
 
 /// A way that is too long is missed by as much in all units.
 #[test]
-fn violations_are_those_of_the_problem() -> Test {
+fn violations_in_other_units() -> Test {
     let missed = |solver: Solver, units: Units| -> Result<f64, Box<dyn std::error::Error>> {
-        let mut ocp = way(units, 2.0)?;
+        let mut ocp = transfer_problem(units, 2.0)?;
         let (outcome, log) = solver.solve(&mut ocp)?;
         match outcome.status {
             Status::Infeasible { constraint, violation } if constraint.name == "x[0]" => {
@@ -209,7 +209,7 @@ fn violations_are_those_of_the_problem() -> Test {
     };
     for solver in [Solver::Ipm(Barrier::Adaptive), Solver::Sqp(Globalisation::Merit)] {
         // At a speed of 1.02 it gets no farther than 1.53.
-        let first = missed(solver, PLAIN)?;
+        let first = missed(solver, UNSCALED)?;
         assert!((2.0 - 1.53..2.0).contains(&first), "{first}");
         for units in others().filter(|units| units.row == 1.0) {
             let other = missed(solver, units)?;
@@ -222,14 +222,14 @@ fn violations_are_those_of_the_problem() -> Test {
 
 /// Without units the plain problem has the same solution.
 #[test]
-fn units_are_an_option() -> Test {
+fn scaling_switched_off() -> Test {
     let mut objectives = [[0.0; 2]; 2];
     for (objectives, scaling) in objectives.iter_mut().zip([true, false]) {
-        let mut ocp = way(PLAIN, 1.0)?;
+        let mut ocp = transfer_problem(UNSCALED, 1.0)?;
         let mut ipm = HeapIpm::new(&ocp)?;
         ipm.options.scaling = scaling;
         let by_ipm = ipm.solve(&mut ocp)?;
-        let mut ocp = way(PLAIN, 1.0)?;
+        let mut ocp = transfer_problem(UNSCALED, 1.0)?;
         let mut sqp = HeapSqp::new(&ocp)?;
         sqp.options.scaling = scaling;
         let by_sqp = sqp.solve(&mut ocp)?;

@@ -13,7 +13,7 @@ use casados::qp::residuals;
 const LENGTH: f64 = 0.05;
 const RAIL: f64 = 0.5;
 /// Intervals, IPOPT's objective, and its iterations.
-const IPOPT: [(u8, f64, usize); 2] = [(60, 7.082_370_438, 82), (80, 7.642_161_928, 211)];
+const IPOPT_RESULTS: [(u8, f64, usize); 2] = [(60, 7.082_370_438, 82), (80, 7.642_161_928, 211)];
 
 fn falling(
     intervals: u8,
@@ -43,17 +43,17 @@ fn is_feasible(ocp: &HeapOcp<impl Formulation<f64>>, intervals: u8) -> Test {
 
 /// IPOPT ends with a barrier of 2.5e-9 for each bound, of which there are four for each interval.
 /// It relaxes them by 1e-8, which their multipliers make 1.5e-10.
-fn barrier(intervals: u8) -> f64 {
+fn barrier_share(intervals: u8) -> f64 {
     2.5e-9 * 4.0 * f64::from(intervals)
 }
 
 #[test]
-fn violations_that_stay_are_not_the_last_word_where_a_simulation_has_none() -> Test {
-    for (intervals, objective, iterations) in IPOPT {
+fn restart_from_a_feasible_simulation() -> Test {
+    for (intervals, objective, iterations) in IPOPT_RESULTS {
         let mut ocp = falling(intervals)?;
         let outcome = solve(&mut ocp)?;
         let apart = (outcome.objective - objective).abs();
-        assert!(apart <= barrier(intervals), "{intervals} intervals: {apart:e} from IPOPT");
+        assert!(apart <= barrier_share(intervals), "{intervals} intervals: {apart:e} from IPOPT");
         assert!(outcome.iterations <= iterations, "{outcome}");
         is_feasible(&ocp, intervals)?;
     }
@@ -61,8 +61,8 @@ fn violations_that_stay_are_not_the_last_word_where_a_simulation_has_none() -> T
 }
 
 #[test]
-fn a_simulation_is_asked_where_penalties_go_on() -> Test {
-    for (intervals, objective, iterations) in IPOPT {
+fn restart_during_elastic_mode() -> Test {
+    for (intervals, objective, iterations) in IPOPT_RESULTS {
         let mut ocp = falling(intervals)?;
         let mut sqp = HeapSqp::new(&ocp)?;
         sqp.options.tolerance = 1e-9;
@@ -71,7 +71,7 @@ fn a_simulation_is_asked_where_penalties_go_on() -> Test {
         let (judged, _) = residuals(ocp.qp(), ocp.iterate());
         assert!(judged.largest() <= 1e-8, "{judged}");
         let apart = (outcome.objective - objective).abs();
-        assert!(apart <= barrier(intervals), "{intervals} intervals: {apart:e} from IPOPT");
+        assert!(apart <= barrier_share(intervals), "{intervals} intervals: {apart:e} from IPOPT");
         is_feasible(&ocp, intervals)?;
     }
     Ok(())

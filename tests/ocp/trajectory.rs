@@ -56,7 +56,7 @@ fn acceleration(k: usize) -> f64 {
     shape(k) / way
 }
 
-fn near(found: f64, expected: f64, tolerance: f64, what: &str) {
+fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() < tolerance, "{what}: {found} instead of {expected}");
 }
 
@@ -66,37 +66,42 @@ fn check(solution: &Trajectory, dense: &Trajectory) -> Test {
     let points = 3;
     for k in 0..N {
         let a = acceleration(k);
-        near(solution.state("x[0]")?[k], place, 1e-6, "place");
-        near(solution.state("x[1]")?[k], speed, 1e-6, "speed");
-        near(solution.control("u")?[k], MASS * a, 1e-5, "force");
-        near(solution.algebraic("z")?[k], a, 1e-5, "acceleration");
-        near(solution.constraint("Limits[0]")?[k], speed, 1e-6, "constraint");
-        near(solution.constraint("Limits[1]")?[k], a, 1e-5, "constraint of z");
+        assert_near(solution.state("x[0]")?[k], place, 1e-6, "place");
+        assert_near(solution.state("x[1]")?[k], speed, 1e-6, "speed");
+        assert_near(solution.control("u")?[k], MASS * a, 1e-5, "force");
+        assert_near(solution.algebraic("z")?[k], a, 1e-5, "acceleration");
+        assert_near(solution.constraint("Limits[0]")?[k], speed, 1e-6, "constraint");
+        assert_near(solution.constraint("Limits[1]")?[k], a, 1e-5, "constraint of z");
         for j in 0..=points {
             let (index, t) = (k * (points + 1) + j, 0.1 * j as f64 / (points + 1) as f64);
-            near(dense.times()[index], 0.1 * k as f64 + t, 1e-12, "time");
-            near(dense.state("x[0]")?[index], place + t * speed + 0.5 * t * t * a, 1e-6, "place inside");
-            near(dense.state("x[1]")?[index], speed + t * a, 1e-6, "speed inside");
-            near(dense.control("u")?[index], MASS * a, 1e-5, "force inside");
-            near(dense.algebraic("z")?[index], a, 1e-5, "acceleration inside");
-            near(dense.constraint("Limits[0]")?[index], speed + t * a, 1e-6, "constraint inside");
+            assert_near(dense.times()[index], 0.1 * k as f64 + t, 1e-12, "time");
+            assert_near(
+                dense.state("x[0]")?[index],
+                place + t * speed + 0.5 * t * t * a,
+                1e-6,
+                "place inside",
+            );
+            assert_near(dense.state("x[1]")?[index], speed + t * a, 1e-6, "speed inside");
+            assert_near(dense.control("u")?[index], MASS * a, 1e-5, "force inside");
+            assert_near(dense.algebraic("z")?[index], a, 1e-5, "acceleration inside");
+            assert_near(dense.constraint("Limits[0]")?[index], speed + t * a, 1e-6, "constraint inside");
         }
         (place, speed) = (place + 0.1 * speed + 0.005 * a, speed + 0.1 * a);
     }
-    near(solution.state("x[0]")?[N], 1.0, 1e-6, "end");
-    near(solution.terminal("End")?[0], 0.0, 1e-6, "constraint at the end");
+    assert_near(solution.state("x[0]")?[N], 1.0, 1e-6, "end");
+    assert_near(solution.terminal("End")?[0], 0.0, 1e-6, "constraint at the end");
     assert_eq!(solution.parameter("p")?, [MASS; N + 1]);
     assert_eq!(dense.times().len(), (points + 1) * N + 1);
     for series in dense.series() {
         assert_eq!(dense.times_of(series).len(), series.values.len(), "{}", series.name);
         assert!(!dense.times_of(series).is_empty(), "{}", series.name);
     }
-    near(dense.times_of(dense.get("End")?)[0], 1.0, 1e-12, "time of the end");
+    assert_near(dense.times_of(dense.get("End")?)[0], 1.0, 1e-12, "time of the end");
     Ok(())
 }
 
 #[test]
-fn integrators_of_every_kind() -> Test {
+fn trajectories_of_all_integrators() -> Test {
     let options = Options::default();
     let mut ocp = rest_to_rest!(Irk::<Cart, Gauss<2>>::new(options)?);
     assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
@@ -117,19 +122,19 @@ fn integrators_of_every_kind() -> Test {
 /// by that factor: its derivative is twice the value, and so is minus the multiplier of the
 /// equation.
 #[test]
-fn multipliers_are_derivatives() -> Test {
+fn multipliers_as_derivatives() -> Test {
     let mut ocp = rest_to_rest!(Irk::<Cart, Gauss<2>>::new(Options::default())?);
     let mut ipm = HeapIpm::new(&ocp)?;
     ipm.options.tolerance = 1e-10;
     let outcome = ipm.solve(&mut ocp)?;
     let solution = ocp.solution()?;
     let value: f64 = (0..N).map(|k| 0.05 * (MASS * acceleration(k)).powi(2)).sum();
-    near(outcome.objective, value, 1e-6, "objective");
-    near(solution.multiplier("End")?[0], -2.0 * value, 1e-5, "multiplier of the end");
+    assert_near(outcome.objective, value, 1e-6, "objective");
+    assert_near(solution.multiplier("End")?[0], -2.0 * value, 1e-5, "multiplier of the end");
     // A start at `δ` is a way that is shorter by it.
-    near(solution.multiplier("x[0]")?[0], 2.0 * value, 1e-5, "multiplier of the start");
+    assert_near(solution.multiplier("x[0]")?[0], 2.0 * value, 1e-5, "multiplier of the start");
     for &costate in solution.costate("x[0]")? {
-        near(costate, -2.0 * value, 1e-5, "costate");
+        assert_near(costate, -2.0 * value, 1e-5, "costate");
     }
     assert_eq!(solution.multiplier("u")?.len(), N);
     Ok(())
@@ -157,8 +162,8 @@ fn slacks_and_active_bounds() -> Test {
     let series = solution.get("x")?;
     assert_eq!((series.kind, series.first), (Kind::State, 0));
     assert_eq!((&series.lower[..], &series.upper[..]), (&[Some(0.0), None][..], &[Some(0.0), Some(1.0)][..]));
-    near(series.violations()[1], 0.5, 1e-6, "slack");
-    near(series.multipliers()[1], 1.5, 1e-5, "force");
+    assert_near(series.violations()[1], 0.5, 1e-6, "slack");
+    assert_near(series.multipliers()[1], 1.5, 1e-5, "force");
     assert!(series.is_active(1, 1e-6) && !series.is_active(2, 1e-6));
     assert!(solution.get("u")?.violations().iter().all(|&e| e == 0.0));
     // Of a map there is nothing between nodes.
@@ -166,7 +171,7 @@ fn slacks_and_active_bounds() -> Test {
     Ok(())
 }
 
-fn solved() -> Result<
+fn solved_problem() -> Result<
     HeapOcp<impl casados::ocp::Formulation<f64, Dynamics: casados::ocp::SecondOrder<f64>>>,
     Box<dyn std::error::Error>,
 > {
@@ -178,8 +183,8 @@ fn solved() -> Result<
 
 /// A solution that was taken up again is one: there is nothing left to do.
 #[test]
-fn restored() -> Test {
-    let mut first = solved()?;
+fn restored_solutions() -> Test {
+    let mut first = solved_problem()?;
     let solution = first.solution()?;
     let mut ocp = rest_to_rest!(Irk::<Cart, Gauss<2>>::new(Options::default())?);
     ocp.bound("u", .., -10.0, 10.0)?.restore(&solution)?;
@@ -193,8 +198,8 @@ fn restored() -> Test {
 }
 
 #[test]
-fn saved_and_read() -> Test {
-    let mut ocp = solved()?;
+fn saved_trajectories() -> Test {
+    let mut ocp = solved_problem()?;
     let solution = ocp.solution()?;
     let text = serde_json::to_string(&solution)?;
     let again: Trajectory = serde_json::from_str(&text)?;
@@ -211,8 +216,8 @@ fn saved_and_read() -> Test {
 
 /// What no problem writes is refused where it is read, by name.
 #[test]
-fn spoiled_and_read() -> Test {
-    let mut ocp = solved()?;
+fn corrupted_files() -> Test {
+    let mut ocp = solved_problem()?;
     let sound = serde_json::to_value(ocp.solution()?)?;
     let read = |value: serde_json::Value| {
         let found = serde_json::from_value::<Trajectory>(value);
@@ -248,8 +253,8 @@ fn spoiled_and_read() -> Test {
 
 /// Bounds that contradict each other over several stages are named, whatever the solver says.
 #[test]
-fn violations_by_name() -> Test {
-    let mut ocp = solved()?;
+fn violations_by_constraint_name() -> Test {
+    let mut ocp = solved_problem()?;
     ocp.bound("x[0]", 2..5, 7.0, 8.0)?.bound("x[1]", 2..5, -1e-3, 1e-3)?.guess(&[0.0; 2], &[0.0])?;
     let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.max_iterations = 3;
@@ -282,7 +287,7 @@ fn violations_by_name() -> Test {
 /// A guess on a finer grid: states on straight lines, controls held.
 #[test]
 fn guesses_from_other_grids() -> Test {
-    let mut coarse = solved()?;
+    let mut coarse = solved_problem()?;
     let solution = coarse.solution()?;
     let mut fine = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .on(Horizon::nodes(&[-0.5, 0.0, 0.025, 0.1, 0.25, 0.3, 0.95, 1.0, 2.0]))?;
@@ -290,7 +295,7 @@ fn guesses_from_other_grids() -> Test {
     let (x, u) = (solution.state("x[0]")?, solution.control("u")?);
     let expected = [x[0], x[0], 0.75 * x[0] + 0.25 * x[1], x[1], 0.5 * (x[2] + x[3]), x[3]];
     for (k, expected) in expected.into_iter().chain([0.5 * (x[9] + x[10]), x[10], x[10]]).enumerate() {
-        near(fine.stage(k)?.x[0], expected, 1e-14, "state");
+        assert_near(fine.stage(k)?.x[0], expected, 1e-14, "state");
     }
     for (k, expected) in [u[0], u[0], u[0], u[1], u[2], u[3], u[9], u[9]].into_iter().enumerate() {
         assert_eq!(fine.stage(k)?.u[0], expected, "{k}");
@@ -300,8 +305,8 @@ fn guesses_from_other_grids() -> Test {
 
 /// One line for each time, of which every number can be read back.
 #[test]
-fn tables() -> Test {
-    let solution = solved()?.solution()?;
+fn tables_of_trajectories() -> Test {
+    let solution = solved_problem()?.solution()?;
     let text = solution.csv().to_string();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("t,x[0],x[1],z,u,p,Limits[0],Limits[1],End"));
@@ -317,30 +322,33 @@ fn tables() -> Test {
     Ok(())
 }
 
-fn text<V>(result: Result<V, TrajectoryError>) -> String {
+fn message<V>(result: Result<V, TrajectoryError>) -> String {
     result.err().map(|error| error.to_string()).unwrap_or_default()
 }
 
 #[test]
-fn mistakes() -> Test {
-    let mut ocp = solved()?;
+fn invalid_arguments() -> Test {
+    let mut ocp = solved_problem()?;
     let solution = ocp.solution()?;
-    assert_eq!(text(solution.state("speed")), "the solution of `Cart` has no `speed`: it has `x[0]`, `x[1]`");
-    assert_eq!(text(solution.state("x")), "`x` is ambiguous, it matches `x[0]`, `x[1]`");
     assert_eq!(
-        text(solution.constraint("Corner")),
+        message(solution.state("speed")),
+        "the solution of `Cart` has no `speed`: it has `x[0]`, `x[1]`"
+    );
+    assert_eq!(message(solution.state("x")), "`x` is ambiguous, it matches `x[0]`, `x[1]`");
+    assert_eq!(
+        message(solution.constraint("Corner")),
         "the solution of `Cart` has no `Corner`: it has `Limits[0]`, `Limits[1]`"
     );
-    assert!(text(solution.get("y")).contains("`z`, `u`, `p`, `Limits[0]`"));
+    assert!(message(solution.get("y")).contains("`z`, `u`, `p`, `Limits[0]`"));
     let mut short =
         Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(2, 0.1))?;
     assert_eq!(
-        text(short.restore(&solution).map(|_| ())),
+        message(short.restore(&solution).map(|_| ())),
         "the trajectory has 11 values of `x[0]` instead of 3: for other horizons use `guess_from`, which interpolates"
     );
     let mut other = Problem::new(Map::<Step, f64>::new()).on(Horizon::uniform(N, 0.1))?;
     assert_eq!(
-        text(other.guess_from(&solution).map(|_| ())),
+        message(other.guess_from(&solution).map(|_| ())),
         "the solution of `Cart` has no `x[2]`: it has `x[0]`, `x[1]`"
     );
     assert!(matches!(other.solution(), Err(OcpError::Missing { .. })));

@@ -5,7 +5,7 @@ use casados::ocp::{Constraint, GeneralCost, HeapIpm, HeapSqp, Horizon, Map, OcpE
 use casados::prelude::*;
 use casados::qp::Side;
 
-fn tight() -> AdaptiveOptions {
+fn tight_options() -> AdaptiveOptions {
     AdaptiveOptions { rtol: 1e-11, atol: 1e-12, ..Default::default() }
 }
 
@@ -16,13 +16,13 @@ fn decay(x: [f64; 2], p: f64) -> [f64; 2] {
 
 /// Of Heun's method a step is `1 − h + h²/2`, the flow is `e^−h`: the defect is the difference.
 #[test]
-fn defects_are_what_the_flow_is_ahead() -> Test {
+fn defects_of_intervals() -> Test {
     let times = [0.0, 0.1, 0.4, 1.0];
     let erk = Erk::<Decay, Heun>::new(Options::default())?;
     let mut ocp = Problem::new(erk).on(Horizon::nodes(&times))?;
     ocp.fix_initial_state(&[3.0, 0.5])?.set_parameters(.., &[0.0])?.guess(&[3.0, 0.5], &[])?;
     ocp.guess_by_simulation()?;
-    let verification = ocp.verify(&mut Adaptive::<Decay, Radau>::new(tight())?)?;
+    let verification = ocp.verify(&mut Adaptive::<Decay, Radau>::new(tight_options())?)?;
     for k in 0..3 {
         let h: f64 = times[k + 1] - times[k];
         let expected = ocp.stage(k)?.x[0] * ((-h).exp() - (1.0 - h + 0.5 * h * h));
@@ -67,7 +67,7 @@ fn violations_between_nodes_by_name() -> Test {
     // From 0 with 2 m/s against 2 m/s²: 1 m high after 1 s, back after 2 s, at the node.
     ocp.guess_stage(0, &[0.0, 2.0], &[-2.0])?.guess_stage(1, &[0.0, -2.0], &[2.0])?;
     ocp.guess_stage(2, &[0.0, 2.0], &[])?;
-    let verification = ocp.verify(&mut Adaptive::<Throw, Radau>::new(tight())?)?;
+    let verification = ocp.verify(&mut Adaptive::<Throw, Radau>::new(tight_options())?)?;
     assert!(verification.largest_defect().ok_or("none")?.amount.abs() < 1e-9);
     let [state, first, ..] = verification.violations() else { return Err("too few".into()) };
     assert_eq!((state.name.as_str(), state.interval, state.side), ("x[0]", 0, Side::Upper));
@@ -92,7 +92,7 @@ fn effort(_x: [f64; 2], u: f64) -> f64 {
 
 /// Intervals are halved until all defects are small; the grid is finer where it has to be.
 #[test]
-fn a_loop_of_refinement() -> Test {
+fn mesh_refinement() -> Test {
     let mut nodes: Vec<f64> = (0..=8).map(|k| 0.25 * f64::from(k)).collect();
     let mut guess = None;
     let mut counts = Vec::new();
@@ -106,7 +106,7 @@ fn a_loop_of_refinement() -> Test {
             ocp.guess_from(solution)?;
         }
         assert!(HeapIpm::new(&ocp)?.solve(&mut ocp)?.is_converged());
-        let verification = ocp.verify(&mut Adaptive::<Pendulum, Radau>::new(tight())?)?;
+        let verification = ocp.verify(&mut Adaptive::<Pendulum, Radau>::new(tight_options())?)?;
         let coarse = verification.intervals(1e-5);
         counts.push((n, coarse.len()));
         if coarse.is_empty() {
@@ -133,11 +133,12 @@ fn growth(x: f64) -> f64 {
 }
 
 #[test]
-fn maps_have_no_flow() -> Test {
+fn verification_of_maps() -> Test {
     let mut ocp = Problem::new(Map::<Double, f64>::new()).on(Horizon::uniform(2, 1.0))?;
     ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[])?;
     assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
-    let error = ocp.verify(&mut Adaptive::<Growth, Radau>::new(tight())?).err().ok_or("it is verified")?;
+    let error =
+        ocp.verify(&mut Adaptive::<Growth, Radau>::new(tight_options())?).err().ok_or("it is verified")?;
     assert!(matches!(error, OcpError::Unsupported { .. }), "{error}");
     assert_eq!(Horizon::refined(&[0.0, 1.0], &[3]), [0.0, 1.0]);
     assert_eq!(Horizon::<f64>::refined(&[], &[0]), [] as [f64; 0]);

@@ -13,25 +13,25 @@ fn circle(x: [f64; 2], u: f64, _p: f64) -> [f64; 2] {
     [u * u + x[0] * x[0], x[0] + u]
 }
 
-fn texts(warnings: &[Warning]) -> Vec<String> {
+fn warning_texts(warnings: &[Warning]) -> Vec<String> {
     warnings.iter().map(ToString::to_string).collect()
 }
 
 #[test]
-fn warnings_are_named() -> Test {
+fn names_in_warnings() -> Test {
     let circle = Constraint::<Circle>::new([1.0, -5.0], [1.0, 5.0]);
     let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .path_constraints(circle)
         .on(Horizon::uniform(3, 0.1))?;
     ocp.free_initial_state().set_parameters(.., &[1.0])?.guess(&[0.5, 0.0], &[0.5])?;
-    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    assert_eq!(warning_texts(&ocp.warnings()?), [] as [&str; 0]);
 
     // Outside of bounds, where it is so by most; of the state at the start alone if that is free.
     ocp.guess_stage(2, &[0.5, 3.0], &[0.5])?.bound("x[1]", 1.., -1.0, 1.0)?;
     ocp.guess_stage(3, &[0.5, 1.5], &[])?;
     let warnings = ocp.warnings()?;
     let expected = "the guess 3e0 violates the upper bound of `x[1]` at stage 2, 1e0; solvers move it inside";
-    assert_eq!(texts(&warnings), [expected]);
+    assert_eq!(warning_texts(&warnings), [expected]);
 
     // At the origin nothing says where the circle is.
     ocp.guess(&[0.0, 0.0], &[0.0])?;
@@ -40,7 +40,7 @@ fn warnings_are_named() -> Test {
         matches!(warnings[..], [Warning::VanishingGradient { constraint, violation }]
             if constraint.name == "Circle" && constraint.output == 0 && constraint.stage == 0 && violation == 1.0),
         "{:?}",
-        texts(&warnings)
+        warning_texts(&warnings)
     );
 
     // A mass in kg beside forces in giganewtons.
@@ -50,14 +50,14 @@ fn warnings_are_named() -> Test {
         warnings,
         [Warning::FarUnits { small: ("p", 1e-2), large: ("u", 1e9) }],
         "{:?}",
-        texts(&warnings)
+        warning_texts(&warnings)
     );
     Ok(())
 }
 
 /// The first state is the one that is given, whatever its guess.
 #[test]
-fn given_states_have_no_guess() -> Test {
+fn guesses_of_given_states() -> Test {
     let mut ocp =
         Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?).on(Horizon::uniform(2, 0.1))?;
     ocp.fix_initial_state(&[1.0, 0.0])?.set_parameters(.., &[1.0])?.guess(&[0.0, 0.0], &[0.0])?;
@@ -77,7 +77,7 @@ fn twice(x: [f64; 2], _u: f64) -> f64 {
 /// Without a sail no wind moves a boat: an end elsewhere is out of reach, as a bound and as a
 /// constraint. With a sail, or one that is free, it is not; nor is an end where it is anyway.
 #[test]
-fn ends_are_out_of_reach() -> Test {
+fn unreachable_ends() -> Test {
     let mut ocp = Problem::new(Irk::<Boat, Gauss<2>>::new(Options::default())?)
         .terminal_constraints(Constraint::<Twice>::new([1.0], [4.0]))
         .on(Horizon::uniform(3, 0.1))?;
@@ -87,7 +87,7 @@ fn ends_are_out_of_reach() -> Test {
     let [Warning::UnreachableEnd { bound, value, limit }, Warning::UnreachableEnd { bound: other, .. }] =
         warnings[..]
     else {
-        return Err(format!("{:?}", texts(&warnings)).into());
+        return Err(format!("{:?}", warning_texts(&warnings)).into());
     };
     assert!((value - 0.25).abs() < 1e-12);
     assert_eq!((bound.name, bound.stage, limit), ("x[0]", 3, 1.0));
@@ -96,15 +96,15 @@ fn ends_are_out_of_reach() -> Test {
     ocp.guess_stage(3, &[0.25, 0.0], &[])?
         .bound("x[0]", 3.., 0.25, 0.25)?
         .set_terminal_bounds(&[0.0], &[0.5])?;
-    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    assert_eq!(warning_texts(&ocp.warnings()?), [] as [&str; 0]);
 
     ocp.bound("x[0]", 3.., 1.0, 1.0)?.set_terminal_bounds(&[1.0], &[4.0])?;
     ocp.fix_initial_state(&[0.25, 1.0])?.guess(&[1.0, 1.0], &[0.5])?;
-    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    assert_eq!(warning_texts(&ocp.warnings()?), [] as [&str; 0]);
     // Of a control that is given nothing is moved, and a free sail is a way.
     ocp.bound("u", .., 0.5, 0.5)?;
     assert_eq!(ocp.warnings()?.len(), 2);
     ocp.free_initial_state();
-    assert_eq!(texts(&ocp.warnings()?), [] as [&str; 0]);
+    assert_eq!(warning_texts(&ocp.warnings()?), [] as [&str; 0]);
     Ok(())
 }

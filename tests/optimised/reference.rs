@@ -154,26 +154,26 @@ fn awe_jacobian() -> Test {
 
 /// Pendulum and chain: in one step `h ∂f/∂x` is of order one, and the condition of the Newton
 /// matrix of order ten; four steps add up.
-const ORDINARY: f64 = 100.0 * f64::EPSILON;
+const ORDINARY_TOLERANCE: f64 = 100.0 * f64::EPSILON;
 
 /// Aircraft: the Newton matrix of the reference has the condition 6e3.
-const AIRCRAFT: f64 = 6e3 * f64::EPSILON;
+const AIRCRAFT_TOLERANCE: f64 = 6e3 * f64::EPSILON;
 
 #[test]
 fn pendulum_gauss() -> Test {
-    case!(Pendulum, Gauss<2>, "pendulum/pendulum_T005_irk_s2n1.json", 4, 1, 5, ORDINARY);
-    case!(Pendulum, Gauss<4>, "pendulum/pendulum_T01_irk_s4n4.json", 4, 1, 5, ORDINARY);
+    case!(Pendulum, Gauss<2>, "pendulum/pendulum_T005_irk_s2n1.json", 4, 1, 5, ORDINARY_TOLERANCE);
+    case!(Pendulum, Gauss<4>, "pendulum/pendulum_T01_irk_s4n4.json", 4, 1, 5, ORDINARY_TOLERANCE);
     Ok(())
 }
 
 #[test]
 fn chain_gauss() -> Test {
-    case!(Chain<9>, Gauss<2>, "chain/chain_3_irk_s2n1.json", 9, 3, 12, ORDINARY);
-    case!(Chain<9>, Gauss<4>, "chain/chain_3_irk_s4n4.json", 9, 3, 12, ORDINARY);
-    case!(Chain<21>, Gauss<2>, "chain/chain_5_irk_s2n1.json", 21, 3, 24, ORDINARY);
-    case!(Chain<33>, Gauss<2>, "chain/chain_7_irk_s2n1.json", 33, 3, 36, ORDINARY);
-    case!(Chain<33>, Gauss<4>, "chain/chain_7_irk_s4n4.json", 33, 3, 36, ORDINARY);
-    case!(Chain<69>, Gauss<2>, "chain/chain_13_irk_s2n1.json", 69, 3, 72, ORDINARY);
+    case!(Chain<9>, Gauss<2>, "chain/chain_3_irk_s2n1.json", 9, 3, 12, ORDINARY_TOLERANCE);
+    case!(Chain<9>, Gauss<4>, "chain/chain_3_irk_s4n4.json", 9, 3, 12, ORDINARY_TOLERANCE);
+    case!(Chain<21>, Gauss<2>, "chain/chain_5_irk_s2n1.json", 21, 3, 24, ORDINARY_TOLERANCE);
+    case!(Chain<33>, Gauss<2>, "chain/chain_7_irk_s2n1.json", 33, 3, 36, ORDINARY_TOLERANCE);
+    case!(Chain<33>, Gauss<4>, "chain/chain_7_irk_s4n4.json", 33, 3, 36, ORDINARY_TOLERANCE);
+    case!(Chain<69>, Gauss<2>, "chain/chain_13_irk_s2n1.json", 69, 3, 72, ORDINARY_TOLERANCE);
     Ok(())
 }
 
@@ -183,7 +183,7 @@ fn awe_orbit() -> Test {
     let (lambda, h) = (reference.vector("lambda")?, reference.number("T")?);
     let mut irk = Irk::<Awe, RadauIIA<4>>::new(Options { start: Start::Zero, ..Default::default() })?;
     for interval in reference.records("intervals")? {
-        check!(irk, interval, lambda, h, 23, 4, 27, AIRCRAFT);
+        check!(irk, interval, lambda, h, 23, 4, 27, AIRCRAFT_TOLERANCE);
     }
     Ok(())
 }
@@ -191,7 +191,7 @@ fn awe_orbit() -> Test {
 /// Stages: the collocation polynomial passes through `x0 + h Σ aᵢⱼ kⱼ` and `zᵢ` at the nodes, and
 /// Radau IIA has its last node at the end.
 #[test]
-fn awe_stages() -> Test {
+fn stages_of_awe() -> Test {
     let reference = Record::load("awe/intervals.json")?;
     let h = reference.number("T")?;
     let tableau = <RadauIIA<4> as Method<4>>::TABLEAU;
@@ -200,13 +200,13 @@ fn awe_stages() -> Test {
         let (x0, u) = (interval.vector::<23>("x0")?, interval.vector("u")?);
         let (k, z) = (interval.matrix::<4, 23>("k")?, interval.vector::<4>("z")?);
         let end = irk.solve(&x0, &u, h)?;
-        assert!(error(&end.z, &SVector::from([z[3]])) < AIRCRAFT);
+        assert!(error(&end.z, &SVector::from([z[3]])) < AIRCRAFT_TOLERANCE);
         for stage in 0..4 {
             let increment = SVector::<f64, 4>::from(tableau.a()[stage]);
             let x = x0 + k.transpose() * increment * h;
             let dense = irk.dense(tableau.c()[stage] * h)?;
-            assert!(error(&dense.x, &x) < AIRCRAFT);
-            assert!(error(&dense.z, &SVector::from([z[stage]])) < AIRCRAFT);
+            assert!(error(&dense.x, &x) < AIRCRAFT_TOLERANCE);
+            assert!(error(&dense.z, &SVector::from([z[stage]])) < AIRCRAFT_TOLERANCE);
         }
     }
     Ok(())

@@ -9,7 +9,7 @@ fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
 }
 
 #[test]
-fn matrices_have_a_square_for_each_entry() -> Test {
+fn sparsity_plots() -> Test {
     let structure = Spring::describe();
     let figure =
         Figure::new().with(Sparsity::jacobian(structure)).column(1.0).with(Sparsity::factors(structure));
@@ -34,7 +34,7 @@ fn matrices_have_a_square_for_each_entry() -> Test {
 }
 
 #[test]
-fn space_is_seen_from_where_it_is_said() -> Test {
+fn viewpoint_of_3d_plots() -> Test {
     // A screw around the third axis: from above a circle, from the side as high as it is.
     let turns = (0..=200).map(|i| f64::from(i) * std::f64::consts::PI / 50.0);
     let screw: Vec<[f64; 3]> = turns.map(|t| [2.0 * t.cos(), 2.0 * t.sin(), 0.5 * t]).collect();
@@ -65,7 +65,7 @@ fn space_is_seen_from_where_it_is_said() -> Test {
 }
 
 #[test]
-fn a_line_that_changes_its_colour_has_no_gaps() -> Test {
+fn lines_of_varying_colour() -> Test {
     let points = (0..=50).map(|i| f64::from(i) / 50.0).map(|t| (t, t * t, (6.0 * t).sin()));
     let svg = Figure::new().with(Panel::new("").coloured("power", points)).to_svg();
     let document = Document::parse(&svg)?;
@@ -84,7 +84,7 @@ fn a_line_that_changes_its_colour_has_no_gaps() -> Test {
 }
 
 #[test]
-fn directions_of_a_field_are_those_of_the_model() -> Test {
+fn direction_fields() -> Test {
     let rotation = |x: [f64; 2]| [-x[1], x[0]];
     let panel = Panel::new("").field(rotation).x_range(-1.0..1.0).y_range(-1.0..1.0).equal().line("", []);
     let svg = Figure::new().with(panel).to_svg();
@@ -107,7 +107,7 @@ fn directions_of_a_field_are_those_of_the_model() -> Test {
 }
 
 #[test]
-fn names_stand_below_their_dots() -> Test {
+fn labels_of_points() -> Test {
     let names = ["one", "two", "three"];
     let panel = Panel::new("").x_names(names).dots("dots", [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]);
     let svg = Figure::new().with(panel).to_svg();
@@ -122,7 +122,7 @@ fn names_stand_below_their_dots() -> Test {
 }
 
 #[test]
-fn axes_of_a_column_begin_at_the_same_place() -> Test {
+fn alignment_of_axes() -> Test {
     let [short, long] = [1.0, 1e4].map(|size| Panel::new("").y("unit").line("", [(0.0, 0.0), (1.0, size)]));
     let svg = Figure::new().with(short).with(long).to_svg();
     let document = Document::parse(&svg)?;
@@ -135,7 +135,7 @@ fn axes_of_a_column_begin_at_the_same_place() -> Test {
 }
 
 #[test]
-fn whatever_is_drawn_the_file_is_well_formed() -> Test {
+fn well_formed_files() -> Test {
     let hostile = "a < b & \"c\" > d \0 \u{1b}[31m \u{b} \u{ffff} \t \r\n";
     // From the least denormal number to the largest, and what a logarithmic axis has no place for.
     let extreme = [5e-324, 1e-310, 1e300, f64::MAX, 0.0, -0.0, -1.0, f64::MIN, -5e-324, f64::NAN];
@@ -193,7 +193,7 @@ fn whatever_is_drawn_the_file_is_well_formed() -> Test {
 }
 
 #[test]
-fn a_series_looks_as_it_is_told() -> Test {
+fn styles_of_series() -> Test {
     let series = Curve::line("limit", [(0.0, 0.0), (1.0, 1.0)]).colour(Colour::RED).width(1.0).dashed();
     let folder = std::env::temp_dir().join(format!("casados_plot_{}", std::process::id()));
     let path = folder.join("inside/figure.svg");

@@ -30,7 +30,7 @@ fn deviation(x: [f64; 2], u: f64) -> [f64; 3] {
 type CartProblem = Problem<Irk<Cart, Gauss<2>>, LeastSquaresCost<Deviation>>;
 
 /// At rest beside its place, with a force within one.
-fn solved() -> Result<(HeapOcp<CartProblem>, HeapSqp), Box<dyn std::error::Error>> {
+fn solved_problem() -> Result<(HeapOcp<CartProblem>, HeapSqp), Box<dyn std::error::Error>> {
     let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 1.0, 0.1]))
         .on(Horizon::uniform(20, 0.2))?;
@@ -41,8 +41,8 @@ fn solved() -> Result<(HeapOcp<CartProblem>, HeapSqp), Box<dyn std::error::Error
 }
 
 #[test]
-fn trajectories_are_those_of_the_iterate_with_bounds_and_active_parts() -> Test {
-    let (mut ocp, _) = solved()?;
+fn plots_of_trajectories() -> Test {
+    let (mut ocp, _) = solved_problem()?;
     let svg = Figure::new().with(Panel::trajectories(&ocp.solution()?, "u")?).to_svg();
     let document = Document::parse(&svg)?;
     let panel = groups(&document, "panel", Some("Cart: u"))[0];
@@ -89,8 +89,8 @@ fn trajectories_are_those_of_the_iterate_with_bounds_and_active_parts() -> Test 
 }
 
 #[test]
-fn a_name_means_what_it_means_for_bounds() -> Test {
-    let (mut ocp, _) = solved()?;
+fn names_in_plots() -> Test {
+    let (mut ocp, _) = solved_problem()?;
     let svg = Figure::new().with(Panel::trajectories(&ocp.solution()?, "x")?).to_svg();
     let document = Document::parse(&svg)?;
     let panel = groups(&document, "panel", None)[0];
@@ -112,7 +112,7 @@ fn speed(x: [f64; 2], _u: f64) -> f64 {
 }
 
 #[test]
-fn constraints_are_drawn_between_nodes_too() -> Test {
+fn plots_of_constraints() -> Test {
     let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.01, 0.01]))
         .path_constraints(Constraint::<Speed>::new([-0.5], [f64::INFINITY]))
@@ -149,7 +149,7 @@ fn constraints_are_drawn_between_nodes_too() -> Test {
 }
 
 #[test]
-fn convergence_is_the_log_on_a_logarithmic_axis() -> Test {
+fn convergence_plots() -> Test {
     let row = |iteration, size: f64| {
         let mut row = Iteration::default();
         row.iteration = iteration;
@@ -180,7 +180,7 @@ fn convergence_is_the_log_on_a_logarithmic_axis() -> Test {
 }
 
 #[test]
-fn a_histogram_has_all_samples() -> Test {
+fn histograms() -> Test {
     // 90 of one time, nine of a longer one, and one far away.
     let times: Vec<f64> = (0..100)
         .map(|i| {

@@ -71,21 +71,22 @@ impl Axis {
         Err(format!("numbers stand at the wrong places: {ticks:?}").into())
     }
 
-    fn place(&self, value: f64) -> f64 {
+    fn pixel_range(&self, value: f64) -> f64 {
         if self.is_log { value.log10() } else { value }
     }
 
     /// Where a number is.
     pub fn pixel(&self, value: f64) -> f64 {
-        let share =
-            (self.place(value) - self.place(self.from.0)) / (self.place(self.to.0) - self.place(self.from.0));
+        let share = (self.pixel_range(value) - self.pixel_range(self.from.0))
+            / (self.pixel_range(self.to.0) - self.pixel_range(self.from.0));
         self.from.1 + share * (self.to.1 - self.from.1)
     }
 
     /// What number is at a pixel.
     pub fn value(&self, pixel: f64) -> f64 {
         let share = (pixel - self.from.1) / (self.to.1 - self.from.1);
-        let place = self.place(self.from.0) + share * (self.place(self.to.0) - self.place(self.from.0));
+        let place = self.pixel_range(self.from.0)
+            + share * (self.pixel_range(self.to.0) - self.pixel_range(self.from.0));
         if self.is_log { 10f64.powf(place) } else { place }
     }
 }

@@ -41,7 +41,7 @@ mod trolley {
     }
 }
 
-fn solution(points: usize) -> Result<Trajectory, Box<dyn std::error::Error>> {
+fn solved_problem(points: usize) -> Result<Trajectory, Box<dyn std::error::Error>> {
     let mut ocp = Problem::new(Erk::<Trolley, Rk4>::new(Options::default())?)
         .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 1.0, 0.1]))
         .path_constraints(Constraint::<Energy>::new([-1.0], [0.2]))
@@ -62,9 +62,9 @@ fn texts(panel: Panel) -> Result<Vec<String>, Box<dyn std::error::Error>> {
 }
 
 #[test]
-fn axes_have_units_of_doc_comments() -> Test {
+fn units_of_axes() -> Test {
     for points in [0, 3] {
-        let solution = solution(points)?;
+        let solution = solved_problem(points)?;
         let has = |name: &str, expected: &[&str]| -> Test {
             let found = texts(Panel::trajectories(&solution, name)?)?;
             for text in expected {
@@ -87,8 +87,8 @@ fn axes_have_units_of_doc_comments() -> Test {
 }
 
 #[test]
-fn a_call_says_units() -> Test {
-    let mut solution = solution(0)?;
+fn units_given_in_calls() -> Test {
+    let mut solution = solved_problem(0)?;
     solution.set_unit("x.turns", "rad")?.set_unit("x.motion.place", "cm")?.set_unit("t", "min")?;
     let turns = texts(Panel::trajectories(&solution, "x.turns")?)?;
     assert!(["x.turns, rad", "time, min"].iter().all(|text| turns.iter().any(|t| t == text)), "{turns:?}");
@@ -99,8 +99,8 @@ fn a_call_says_units() -> Test {
 }
 
 #[test]
-fn units_are_in_files_and_files_without_them_are_read() -> Test {
-    let solution = solution(0)?;
+fn units_in_files() -> Test {
+    let solution = solved_problem(0)?;
     let text = serde_json::to_string(&solution)?;
     let read: Trajectory = serde_json::from_str(&text)?;
     assert_eq!(read, solution);

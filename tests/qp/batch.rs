@@ -2,18 +2,18 @@
 
 use crate::Test;
 use crate::infeasible::move_bounds;
-use crate::known::{Hessian, Kind, Numbers, PLAIN, numbers, problem};
+use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, numbers, problem};
 use crate::runs::{Counts, seeds};
 use casados::qp::{BatchInteriorPoint, HeapInteriorPoint, HeapSolution, QpInstance, QpSolver, QpStart};
 
 /// Problems of other dimensions; bounds of a half contradict each other now and then, and a tenth
 /// has NaN in its data.
-fn instances(seed: u64, count: usize) -> Result<Vec<QpInstance>, Box<dyn std::error::Error>> {
+fn random_instances(seed: u64, count: usize) -> Result<Vec<QpInstance>, Box<dyn std::error::Error>> {
     let mut random = Numbers::new(seed);
     let mut instances = Vec::new();
     for _ in 0..count {
-        let hessian = if random.chance(0.5) { Hessian::Definite } else { Hessian::LowRank };
-        let mut qp = problem(&mut random, &Kind { hessian, ..PLAIN })?.qp;
+        let hessian = if random.chance(0.5) { HessianKind::Definite } else { HessianKind::LowRank };
+        let mut qp = problem(&mut random, &ProblemKind { hessian, ..PLAIN })?.qp;
         if random.chance(0.5) {
             move_bounds(&mut random, &mut qp)?;
         }
@@ -33,13 +33,13 @@ fn instances(seed: u64, count: usize) -> Result<Vec<QpInstance>, Box<dyn std::er
 }
 
 #[test]
-fn as_if_alone() -> Test {
+fn batches_and_single_solves() -> Test {
     let mut counts = Counts::new("batches of problems, some infeasible, some NaN");
     let mut batch = BatchInteriorPoint::new();
     // Side by side they are solved to the tolerance: see `together`.
     batch.together = false;
     for seed in seeds(8) {
-        let mut all = instances(seed, 1 + 13 * seed as usize)?;
+        let mut all = random_instances(seed, 1 + 13 * seed as usize)?;
         for start in [QpStart::Cold, QpStart::Warm] {
             let mut alone = all.clone();
             let statuses = batch.solve(&mut all, start)?;

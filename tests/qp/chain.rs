@@ -8,12 +8,12 @@ use casados::qp::{
 use reference_data::Record;
 
 /// Elements of a list of matrices, of which the last one repeats.
-struct Repeated {
+struct RepeatedMatrices {
     numbers: Vec<f64>,
     size: usize,
 }
 
-impl Repeated {
+impl RepeatedMatrices {
     fn load(record: &Record, key: &str, count: usize, size: usize) -> Result<Self, String> {
         Ok(Self { numbers: record.numbers(key, count * size)?, size })
     }
@@ -42,7 +42,7 @@ impl Chain {
         let mut dims = vec![StageDims::new(nx, 3, 0); n + 1];
         dims[n].nu = 0;
         let mut qp = HeapQp::new(&dims)?;
-        let load = |key, count, size| Repeated::load(record, key, count, size);
+        let load = |key, count, size| RepeatedMatrices::load(record, key, count, size);
         let (a, b, offset) = (load("A", 2, nx * nx)?, load("B", 2, nx * 3)?, load("b", 2, nx)?);
         let (q, r, s) = (load("Q", 2, nx * nx)?, load("R", 1, 9)?, load("S", 1, 3 * nx)?);
         let (gradient, wall) = (load("q", 2, nx)?, record.list("wall_index")?);
@@ -93,7 +93,7 @@ impl Chain {
 /// multiplier near zero: a slack of 7e-6 there satisfies the conditions as well as none. The
 /// residuals, which are asserted to rounding, say that the solution here is the better one.
 #[test]
-fn stored_problems_have_their_reference_solutions() -> Test {
+fn reference_solutions_of_stored_problems() -> Test {
     let mut solver = HeapInteriorPoint::new();
     solver.options.tolerance = 1e-12;
     for masses in [3, 5, 7] {
@@ -119,7 +119,7 @@ fn stored_problems_have_their_reference_solutions() -> Test {
 }
 
 #[test]
-fn a_warm_start_takes_few_iterations() -> Test {
+fn iterations_of_warm_starts() -> Test {
     let mut solver = HeapInteriorPoint::new();
     let chain = Chain::load(5)?;
     let mut qp = chain.qp::<f64>()?;
@@ -176,7 +176,7 @@ fn single_precision() -> Test {
 }
 
 /// Multiplies costs: the solution is the same, forces and multipliers are so many times as large.
-fn multiply_costs<T: Real>(qp: &mut HeapQp<T>, factor: f64) {
+fn scale_costs<T: Real>(qp: &mut HeapQp<T>, factor: f64) {
     let factor = T::from_f64(factor);
     for mut stage in qp.stages_mut() {
         let multiply = |mut block: BlockMut<'_, T>| {
@@ -195,18 +195,18 @@ fn multiply_costs<T: Real>(qp: &mut HeapQp<T>, factor: f64) {
 }
 
 /// The largest multiplier of the dynamics: a term of the gradients that are to vanish.
-fn largest_force<T: Real>(solution: &HeapSolution<T>) -> f64 {
+fn largest_multiplier<T: Real>(solution: &HeapSolution<T>) -> f64 {
     let all = solution.stages().flat_map(|stage| stage.dynamics);
     all.map(|force| force.to_f64().abs()).fold(0.0, f64::max)
 }
 
 /// Costs in other units, 2²⁰ times as large: rounding errors of forces of 1e6 and more are far
 /// above the absolute tolerance, and a part of the forces is what can be asked for.
-fn in_other_units<T: Real>(relative: f64) -> Test {
+fn solve_in_other_units<T: Real>(relative: f64) -> Test {
     const UNIT: f64 = (1 << 20) as f64;
     let chain = Chain::load(3)?;
     let mut qp = chain.qp::<T>()?;
-    multiply_costs(&mut qp, UNIT);
+    scale_costs(&mut qp, UNIT);
     let mut solution = HeapSolution::new(qp.dims())?;
     let mut solver = HeapInteriorPoint::<T>::new();
     // In units both would be the same.
@@ -220,7 +220,7 @@ fn in_other_units<T: Real>(relative: f64) -> Test {
     (solver.options.tolerance, solver.options.relative_tolerance) = (0.0, relative);
     let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     let (found, _) = residuals(qp.view(), &solution);
-    let force = largest_force(&solution);
+    let force = largest_multiplier(&solution);
     // Multipliers are among the terms of gradients, and none of the others is more than ten times
     // as large here.
     assert!(found.stationarity.max(found.complementarity) <= 10.0 * relative * force, "{found} of {force:e}");
@@ -235,13 +235,13 @@ fn in_other_units<T: Real>(relative: f64) -> Test {
 
 #[test]
 fn relative_tolerances() -> Test {
-    in_other_units::<f32>(1e-5)?;
-    in_other_units::<f64>(1e-12)
+    solve_in_other_units::<f32>(1e-5)?;
+    solve_in_other_units::<f64>(1e-12)
 }
 
 /// Clarabel, which shares nothing with the other solver, and the interface to it.
 #[test]
-fn clarabel_agrees() -> Test {
+fn agreement_with_clarabel() -> Test {
     let chain = Chain::load(3)?;
     let qp = chain.qp::<f64>()?;
     let mut solution = HeapSolution::new(qp.dims())?;

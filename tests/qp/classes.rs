@@ -3,7 +3,9 @@
 //! A run has some hundred problems of each class; `CASADOS_RANDOM=100` multiplies that.
 
 use crate::Test;
-use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, numbers, problem, senseless};
+use crate::known_solutions::{
+    HessianKind, KnownProblem, Numbers, PLAIN, ProblemKind, invalid_numbers, numbers, problem,
+};
 use crate::runs::{Counts, kind, seeds, shows};
 use casados::qp::{
     Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart,
@@ -13,12 +15,12 @@ use casados::qp::{
 const TOLERANCE: f64 = 1e-8;
 
 /// What became of the problems of a class, and the solver of all of them.
-struct Class {
+struct VerdictCounts {
     counts: Counts,
     solver: HeapInteriorPoint<f64>,
 }
 
-impl Class {
+impl VerdictCounts {
     fn new(name: impl Into<String>) -> Self {
         Self { counts: Counts::new(name), solver: HeapInteriorPoint::new() }
     }
@@ -53,13 +55,13 @@ impl Class {
     /// Whether no more than so many of a thousand, or one of a few, were given up with the
     /// residuals that were reached.
     fn unsolved(&self, most: u64) -> bool {
-        1000 * self.given_up() <= most * self.counts.all().max(1000)
+        1000 * self.gave_up() <= most * self.counts.all().max(1000)
     }
-    fn given_up(&self) -> u64 {
+    fn gave_up(&self) -> u64 {
         self.counts.among(&["MaxIterations", "Stalled"])
     }
     fn false_verdicts(&self) -> u64 {
-        self.counts.all() - self.counts.of("Ok") - self.given_up()
+        self.counts.all() - self.counts.of("Ok") - self.gave_up()
     }
 }
 
@@ -73,7 +75,7 @@ fn multipliers<'a>(stage: &SolutionStage<'a, f64>) -> impl Iterator<Item = &'a f
 /// With residuals of at most `r`, convexity says
 /// `f(v) − f* ≤ ∇f(v)ᵀ (v − v*) ≤ r (|v − v*|₁ + |λ|₁ + |π|₁ + sides)`, and weak duality
 /// `f* − f(v) ≤ r (|λ*|₁ + |π*|₁)`.
-fn wrong(known: &Known, found: &HeapSolution<f64>, tolerance: f64) -> Option<String> {
+fn point_errors(known: &KnownProblem, found: &HeapSolution<f64>, tolerance: f64) -> Option<String> {
     let (r, objective) = residuals(known.qp.view(), found);
     let judged = [r.stationarity, r.dynamics, r.inequalities, r.complementarity, objective];
     let largest = judged[..4].iter().fold(0.0, |largest: f64, &r| largest.max(r));
@@ -123,8 +125,8 @@ fn objective_terms(data: &Stage<'_, f64>, point: &SolutionStage<'_, f64>) -> f64
 }
 
 /// Solves problems of a kind; `start` may write something senseless into the solution first.
-fn run(name: &str, kind: &Kind, few: u64, start: QpStart) -> Result<Class, QpError> {
-    let mut class = Class::new(name);
+fn run_class(name: &str, kind: &ProblemKind, few: u64, start: QpStart) -> Result<VerdictCounts, QpError> {
+    let mut class = VerdictCounts::new(name);
     if kind.units > 0.0 {
         // Terms of other sizes: a part of them is what can be asked for.
         class.solver.options.relative_tolerance = 1e-9;
@@ -136,11 +138,11 @@ fn run(name: &str, kind: &Kind, few: u64, start: QpStart) -> Result<Class, QpErr
         assert!(own.largest() < 1e-11 * 10_f64.powf(2.0 * kind.units), "{seed}: {own}");
         let mut solution = HeapSolution::new(known.qp.dims())?;
         if start == QpStart::Warm {
-            senseless(&mut random, &mut solution);
+            invalid_numbers(&mut random, &mut solution);
         }
         let found = class.solve(&known.qp, start, &mut solution);
         let tolerance = if kind.units > 0.0 { f64::INFINITY } else { TOLERANCE };
-        class.count(seed, &found.map(|_| wrong(&known, &solution, tolerance)));
+        class.count(seed, &found.map(|_| point_errors(&known, &solution, tolerance)));
     }
     println!("{}", class.counts);
     Ok(class)
@@ -148,19 +150,19 @@ fn run(name: &str, kind: &Kind, few: u64, start: QpStart) -> Result<Class, QpErr
 
 #[test]
 fn strictly_convex() -> Test {
-    let class = run("strictly convex", &PLAIN, 300, QpStart::Cold)?;
+    let class = run_class("strictly convex", &PLAIN, 300, QpStart::Cold)?;
     assert_eq!(class.counts.of("Ok"), class.counts.all());
-    let kind = Kind { empty: true, ..PLAIN };
-    let class = run("strictly convex with empty stages", &kind, 300, QpStart::Cold)?;
+    let kind = ProblemKind { empty: true, ..PLAIN };
+    let class = run_class("strictly convex with empty stages", &kind, 300, QpStart::Cold)?;
     assert_eq!(class.counts.of("Ok"), class.counts.all());
     Ok(())
 }
 
 #[test]
 fn convex() -> Test {
-    for hessian in [Hessian::LowRank, Hessian::Zero] {
-        let kind = Kind { hessian, empty: true, ..PLAIN };
-        let class = run(&format!("{hessian:?}"), &kind, 300, QpStart::Cold)?;
+    for hessian in [HessianKind::LowRank, HessianKind::Zero] {
+        let kind = ProblemKind { hessian, empty: true, ..PLAIN };
+        let class = run_class(&format!("{hessian:?}"), &kind, 300, QpStart::Cold)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
@@ -168,9 +170,9 @@ fn convex() -> Test {
 
 #[test]
 fn degenerate() -> Test {
-    for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
-        let kind = Kind { hessian, degenerate: true, empty: true, ..PLAIN };
-        let class = run(&format!("degenerate, {hessian:?}"), &kind, 300, QpStart::Cold)?;
+    for hessian in [HessianKind::Definite, HessianKind::LowRank, HessianKind::Zero] {
+        let kind = ProblemKind { hessian, degenerate: true, empty: true, ..PLAIN };
+        let class = run_class(&format!("degenerate, {hessian:?}"), &kind, 300, QpStart::Cold)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
@@ -178,10 +180,11 @@ fn degenerate() -> Test {
 
 #[test]
 fn soft() -> Test {
-    for hessian in [Hessian::Definite, Hessian::LowRank] {
+    for hessian in [HessianKind::Definite, HessianKind::LowRank] {
         for huge in [1e3, 1e8, 1e10, 1e12, 1e14, 1e20, f64::INFINITY] {
-            let kind = Kind { hessian, soft: Some(huge), empty: true, ..PLAIN };
-            let class = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, QpStart::Cold)?;
+            let kind = ProblemKind { hessian, soft: Some(huge), empty: true, ..PLAIN };
+            let class =
+                run_class(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, QpStart::Cold)?;
             assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
         }
     }
@@ -189,21 +192,21 @@ fn soft() -> Test {
 }
 
 #[test]
-fn senseless_starts() -> Test {
-    for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
-        let kind = Kind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
-        let class = run(&format!("senseless start, {hessian:?}"), &kind, 200, QpStart::Warm)?;
+fn invalid_start_points() -> Test {
+    for hessian in [HessianKind::Definite, HessianKind::LowRank, HessianKind::Zero] {
+        let kind = ProblemKind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
+        let class = run_class(&format!("senseless start, {hessian:?}"), &kind, 200, QpStart::Warm)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
 }
 
 #[test]
-fn other_units() -> Test {
-    for hessian in [Hessian::Definite, Hessian::Zero] {
+fn problems_in_other_units() -> Test {
+    for hessian in [HessianKind::Definite, HessianKind::Zero] {
         for units in [1.0, 3.0] {
-            let kind = Kind { hessian, units, ..PLAIN };
-            let class = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, QpStart::Cold)?;
+            let kind = ProblemKind { hessian, units, ..PLAIN };
+            let class = run_class(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, QpStart::Cold)?;
             assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
         }
     }
@@ -215,13 +218,16 @@ fn other_units() -> Test {
 /// distance no more than what the rows lack.
 #[test]
 fn infeasible() -> Test {
-    for (hessian, distance) in [(Hessian::Definite, 1.0), (Hessian::Zero, 1e-3), (Hessian::LowRank, 1e4)] {
-        let mut class = Class::new(format!("infeasible by {distance:e}, {hessian:?}"));
+    for (hessian, distance) in
+        [(HessianKind::Definite, 1.0), (HessianKind::Zero, 1e-3), (HessianKind::LowRank, 1e4)]
+    {
+        let mut class = VerdictCounts::new(format!("infeasible by {distance:e}, {hessian:?}"));
         for seed in seeds(100) {
             let mut random = Numbers::new(!seed);
-            let kind = Kind { hessian, empty: seed % 2 == 0, soft: (seed % 3 == 0).then_some(1e9), ..PLAIN };
+            let kind =
+                ProblemKind { hessian, empty: seed % 2 == 0, soft: (seed % 3 == 0).then_some(1e9), ..PLAIN };
             let known = problem(&mut random, &kind)?;
-            let Some((qp, stage)) = contradict(&known, &mut random, distance)? else { continue };
+            let Some((qp, stage)) = add_contradictory_rows(&known, &mut random, distance)? else { continue };
             let mut solution = HeapSolution::new(qp.dims())?;
             let found = class.solve(&qp, QpStart::Cold, &mut solution);
             class.count(seed, &found.map(|_| Some("solved".into())));
@@ -238,14 +244,14 @@ fn infeasible() -> Test {
         }
         println!("{}", class.counts);
         let (all, true_ones) = (class.counts.all(), class.counts.of("Infeasible"));
-        assert!(all > 0 && true_ones + class.given_up() == all && class.unsolved(5), "{}", class.counts);
+        assert!(all > 0 && true_ones + class.gave_up() == all && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
 }
 
 /// The problem with two more rows in a stage that has variables.
-fn contradict(
-    known: &Known,
+fn add_contradictory_rows(
+    known: &KnownProblem,
     random: &mut Numbers,
     distance: f64,
 ) -> Result<Option<(HeapQp<f64>, usize)>, QpError> {
@@ -315,8 +321,8 @@ fn copy(from: &Stage<'_, f64>, to: &mut StageMut<'_, f64>) {
 /// conditions of optimality, and `NotConvex` only where the Hessian that is left when states are
 /// eliminated has a negative eigenvalue.
 #[test]
-fn not_convex() -> Test {
-    let mut class = Class::new("some not convex");
+fn nonconvex_problems() -> Test {
+    let mut class = VerdictCounts::new("some not convex");
     let mut convex = 0;
     for seed in seeds(300) {
         let mut random = Numbers::new(seed.wrapping_mul(7));
@@ -339,7 +345,7 @@ fn not_convex() -> Test {
         qp.fix_initial_state(&x0)?;
         let mut solution = HeapSolution::new(&dims)?;
         let found = class.solve(&qp, QpStart::Cold, &mut solution);
-        let least = least_curvature(&qp);
+        let least = min_reduced_eigenvalue(&qp);
         convex += u64::from(least > 1e-6);
         match found {
             Ok(_) => assert!(residuals(qp.view(), &solution).0.largest() <= TOLERANCE),
@@ -352,13 +358,13 @@ fn not_convex() -> Test {
     }
     println!("{}", class.counts);
     let said = class.counts.of("NotConvex");
-    let known = said + class.counts.of("Ok") + class.given_up();
+    let known = said + class.counts.of("Ok") + class.gave_up();
     assert!(said > 0 && convex > 0 && known == class.counts.all(), "{}", class.counts);
     Ok(())
 }
 
 /// The least eigenvalue of the Hessian over all controls, states eliminated.
-fn least_curvature(qp: &HeapQp<f64>) -> f64 {
+fn min_reduced_eigenvalue(qp: &HeapQp<f64>) -> f64 {
     let dims = qp.dims();
     let controls: usize = dims.iter().map(|d| d.nu).sum();
     // What a control does to all variables, column after column.

@@ -75,7 +75,7 @@ pub fn couple(seed: u64, qp: &mut HeapQp<f64>) {
 /// Both find the same minimum. Products of slacks and multipliers of 1e-9, of at most 200 sides,
 /// leave 2e-7 of the objective.
 #[test]
-fn same_minimum_as_clarabel() -> Test {
+fn minimum_of_clarabel() -> Test {
     for seed in 0..120 {
         let qp = problem(seed, 3 + seed as usize % 11)?;
         let mut solution = HeapSolution::new(qp.dims())?;
@@ -145,7 +145,7 @@ fn deadlines() -> Test {
 }
 
 #[test]
-fn others_refuse() -> Test {
+fn solvers_without_couplings() -> Test {
     let qp = problem(3, 8)?;
     let mut solution = HeapSolution::new(qp.dims())?;
     let mut condensing = Condensing::new(2, HeapInteriorPoint::new());

@@ -22,7 +22,7 @@ fn problem() -> Result<HeapQp<f64>, QpError> {
     Ok(qp)
 }
 
-fn error_of(qp: &HeapQp<f64>) -> Result<QpError, Box<dyn std::error::Error>> {
+fn solve_error(qp: &HeapQp<f64>) -> Result<QpError, Box<dyn std::error::Error>> {
     let mut solution = HeapSolution::new(qp.dims())?;
     let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     Ok(found.err().ok_or("solved")?)
@@ -34,7 +34,7 @@ fn crossed_bounds() -> Test {
     qp.stage_mut(1).ok_or("no stage")?.g_bounds_mut().set(0, 2.0, 1.0);
     let expected =
         QpError::CrossedBounds { field: QpField::GeneralBounds, stage: 1, index: 0, lower: 2.0, upper: 1.0 };
-    assert_eq!(error_of(&qp)?, expected);
+    assert_eq!(solve_error(&qp)?, expected);
     assert_eq!(
         expected.to_string(),
         "stage 1: lower bound 2 exceeds upper bound 1 at element 0 of the bounds of the general constraints"
@@ -44,7 +44,7 @@ fn crossed_bounds() -> Test {
 
 /// Numbers that are not finite, wherever they are, are named.
 #[test]
-fn not_finite() -> Test {
+fn non_finite_data() -> Test {
     type Spoil = fn(&mut casados::qp::StageMut<'_, f64>);
     let places: [(Spoil, QpField, usize); 9] = [
         (|s| s.a_mut().set(1, 0, f64::NAN), QpField::A, 1),
@@ -60,7 +60,7 @@ fn not_finite() -> Test {
     for (spoil, expected, at) in places {
         let mut qp = problem()?;
         spoil(&mut qp.stage_mut(1).ok_or("no stage")?);
-        let found = error_of(&qp)?;
+        let found = solve_error(&qp)?;
         let QpError::InvalidValue { field, stage, index, value } = found else {
             return Err(format!("{expected}: {found}").into());
         };
@@ -73,11 +73,11 @@ fn not_finite() -> Test {
 /// So are those of a row without bounds, at the state that is given, too: a single stage has no
 /// other.
 #[test]
-fn not_finite_where_nothing_is_bounded() -> Test {
+fn non_finite_data_of_unbounded_rows() -> Test {
     let mut qp = HeapQp::new(&[StageDims::new(2, 0, 1)])?;
     qp.fix_initial_state(&[1.0, 2.0])?;
     qp.stage_mut(0).ok_or("no stage")?.c_mut().set(0, 1, f64::NAN);
-    let QpError::InvalidValue { field, stage, index, .. } = error_of(&qp)? else {
+    let QpError::InvalidValue { field, stage, index, .. } = solve_error(&qp)? else {
         return Err("another error".into());
     };
     assert_eq!((field, stage, index), (QpField::C, 0, 1));
@@ -89,7 +89,7 @@ fn negative_penalty() -> Test {
     let mut qp = problem()?;
     qp.stage_mut(0).ok_or("no stage")?.u_bounds_mut().soften(0, -1.0, 0.0);
     assert_eq!(
-        error_of(&qp)?,
+        solve_error(&qp)?,
         QpError::InvalidValue { field: QpField::Penalty, stage: 0, index: 0, value: -1.0 }
     );
     Ok(())
@@ -119,7 +119,7 @@ fn wrong_lengths() -> Test {
 /// Everything in arrays, of exactly the lengths that the constant functions say, and in ones that
 /// are too short.
 #[test]
-fn memory_of_the_owner() -> Test {
+fn memory_in_arrays() -> Test {
     const DATA: usize = Qp::<f64, (), ()>::memory(&DIMS);
     const POINT: usize = Solution::<f64, (), ()>::memory(&DIMS);
     // Bounds of two general constraints, two sides each.

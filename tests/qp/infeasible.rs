@@ -2,7 +2,7 @@
 //! many iterations it takes is printed.
 
 use crate::Test;
-use crate::known::{Hessian, Kind, Numbers, PLAIN, problem};
+use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, problem};
 use crate::runs::{shows, times};
 use casados::qp::{Clarabel, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, residuals};
 
@@ -39,7 +39,7 @@ pub fn move_bounds(random: &mut Numbers, qp: &mut HeapQp<f64>) -> Test {
 }
 
 /// The median, the ninth tenth and the largest.
-fn spread(mut iterations: Vec<usize>) -> String {
+fn quantiles(mut iterations: Vec<usize>) -> String {
     iterations.sort_unstable();
     let at = |part: f64| iterations[(part * (iterations.len() - 1) as f64) as usize];
     format!("{} | {} | {} | {}", iterations.len(), at(0.5), at(0.9), at(1.0))
@@ -49,7 +49,7 @@ fn spread(mut iterations: Vec<usize>) -> String {
 /// said to be one, or nothing is said; and so is one feasible problem of a hundred, since
 /// multipliers are nearly a proof only.
 #[test]
-fn limited() -> Test {
+fn check_iteration_limit() -> Test {
     const MAX_ITERATIONS: usize = 30;
     let (mut suspected, mut told, mut count) = ([0, 0], [0, 0], [0, 0]);
     for seed in 1..=400 {
@@ -98,7 +98,7 @@ fn limited() -> Test {
 }
 
 /// Iterations are what the solver asks the clock for: errors have no number of them.
-fn told_apart(name: &str, kind: &Kind) -> Test {
+fn check_verdicts(name: &str, kind: &ProblemKind) -> Test {
     let (mut feasible, mut infeasible, mut given_up) = (Vec::new(), Vec::new(), 0);
     let count = 500 * times() as usize;
     let mut seed = 0;
@@ -138,18 +138,21 @@ fn told_apart(name: &str, kind: &Kind) -> Test {
             (oracle, found) => return Err(format!("{name}, {seed}: {oracle:?}, {found:?}").into()),
         }
     }
-    println!("| {name} | feasible | {} |", spread(feasible));
-    println!("| {name} | infeasible | {} |", spread(infeasible));
+    println!("| {name} | feasible | {} |", quantiles(feasible));
+    println!("| {name} | infeasible | {} |", quantiles(infeasible));
     assert!(given_up <= 2 * times(), "{given_up}");
     Ok(())
 }
 
 #[test]
 fn strictly_convex() -> Test {
-    told_apart("strictly convex", &PLAIN)
+    check_verdicts("strictly convex", &PLAIN)
 }
 
 #[test]
 fn low_rank_and_degenerate() -> Test {
-    told_apart("low rank, degenerate", &Kind { hessian: Hessian::LowRank, degenerate: true, ..PLAIN })
+    check_verdicts(
+        "low rank, degenerate",
+        &ProblemKind { hessian: HessianKind::LowRank, degenerate: true, ..PLAIN },
+    )
 }

@@ -5,17 +5,17 @@
 #[path = "../runs/mod.rs"]
 mod runs;
 
-mod absurd;
+mod arbitrary_data;
 mod batch;
 mod chain;
 mod classes;
 mod coupling;
+mod difficult_problems;
 mod errors;
-mod hard;
 mod infeasible;
-mod known;
+mod known_solutions;
 mod random;
-mod together;
+mod side_by_side;
 mod units;
 mod unstable;
 

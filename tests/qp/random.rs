@@ -4,7 +4,7 @@
 //! unbounded, or, of some in ten thousand, that the solver gives up: then it says what residuals it
 //! reached, and so does a solver that never saw another problem.
 
-use crate::known::{Numbers, numbers};
+use crate::known_solutions::{Numbers, numbers};
 use crate::runs::{Counts, seeds, shows};
 use crate::{Test, solve_to};
 use casados::qp::{
@@ -86,7 +86,7 @@ fn problem(dims: &[StageDims], seed: u64) -> Result<HeapQp<f64>, QpError> {
 
 /// How much of the objective one unit of a violated condition is worth, at least 1: the largest
 /// multiplier.
-fn size(solution: &HeapSolution<f64>) -> f64 {
+fn violation_price(solution: &HeapSolution<f64>) -> f64 {
     let all = solution.stages().flat_map(|s| {
         [s.dynamics, s.x_lower, s.x_upper, s.u_lower, s.u_upper, s.g_lower, s.g_upper].into_iter().flatten()
     });
@@ -99,7 +99,7 @@ fn dims(seed: u64) -> Vec<StageDims> {
     (0..stages).map(|_| StageDims::new(1 + random.below(8), random.below(4), random.below(3))).collect()
 }
 
-fn counted(counts: &mut Counts, seed: u64, found: &Result<QpStatistics, QpError>) {
+fn solve_and_count(counts: &mut Counts, seed: u64, found: &Result<QpStatistics, QpError>) {
     counts.result(found);
     if shows() && found.is_err() {
         println!("{counts} {seed}: {found:?}");
@@ -130,19 +130,19 @@ fn solve<S: QpSolver<f64>>(
     found
 }
 
-fn interior_point() -> HeapInteriorPoint<f64> {
+fn interior_point_options() -> HeapInteriorPoint<f64> {
     let mut solver = HeapInteriorPoint::new();
     solver.options.tolerance = TOLERANCE;
     solver
 }
 
 /// Products of slacks and multipliers of 1e-9, of at most 300 sides, leave 3e-7 of the objective.
-fn same_minimum(a: f64, b: f64, solution: &HeapSolution<f64>) -> bool {
-    (a - b).abs() <= 3e-7 * size(solution)
+fn assert_same_minimum(a: f64, b: f64, solution: &HeapSolution<f64>) -> bool {
+    (a - b).abs() <= 3e-7 * violation_price(solution)
 }
 
 /// No verdict is false, and no more than one problem in a thousand is given up that has a solution.
-fn judged(counts: &Counts, unbounded: u64) {
+fn assert_verdicts(counts: &Counts, unbounded: u64) {
     println!("{counts}");
     let given_up = counts.among(&["Stalled", "MaxIterations"]);
     assert_eq!(counts.of("Ok") + given_up, counts.all(), "{counts}");
@@ -151,19 +151,19 @@ fn judged(counts: &Counts, unbounded: u64) {
 
 /// Both find the same minimum.
 #[test]
-fn same_minimum_as_clarabel() -> Test {
+fn minimum_of_clarabel() -> Test {
     let (mut counts, mut unbounded) = (Counts::new("feasible, convex; beside clarabel"), 0);
-    let mut solver = interior_point();
+    let mut solver = interior_point_options();
     for seed in seeds(200) {
         let dims = dims(seed);
         let qp = problem(&dims, seed)?;
         let mut solution = HeapSolution::new(&dims)?;
         let clarabel = Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
-        let own = solve(&mut solver, interior_point, &qp, QpStart::Cold, &mut solution);
-        counted(&mut counts, seed, &own);
+        let own = solve(&mut solver, interior_point_options, &qp, QpStart::Cold, &mut solution);
+        solve_and_count(&mut counts, seed, &own);
         match (clarabel, own) {
             (Ok(clarabel), Ok(own)) => {
-                let same = same_minimum(clarabel.objective, own.objective, &solution);
+                let same = assert_same_minimum(clarabel.objective, own.objective, &solution);
                 assert!(same, "{seed}: {clarabel:?} {own:?}");
             }
             // Free states at the start may make a problem unbounded.
@@ -172,59 +172,59 @@ fn same_minimum_as_clarabel() -> Test {
             _ => {}
         }
     }
-    judged(&counts, unbounded);
+    assert_verdicts(&counts, unbounded);
     Ok(())
 }
 
 /// The problem with eliminated states has the same minimum, and what is expanded satisfies the
 /// conditions of optimality.
 #[test]
-fn condensed_is_uncondensed() -> Test {
+fn condensing() -> Test {
     let mut counts = Counts::new("feasible, convex; states eliminated");
     for seed in seeds(100) {
         let dims = dims(!seed);
         let qp = problem(&dims, !seed)?;
         let Ok((_, expected, _)) = solve_to(TOLERANCE, &qp) else { continue };
-        let fresh = || Condensing::new(1 + seed as usize % 4, interior_point());
+        let fresh = || Condensing::new(1 + seed as usize % 4, interior_point_options());
         let mut solver = fresh();
         let mut solution = HeapSolution::new(&dims)?;
         for start in [QpStart::Cold, QpStart::Warm] {
             let found = solve(&mut solver, fresh, &qp, start, &mut solution);
-            counted(&mut counts, seed, &found);
+            solve_and_count(&mut counts, seed, &found);
             let Ok(found) = found else { continue };
             let (_, objective) = residuals(qp.view(), &solution);
-            assert!(same_minimum(objective, expected.objective, &solution), "{seed}: {found:?}");
+            assert!(assert_same_minimum(objective, expected.objective, &solution), "{seed}: {found:?}");
             // What it says of the objective includes what is constant in eliminated states.
-            assert!(same_minimum(objective, found.objective, &solution), "{seed}: {found:?}");
+            assert!(assert_same_minimum(objective, found.objective, &solution), "{seed}: {found:?}");
         }
     }
-    judged(&counts, 0);
+    assert_verdicts(&counts, 0);
     Ok(())
 }
 
 /// From the solution of a problem nearby, with other linear terms and another state at the start,
 /// to the minimum that a cold start finds.
 #[test]
-fn warm_is_cold() -> Test {
+fn warm_starts() -> Test {
     let mut counts = Counts::new("feasible, convex; from a solution nearby");
-    let mut solver = interior_point();
+    let mut solver = interior_point_options();
     for seed in seeds(200) {
         let dims = dims(seed ^ (1 << 40));
         let mut qp = problem(&dims, seed ^ (1 << 40))?;
         let mut solution = HeapSolution::new(&dims)?;
-        if solve(&mut solver, interior_point, &qp, QpStart::Cold, &mut solution).is_err() {
+        if solve(&mut solver, interior_point_options, &qp, QpStart::Cold, &mut solution).is_err() {
             continue;
         }
         disturb(&mut qp, seed, 10_f64.powi(-(seed as i32 % 4)))?;
         let Ok((_, cold, _)) = solve_to(TOLERANCE, &qp) else { continue };
-        let warm = solve(&mut solver, interior_point, &qp, QpStart::Warm, &mut solution);
-        counted(&mut counts, seed, &warm);
+        let warm = solve(&mut solver, interior_point_options, &qp, QpStart::Warm, &mut solution);
+        solve_and_count(&mut counts, seed, &warm);
         if let Ok(warm) = warm {
             let (_, objective) = residuals(qp.view(), &solution);
-            assert!(same_minimum(objective, cold.objective, &solution), "{seed}: {warm:?} {cold:?}");
+            assert!(assert_same_minimum(objective, cold.objective, &solution), "{seed}: {warm:?} {cold:?}");
         }
     }
-    judged(&counts, 0);
+    assert_verdicts(&counts, 0);
     Ok(())
 }
 
@@ -248,7 +248,7 @@ fn disturb(qp: &mut HeapQp<f64>, seed: u64, scale: f64) -> Test {
 
 /// Most problems nearby are solved by active sets alone.
 #[test]
-fn few_active_sets_lie_between_neighbours() -> Test {
+fn active_sets_of_neighbouring_problems() -> Test {
     let (mut all, mut alone) = (0, 0);
     for seed in 0..200 {
         let dims: Vec<_> = (0..6).map(|k| StageDims::new(4, if k < 5 { 2 } else { 0 }, 1)).collect();
@@ -292,7 +292,7 @@ fn second_order_cone() -> Test {
 
 /// Clarabel's certificate names a constraint, and how large a violation must be at least.
 #[test]
-fn clarabel_finds_what_is_infeasible() -> Test {
+fn infeasibility_certificates_of_clarabel() -> Test {
     let mut qp = HeapQp::<f64>::new(&[StageDims::new(1, 0, 1)])?;
     let mut stage = qp.stage_mut(0).ok_or("no stage")?;
     stage.q_mut().set(0, 0, 1.0);

@@ -2,7 +2,7 @@
 //! ten. What is found is taken back into the units of the problem that was drawn, and judged there
 //! by `residuals`.
 
-use crate::known::{Hessian, Kind, Numbers, PLAIN, problem};
+use crate::known_solutions::{HessianKind, Numbers, PLAIN, ProblemKind, problem};
 use crate::runs::{Counts, kind, seeds, shows};
 use crate::{Test, coupling};
 use casados::qp::{
@@ -13,13 +13,13 @@ use casados::qp::{
 const TOLERANCE: f64 = 1e-8;
 
 /// Units of variables and general constraints of all stages, and of the objective.
-struct Units {
+struct RandomUnits {
     variables: Vec<Vec<f64>>,
     rows: Vec<Vec<f64>>,
     objective: f64,
 }
 
-impl Units {
+impl RandomUnits {
     /// Powers of ten up to an exponent. Variables that may be one at several stages have one unit.
     fn new(random: &mut Numbers, dims: &[StageDims], joint: bool, exponent: f64) -> Self {
         let most = dims.iter().map(|d| d.nx.max(d.nu)).max().unwrap_or(0);
@@ -39,7 +39,7 @@ impl Units {
 
     /// The same problem with variables `unit · v`, rows times their units, and the objective times
     /// its own.
-    fn of(&self, from: &HeapQp<f64>) -> Result<HeapQp<f64>, QpError> {
+    fn in_units(&self, from: &HeapQp<f64>) -> Result<HeapQp<f64>, QpError> {
         let mut qp = HeapQp::new(from.dims())?;
         let f = self.objective;
         for (k, (from, mut to)) in from.view().stages().zip(qp.stages_mut()).enumerate() {
@@ -79,7 +79,7 @@ impl Units {
     }
 
     /// A solution in the units of the problem that was drawn.
-    fn back(&self, found: &HeapSolution<f64>) -> Result<HeapSolution<f64>, QpError> {
+    fn in_original_units(&self, found: &HeapSolution<f64>) -> Result<HeapSolution<f64>, QpError> {
         let mut solution = HeapSolution::new(found.dims())?;
         let f = self.objective;
         let stages: Vec<SolutionStage<'_, f64>> = found.stages().collect();
@@ -115,14 +115,14 @@ impl Units {
 /// What became of a problem in other units.
 fn solve(
     qp: &HeapQp<f64>,
-    units: &Units,
+    units: &RandomUnits,
     mark: &dyn Fn(&mut HeapQp<f64>),
     solution: &mut HeapSolution<f64>,
 ) -> Result<(usize, Option<String>), QpError> {
-    let mut scaled = units.of(qp)?;
+    let mut scaled = units.in_units(qp)?;
     mark(&mut scaled);
     let statistics = HeapInteriorPoint::new().solve(scaled.view(), QpStart::Cold, solution.view_mut())?;
-    let (found, objective) = residuals(qp.view(), &units.back(solution)?);
+    let (found, objective) = residuals(qp.view(), &units.in_original_units(solution)?);
     // The tolerance is in units, and sizes of what was drawn are up to a hundred. Each of some tens
     // of sides may cost the tolerance.
     let mut wrong =
@@ -170,7 +170,7 @@ fn rows_with_small_and_large_coefficients() -> Test {
 /// many take iterations that differ by more than three from those of the problem as it was drawn,
 /// where all units are one. In two units that are both found they do not differ by more than three
 /// where none is unsolved and none is soft.
-fn in_all_units(
+fn check_in_all_units(
     name: &str,
     (few, others, few_unsolved): (u64, u64, u64),
     draw: impl Fn(&mut Numbers, u64) -> Result<HeapQp<f64>, QpError>,
@@ -189,7 +189,7 @@ fn in_all_units(
             // In units a tenth of the tolerance is asked for.
             solver.options.tolerance = 0.1 * TOLERANCE;
             let own = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?.iterations;
-            let units = Units::new(&mut random, qp.dims(), couple.is_some(), exponent);
+            let units = RandomUnits::new(&mut random, qp.dims(), couple.is_some(), exponent);
             let mark = |qp: &mut HeapQp<f64>| {
                 if let Some(couple) = couple {
                     couple(seed, qp);
@@ -198,7 +198,7 @@ fn in_all_units(
             let found = solve(&qp, &units, &mark, &mut solution);
             if let Ok((iterations, _)) = found {
                 *differences.entry(iterations as i64 - own as i64).or_default() += 1;
-                let others = Units::new(&mut random, qp.dims(), couple.is_some(), 5.0);
+                let others = RandomUnits::new(&mut random, qp.dims(), couple.is_some(), 5.0);
                 if exponent > 5.0
                     && let Ok((again, _)) = solve(&qp, &others, &mark, &mut solution)
                 {
@@ -241,18 +241,18 @@ fn in_all_units(
 
 #[test]
 fn strictly_convex() -> Test {
-    in_all_units("strictly convex", (2000, 1, 0), |random, _| Ok(problem(random, &PLAIN)?.qp), None)
+    check_in_all_units("strictly convex", (2000, 1, 0), |random, _| Ok(problem(random, &PLAIN)?.qp), None)
 }
 
 #[test]
 fn soft() -> Test {
-    let kind = Kind { soft: Some(f64::INFINITY), hessian: Hessian::Definite, ..PLAIN };
-    in_all_units("soft", (700, 15, 5), move |random, _| Ok(problem(random, &kind)?.qp), None)
+    let kind = ProblemKind { soft: Some(f64::INFINITY), hessian: HessianKind::Definite, ..PLAIN };
+    check_in_all_units("soft", (700, 15, 5), move |random, _| Ok(problem(random, &kind)?.qp), None)
 }
 
 #[test]
 fn coupled() -> Test {
-    in_all_units(
+    check_in_all_units(
         "coupled",
         (300, 1, 0),
         |_, seed| coupling::problem(seed, 3 + seed as usize % 11),

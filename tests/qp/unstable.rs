@@ -12,7 +12,7 @@ const STAGES: usize = 40;
 const GROWTH: f64 = 3.0;
 
 /// `x₊ = 3 x + u` from `x₀ = 1` with costs `½ (x² + u²)`.
-fn scalar<T: casados::Real>() -> Result<HeapQp<T>, QpError> {
+fn scalar_problem<T: casados::Real>() -> Result<HeapQp<T>, QpError> {
     let mut dims = vec![StageDims::new(1, 1, 0); STAGES + 1];
     dims[STAGES].nu = 0;
     let mut qp = HeapQp::new(&dims)?;
@@ -28,7 +28,7 @@ fn scalar<T: casados::Real>() -> Result<HeapQp<T>, QpError> {
 
 /// States, controls and multipliers by the scalar recursion `p = 1 + a² p₊ / (1 + p₊)`, whose terms
 /// are all positive: `u = −a p₊ / (1 + p₊) x`, `x₊ = a x / (1 + p₊)`, `π = p₊ x₊`.
-fn reference() -> Vec<[f64; 3]> {
+fn scalar_recursion() -> Vec<[f64; 3]> {
     let mut costs = vec![1.0];
     for k in 0..STAGES {
         costs.push(1.0 + GROWTH * GROWTH * costs[k] / (1.0 + costs[k]));
@@ -44,10 +44,10 @@ fn reference() -> Vec<[f64; 3]> {
 
 /// To rounding, in one step, since there is nothing but equations.
 #[test]
-fn the_scalar_recursion() -> Test {
-    let (solution, statistics, _) = solve(&scalar::<f64>()?)?;
+fn agreement_with_the_scalar_recursion() -> Test {
+    let (solution, statistics, _) = solve(&scalar_problem::<f64>()?)?;
     assert_eq!(statistics.iterations, 1);
-    for (stage, expected) in solution.stages().zip(reference()) {
+    for (stage, expected) in solution.stages().zip(scalar_recursion()) {
         for (found, expected) in [stage.x[0], stage.u[0], stage.dynamics[0]].into_iter().zip(expected) {
             // Some hundred operations.
             assert!((found - expected).abs() <= 100.0 * f64::EPSILON, "{found} {expected}");
@@ -59,10 +59,10 @@ fn the_scalar_recursion() -> Test {
 /// In single precision, too: 3¹⁵ are all digits that it has.
 #[test]
 fn single_precision() -> Test {
-    let qp = scalar::<f32>()?;
+    let qp = scalar_problem::<f32>()?;
     let mut solution = HeapSolution::new(qp.dims())?;
     HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut())?;
-    for (stage, expected) in solution.stages().zip(reference()) {
+    for (stage, expected) in solution.stages().zip(scalar_recursion()) {
         for (found, expected) in [stage.x[0], stage.u[0], stage.dynamics[0]].into_iter().zip(expected) {
             let distance = (f64::from(found) - expected).abs();
             assert!(distance <= 100.0 * f64::from(f32::EPSILON), "{found} {expected}");
@@ -74,9 +74,9 @@ fn single_precision() -> Test {
 /// The controls have just enough room, and use it up at first: there is no feedback there. In
 /// between the state is bounded, and its end is given.
 #[test]
-fn with_bounds() -> Test {
+fn unstable_dynamics_with_bounds() -> Test {
     for room in [2.5, 2.1, 2.01, 2.0001] {
-        let mut qp = scalar::<f64>()?;
+        let mut qp = scalar_problem::<f64>()?;
         for mut stage in qp.stages_mut().take(STAGES) {
             stage.u_bounds_mut().set(0, -room, room);
         }
@@ -101,7 +101,7 @@ fn with_bounds() -> Test {
 /// The exponential function of `h A` by its series up to the fourth power, as a step of the
 /// classical Runge-Kutta method has it.
 #[test]
-fn rider() -> Test {
+fn rider_in_the_alps() -> Test {
     let a = [[-10.0, 0.0, 0.0, 0.0], [0.0, -2.0, 0.0, 0.0], [0.0, 0.0, -3.0, 5.0], [0.0, 0.0, 5.0, -3.0]];
     let b = [[1.0, 1.0], [1.0, -2.0], [1.0, -1.0], [1.0, 3.0]];
     let (stages, h) = (200, 0.1);

@@ -21,7 +21,7 @@ const END: [f64; 10] = [
 /// Errors follow the tolerance: the velocities of the reference are of size one, and what is off at
 /// the constraints grows linearly with time.
 #[test]
-fn the_end_is_that_of_the_reference() {
+fn reference_end_values() {
     for tolerance in [1e-6, 1e-8, 1e-10] {
         let options = AdaptiveOptions { rtol: tolerance, atol: tolerance, ..Default::default() };
         let mut radau = Adaptive::<CarAxis, Radau>::new(options).unwrap();

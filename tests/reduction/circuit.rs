@@ -17,7 +17,7 @@ fn exact(t: f64, v2: f64, [c1, c2, r]: [f64; 3]) -> (f64, f64) {
 }
 
 #[test]
-fn voltages_and_the_current_are_exact() {
+fn exact_voltages_and_current() {
     let p = [0.7, 1.9, 0.4];
     let mut irk =
         Irk::<LoopOfCapacitors, RadauIIA<5>>::new(Options { steps: 8, ..Default::default() }).unwrap();

@@ -18,7 +18,7 @@ fn invariants(x: &Vector4<f64>) -> ([f64; 2], DMatrix<f64>) {
 }
 
 #[test]
-fn the_nearest_states_satisfy_the_constraints() {
+fn nearest_consistent_states() {
     for (guess, held) in [
         (vector![0.4, -0.7, 0.3, 0.2], &[][..]),
         (vector![0.4, -0.7, 0.3, 0.2], &["x[0]"][..]),
@@ -44,7 +44,7 @@ fn the_nearest_states_satisfy_the_constraints() {
 }
 
 #[test]
-fn single_precision_satisfies_them_to_its_rounding() {
+fn consistent_states_in_single_precision() {
     let guess = vector![0.4f32, -0.7, 0.3, 0.2];
     let x = Consistent::<Pendulum>::new().solve(&guess, &vector![9.81, LENGTH as f32], 0.0).unwrap();
     let (values, _) = invariants(&x.map(f64::from));
@@ -53,7 +53,7 @@ fn single_precision_satisfies_them_to_its_rounding() {
 
 /// `y_b(0) = 0`, by which others divide.
 #[test]
-fn the_car_axis_starts_where_its_data_say() {
+fn initial_states_of_the_car_axis() {
     let start = vector![0.0, 0.5, 1.0, 0.5, -0.5, 0.0, -0.5, 0.0];
     let mut v = ArrayV::<<CarAxis as Constrained>::Invariants, f64>::zeroed();
     v[8..16].copy_from_slice(start.as_slice());
@@ -69,7 +69,7 @@ fn the_car_axis_starts_where_its_data_say() {
 }
 
 #[test]
-fn what_cannot_be_satisfied_is_named() {
+fn inconsistent_constraints() {
     let solve = |consistent: Consistent<Pendulum>, x: Vector4<f64>, length: f64| {
         consistent.solve(&x, &vector![9.81, length], 0.0)
     };
@@ -109,7 +109,7 @@ fn rail(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
 }
 
 #[test]
-fn states_beyond_the_range_are_an_error() {
+fn overflow_of_states() {
     let solve = |p: f64| Consistent::<Rail>::new().solve(&vector![1.0, 1.0], &vector![p], 0.0);
     assert!((solve(2.0).unwrap() - vector![2e10, 0.0]).amax() < 1e-5);
     let error = solve(1e300).unwrap_err();

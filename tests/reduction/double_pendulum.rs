@@ -48,7 +48,7 @@ fn cartesian([a, b, va, vb]: [f64; 4]) -> [f64; 8] {
 
 /// Both are of order eight; their difference is their error, and halves 256 times.
 #[test]
-fn both_forms_move_alike() {
+fn angles_and_cartesian_coordinates() {
     let start = [1.2, -0.7, 0.4, 2.0];
     let apart = |steps: usize| {
         let options = Options { steps, ..Default::default() };
@@ -65,7 +65,7 @@ fn both_forms_move_alike() {
 
 /// What the constraints and their first derivatives are off by.
 #[test]
-fn drift_is_that_of_the_method() {
+fn drift_of_the_method() {
     type Invariants = <RodsInARow as Constrained>::Invariants;
     let mut v = [0.0; 19];
     let options = Options { steps: 2000, ..Default::default() };

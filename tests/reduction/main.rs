@@ -3,13 +3,13 @@
 mod car_axis;
 mod circuit;
 mod consistent;
-mod divided;
+mod divided_intervals;
 mod double_pendulum;
-mod everywhere;
 mod mechanisms;
 mod ocp;
 mod pendulum;
 mod projected;
+mod reduced_models;
 mod singular;
 mod slider_crank;
 mod squeezer;

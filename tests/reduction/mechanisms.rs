@@ -80,8 +80,8 @@ pub fn loop_of_capacitors(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], p: [f64; 3],
 }
 
 #[test]
-fn what_is_differentiated_is_told() {
-    fn told<M: Constrained>(differentiated: &[(u32, u32)]) {
+fn descriptions_of_reductions() {
+    fn description<M: Constrained>(differentiated: &[(u32, u32)]) {
         let reduction = M::STRUCTURE.reduction.expect("the index was reduced");
         assert_eq!(reduction.differentiated, differentiated);
         assert_eq!(
@@ -89,10 +89,10 @@ fn what_is_differentiated_is_told() {
             <<M::Invariants as Function>::Outputs as casados::__private::Outputs>::NY
         );
     }
-    told::<Pendulum>(&[(4, 2)]);
-    told::<Damped>(&[(4, 2)]);
-    told::<CarAxis>(&[(8, 2), (9, 2)]);
-    told::<LoopOfCapacitors>(&[(2, 1)]);
+    description::<Pendulum>(&[(4, 2)]);
+    description::<Damped>(&[(4, 2)]);
+    description::<CarAxis>(&[(8, 2), (9, 2)]);
+    description::<LoopOfCapacitors>(&[(2, 1)]);
     assert_eq!(Damped::STRUCTURE.reduction.map(|reduction| reduction.rates), Some(&[3.0, 2.0][..]));
     assert!(ByHand::STRUCTURE.reduction.is_none());
     let text = Damped::describe().to_string();

@@ -63,7 +63,7 @@ const DISTANCE: f64 = 3.0;
 /// From rest to rest with the least effort: both forms have the same optimum, but for the error of
 /// their steps.
 #[test]
-fn a_crane_by_its_rope_moves_as_by_its_angle() {
+fn crane_in_both_coordinates() {
     let horizon = || Horizon::uniform(N, DURATION / N as f64);
     let mut ocp = Problem::new(by_rope()).running_cost(GeneralCost::<Effort>::new()).on(horizon()).unwrap();
     ocp.fix_initial_state(&[0.0, 0.0, 0.0, -ROPE, 0.0, 0.0]).unwrap();
@@ -107,13 +107,13 @@ fn without_rope() -> Shooting<Irk<ByAngle, Gauss<4>>> {
 }
 
 /// Projected after every step.
-fn projected() -> Divided<Projected<Irk<ProjectedCrane, Gauss<4>>>, 4> {
+fn projected_dynamics() -> Divided<Projected<Irk<ProjectedCrane, Gauss<4>>>, 4> {
     Divided::new(Projected::new(Irk::<ProjectedCrane, Gauss<4>>::new(Options::default()).unwrap()))
 }
 
 /// From rest at the left, where the load may hang at an angle, to rest at the right with the least
 /// effort: that angle is found. The constraint and its derivative are imposed where it starts.
-fn from_an_angle<D, F>(dynamics: D) -> f64
+fn crane_from_an_angle<D, F>(dynamics: D) -> f64
 where
     D: SecondOrder<f64, Shape = <Crane as Dae>::Shape>,
     F: Function<Shape = D::Shape>,
@@ -144,7 +144,7 @@ where
 }
 
 #[test]
-fn invariants_are_imposed_where_the_crane_starts() {
+fn invariants_at_the_initial_state() {
     let mut ocp = Problem::new(without_rope())
         .running_cost(GeneralCost::<EffortByAngle>::new())
         .on(Horizon::uniform(N, DURATION / N as f64))
@@ -157,9 +157,9 @@ fn invariants_are_imposed_where_the_crane_starts() {
         }
     }
     let objective = optimum!(ocp);
-    let found = from_an_angle::<_, <Crane as Constrained>::Invariants>(by_rope());
+    let found = crane_from_an_angle::<_, <Crane as Constrained>::Invariants>(by_rope());
     assert!((found - objective).abs() < 1e-7, "{found} {objective}");
-    let found = from_an_angle::<_, <ProjectedCrane as Constrained>::Invariants>(projected());
+    let found = crane_from_an_angle::<_, <ProjectedCrane as Constrained>::Invariants>(projected_dynamics());
     assert!((found - objective).abs() < 1e-7, "{found} {objective}");
 }
 
@@ -177,7 +177,7 @@ fn following_by_angle(x: [f64; 4], u: f64, t: f64) -> f64 {
 }
 
 /// Periodic in all states: what the constraint is off by would decay in a period, and so is zero.
-fn orbit<D: SecondOrder<f64, Shape = <Crane as Dae>::Shape>>(dynamics: D, interior: bool) -> f64 {
+fn periodic_orbit<D: SecondOrder<f64, Shape = <Crane as Dae>::Shape>>(dynamics: D, interior: bool) -> f64 {
     let mut ocp = Problem::new(dynamics)
         .running_cost(GeneralCost::<Following>::new())
         .on(Horizon::uniform(N, DURATION / N as f64))
@@ -202,7 +202,7 @@ fn orbit<D: SecondOrder<f64, Shape = <Crane as Dae>::Shape>>(dynamics: D, interi
 }
 
 #[test]
-fn periodic_orbits_need_no_invariants() {
+fn invariants_of_periodic_orbits() {
     let mut ocp = Problem::new(without_rope())
         .running_cost(GeneralCost::<FollowingByAngle>::new())
         .on(Horizon::uniform(N, DURATION / N as f64))
@@ -211,14 +211,18 @@ fn periodic_orbits_need_no_invariants() {
     ocp.periodic("x").unwrap();
     let objective = optimum!(ocp);
     let collocation = Collocation::new(Irk::<Crane, Gauss<4>>::new(options()).unwrap()).unwrap();
-    for found in [orbit(by_rope(), false), orbit(projected(), false), orbit(collocation, true)] {
+    for found in [
+        periodic_orbit(by_rope(), false),
+        periodic_orbit(projected_dynamics(), false),
+        periodic_orbit(collocation, true),
+    ] {
         assert!((found - objective).abs() < 1e-7, "{found} {objective}");
     }
 }
 
 /// The length of the rope holds to rounding under controls that jump.
 #[test]
-fn a_projected_rope_keeps_its_length() {
+fn length_of_a_projected_rope() {
     let irk = Irk::<ProjectedCrane, RadauIIA<2>>::new(Options::default()).unwrap();
     let mut projected = Projected::new(irk);
     let mut x = vector![0.0, 0.0, 0.0, -ROPE, 0.0, 0.0];

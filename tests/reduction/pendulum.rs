@@ -13,7 +13,7 @@ const GRAVITY: f64 = 9.81;
 const LENGTH: f64 = 0.7;
 
 /// The mean of arithmetic and geometric means.
-fn agm(mut a: f64, mut b: f64) -> f64 {
+fn arithmetic_geometric_mean(mut a: f64, mut b: f64) -> f64 {
     for _ in 0..8 {
         (a, b) = ((a + b) / 2.0, (a * b).sqrt());
     }
@@ -26,7 +26,7 @@ fn options() -> AdaptiveOptions {
 }
 
 /// Where the pendulum is after a time, and how far errors on the way grow at least.
-fn after(x0: Vector4<f64>, time: f64) -> (Vector4<f64>, f64) {
+fn state_after(x0: Vector4<f64>, time: f64) -> (Vector4<f64>, f64) {
     let options = Options { steps: 400, ..Default::default() };
     let mut irk = Irk::<Pendulum, Gauss<5>>::new(options).unwrap();
     irk.set_parameters(&vector![GRAVITY, LENGTH]).unwrap();
@@ -34,38 +34,40 @@ fn after(x0: Vector4<f64>, time: f64) -> (Vector4<f64>, f64) {
     (end.x, end.dx_dx0.abs().column_sum().amax())
 }
 
-/// `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / agm(1, cos(θ/2))`, from horizontal and from the bottom,
+/// `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / arithmetic_geometric_mean(1, cos(θ/2))`, from horizontal and from the bottom,
 /// where one coordinate of the constraint's derivative vanishes.
 #[test]
-fn swings_have_the_period_of_the_elliptic_integral() {
+fn period_of_swings() {
     for angle in [PI / 2.0, 0.3, 2.5] {
-        let period = 2.0 * PI * (LENGTH / GRAVITY).sqrt() / agm(1.0, (angle / 2.0).cos());
+        let period =
+            2.0 * PI * (LENGTH / GRAVITY).sqrt() / arithmetic_geometric_mean(1.0, (angle / 2.0).cos());
         let speed = (2.0 * GRAVITY * LENGTH * (1.0 - angle.cos())).sqrt();
         for x0 in [
             vector![LENGTH * angle.sin(), -LENGTH * angle.cos(), 0.0, 0.0],
             vector![0.0, -LENGTH, speed, 0.0],
         ] {
-            let (end, growth) = after(x0, period);
+            let (end, growth) = state_after(x0, period);
             // Rounding of 400 steps.
             assert!((end - x0).amax() < 1e-13 * growth, "{angle}: {end}");
         }
     }
 }
 
-/// From the top with the angular speed `ω` a turn takes `2π / agm(ω, √(ω² + 4g/l))`.
+/// From the top with the angular speed `ω` a turn takes `2π / arithmetic_geometric_mean(ω, √(ω² + 4g/l))`.
 #[test]
-fn turns_from_upright_have_their_period() {
+fn period_of_turns() {
     for omega in [0.5f64, 4.0] {
-        let turn = 2.0 * PI / agm(omega, (omega * omega + 4.0 * GRAVITY / LENGTH).sqrt());
+        let turn =
+            2.0 * PI / arithmetic_geometric_mean(omega, (omega * omega + 4.0 * GRAVITY / LENGTH).sqrt());
         let x0 = vector![0.0, LENGTH, omega * LENGTH, 0.0];
-        let (end, growth) = after(x0, turn);
+        let (end, growth) = state_after(x0, turn);
         // Rounding of 400 steps.
         assert!((end - x0).amax() < 1e-13 * growth, "{omega}: {end}");
     }
 }
 
 #[test]
-fn reduced_equations_are_those_by_hand() {
+fn reduction_by_hand() {
     let mut v = ArrayV::<Damped, f64>::zeroed();
     let (mut reduced, mut by_hand) = (ArrayK::<Damped, f64>::zeroed(), ArrayK::<ByHand, f64>::zeroed());
     for point in 0..100 {
@@ -81,7 +83,7 @@ fn reduced_equations_are_those_by_hand() {
 }
 
 #[test]
-fn derivatives_are_those_of_the_form_by_hand() {
+fn derivatives_of_the_reduction_by_hand() {
     fn hessian<M: Dae<Shape = <Damped as Dae>::Shape>>() -> Hessian<M> {
         let options = Options { steps: 3, ..Default::default() };
         let mut irk = Irk::<M, Gauss<3>>::new(options).unwrap();
@@ -98,7 +100,7 @@ fn derivatives_are_those_of_the_form_by_hand() {
 
 /// `(d/dt + 3)(d/dt + 2) g = 0` from errors at the start, whatever the motion is.
 #[test]
-fn errors_decay_with_their_rates() {
+fn decay_of_constraint_errors() {
     let x0 = vector![0.5, -0.6, 0.4, 0.2];
     let error = |x: &Vector4<f64>| x[0] * x[0] + x[1] * x[1] - LENGTH * LENGTH;
     let rate = |x: &Vector4<f64>| 2.0 * (x[0] * x[2] + x[1] * x[3]);

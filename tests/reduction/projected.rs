@@ -33,13 +33,13 @@ fn bead(xdot: [f64; 4], x: [f64; 4], u: f64, z: f64, p: f64, t: f64) -> [f64; 5]
 }
 
 /// What the constraint of the circle and its derivative are off by.
-fn off(x: &Vector4<f64>, length: f64) -> [f64; 2] {
+fn constraint_residuals(x: &Vector4<f64>, length: f64) -> [f64; 2] {
     [x[0] * x[0] + x[1] * x[1] - length * length, x[0] * x[2] + x[1] * x[3]]
 }
 
 /// A hundred thousand steps of order three, with errors of 1e-5 each that the projection takes.
 #[test]
-fn invariants_are_at_rounding_after_many_steps() {
+fn invariants_after_many_steps() {
     let length = 0.7;
     let mut irk = Projected::new(Irk::<Circle, RadauIIA<2>>::new(Options::default()).unwrap());
     irk.set_parameters(&vector![length]).unwrap();
@@ -47,7 +47,10 @@ fn invariants_are_at_rounding_after_many_steps() {
     for step in 0..100_000 {
         x = irk.solve(&x, &vector![], 0.02).unwrap().x;
         // Squares of lengths and products with velocities of up to four.
-        assert!(off(&x, length).iter().all(|off| off.abs() < 16.0 * f64::EPSILON), "{step}: {x}");
+        assert!(
+            constraint_residuals(&x, length).iter().all(|off| off.abs() < 16.0 * f64::EPSILON),
+            "{step}: {x}"
+        );
     }
     let mut plain = Irk::<Circle, RadauIIA<2>>::new(Options::default()).unwrap();
     plain.set_parameters(&vector![length]).unwrap();
@@ -55,21 +58,24 @@ fn invariants_are_at_rounding_after_many_steps() {
     for _ in 0..1000 {
         x = plain.solve(&x, &vector![], 0.02).unwrap().x;
     }
-    assert!(off(&x, length).iter().any(|off| off.abs() > 1e-4), "without it they drift: {x}");
+    assert!(
+        constraint_residuals(&x, length).iter().any(|off| off.abs() > 1e-4),
+        "without it they drift: {x}"
+    );
 }
 
 /// A hundred thousand of the same steps with rates: what a step does is forgotten within seconds.
 /// So the last thousand of them are off by as much as the first, and less with faster rates.
 #[test]
-fn errors_stay_with_rates() {
-    fn worst<M: Dae<Shape = <Circle as Dae>::Shape>>() -> [f64; 2] {
+fn constraint_errors_with_rates() {
+    fn largest_constraint_error<M: Dae<Shape = <Circle as Dae>::Shape>>() -> [f64; 2] {
         let mut irk = Irk::<M, RadauIIA<2>>::new(Options::default()).unwrap();
         irk.set_parameters(&vector![0.7]).unwrap();
         let mut x = vector![0.7, 0.0, 0.0, 0.0];
         let [mut first, mut last] = [0.0f64; 2];
         for step in 0..100_000 {
             x = irk.solve(&x, &vector![], 0.02).unwrap().x;
-            let off = off(&x, 0.7)[0].abs();
+            let off = constraint_residuals(&x, 0.7)[0].abs();
             if step < 1000 {
                 first = first.max(off);
             } else if step >= 99_000 {
@@ -78,7 +84,7 @@ fn errors_stay_with_rates() {
         }
         [first, last]
     }
-    let (slow, fast) = (worst::<Slow>(), worst::<Fast>());
+    let (slow, fast) = (largest_constraint_error::<Slow>(), largest_constraint_error::<Fast>());
     // The swings get smaller by the damping of the method, and with them its errors.
     assert!(slow[1] < slow[0] && slow[1] > 0.5 * slow[0], "{slow:?}");
     assert!(fast[1] < fast[0] && fast[0] < 0.5 * slow[0], "{fast:?} {slow:?}");
@@ -108,7 +114,7 @@ fn fast(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
 
 /// The projected state is the nearest: what it was moved by is in the row space of `G`.
 #[test]
-fn the_projection_is_orthogonal() {
+fn orthogonality_of_the_projection() {
     let (x0, length) = (vector![0.42, -0.56, 1.2, 0.9], 0.7);
     let mut plain = Irk::<Circle, RadauIIA<1>>::new(Options::default()).unwrap();
     plain.set_parameters(&vector![length]).unwrap();
@@ -117,7 +123,7 @@ fn the_projection_is_orthogonal() {
     projected.set_parameters(&vector![length]).unwrap();
     let x = projected.solve(&x0, &vector![], 0.1).unwrap().x;
     let moved = x - given;
-    assert!(moved.norm() > 1e-3 && off(&x, length).iter().all(|off| off.abs() < 1e-15));
+    assert!(moved.norm() > 1e-3 && constraint_residuals(&x, length).iter().all(|off| off.abs() < 1e-15));
     let (first, second) = (vector![x[0], x[1], 0.0, 0.0], vector![x[2], x[3], x[0], x[1]]);
     // Tangents of the constraints: orthogonal to both rows.
     for tangent in [vector![-x[1], x[0], 0.0, 0.0], vector![0.0, 0.0, -x[1], x[0]]] {
@@ -134,7 +140,7 @@ fn the_projection_is_orthogonal() {
 /// Differences of high order of states and gradients; steps are coarse, so that the projection
 /// moves by percents.
 #[test]
-fn derivatives_are_those_of_the_projected_map() {
+fn derivatives_of_the_projection() {
     let mut coarse = Projected::new(Irk::<Bead, RadauIIA<1>>::new(Options::default()).unwrap());
     coarse.set_time(0.3).unwrap();
     let x0 = vector![0.4, (1.3f64 * 0.4).sin() + 0.1 * 0.3f64.sin(), 0.8, 0.7];
@@ -148,7 +154,7 @@ fn derivatives_are_those_of_the_projected_map() {
 }
 
 #[test]
-fn what_cannot_be_projected_is_an_error() {
+fn failed_projections() {
     let mut irk = Projected::new(Irk::<Circle, RadauIIA<1>>::new(Options::default()).unwrap());
     irk.set_parameters(&vector![0.0]).unwrap();
     // A circle of radius zero has no derivative at its centre.
@@ -185,7 +191,7 @@ fn corner(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
 }
 
 #[test]
-fn derivatives_by_parameters_are_finite_or_an_error() {
+fn parameter_derivatives_of_the_projection() {
     let (x0, lambda) = (vector![1.0, 0.0, 0.0, 0.0], vector![1.0, 2.0, 3.0, 4.0]);
     let mut edge = Projected::new(Irk::<Edge, RadauIIA<2>>::new(Options::default()).unwrap());
     edge.set_parameters(&vector![0.0]).unwrap();
@@ -206,7 +212,7 @@ fn derivatives_by_parameters_are_finite_or_an_error() {
 }
 
 #[test]
-fn parameters_and_time_are_those_of_the_projection() {
+fn parameters_and_time_of_the_projection() {
     let x0 = vector![0.4, (1.3f64 * 0.4).sin() + 0.1 * 0.3f64.sin(), 0.8, 0.7];
     let mut irk = Irk::<Bead, RadauIIA<1>>::new(Options::default()).unwrap();
     irk.set_parameters(&vector![1.3]).unwrap();

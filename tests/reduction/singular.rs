@@ -51,7 +51,7 @@ fn level(x: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn a_linkage_swings_as_the_pendulum_that_it_is() {
+fn swing_of_a_parallelogram() {
     let (angle, rate) = (-2.0, 1.3);
     let options = Options { steps: 200, ..Default::default() };
     let mut irk = Irk::<Parallelogram, Gauss<4>>::new(options).unwrap();
@@ -65,7 +65,7 @@ fn a_linkage_swings_as_the_pendulum_that_it_is() {
 }
 
 #[test]
-fn the_linkage_on_the_line_of_its_pivots_is_refused() {
+fn singular_configuration_of_a_linkage() {
     let flat = vector![0.0, 0.0, 0.0, 1.0, 0.0, 1.0];
     let mut irk = Irk::<Parallelogram, Gauss<2>>::new(Options::default()).unwrap();
     // Its stages are beside it; where they would have to start is in the line.
@@ -84,7 +84,7 @@ fn the_linkage_on_the_line_of_its_pivots_is_refused() {
 /// One of two capacitors may be missing: the matrix stays regular, and the index is what it was.
 /// Without both there is nothing that the derivatives of the voltages follow from.
 #[test]
-fn an_index_that_depends_on_parameters() {
+fn parameter_dependent_index() {
     let mut irk =
         Irk::<LoopOfCapacitors, RadauIIA<5>>::new(Options { steps: 8, ..Default::default() }).unwrap();
     let (c, r) = (1.9, 0.4);
@@ -170,7 +170,7 @@ fn ring_without_a_current(xdot: [f64; 10], x: [f64; 10], z: [f64; 4], t: f64) ->
 }
 
 #[test]
-fn a_circuit_whose_hidden_constraint_is_written_out() {
+fn circuit_with_explicit_hidden_constraint() {
     assert_eq!(Ring::STRUCTURE.reduction.map(|reduction| reduction.differentiated), Some(&[(14, 1)][..]));
     let options = Options { steps: 2000, ..Default::default() };
     let mut ring = Irk::<Ring, RadauIIA<3>>::new(options).unwrap();

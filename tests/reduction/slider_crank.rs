@@ -122,7 +122,7 @@ mod slider_crank {
 }
 
 /// Near the smooth motion: the modes of the rod as the test set has them.
-const RATHER: [f64; 14] = [
+const SMOOTH_START: [f64; 14] = [
     0.0,
     0.0,
     0.450016933,
@@ -160,16 +160,16 @@ const END: [f64; 14] = [
 const FORCES: [f64; 3] = [-62.32935927945395, -163.79209934712657, 25.29857948799753];
 
 #[test]
-fn the_rod_moves_as_by_its_modes_alone() {
+fn modal_coordinates_of_the_rod() {
     // The data of the test set satisfy the constraints to nine digits; what follows from the rod
     // and the crank is found.
     let mut consistent = Consistent::<SliderCrank>::new();
     for held in ["x[0]", "x[3]", "x[4]", "x[5]", "x[6]", "x[7]", "x[10]", "x[11]", "x[12]", "x[13]"] {
         consistent = consistent.hold(held).unwrap();
     }
-    let start = consistent.solve(&SVector::from(RATHER), &Default::default(), 0.0).unwrap();
-    assert!((start - SVector::from(RATHER)).amax() < 1e-7, "{start}");
-    assert_eq!(start[6], RATHER[6]);
+    let start = consistent.solve(&SVector::from(SMOOTH_START), &Default::default(), 0.0).unwrap();
+    assert!((start - SVector::from(SMOOTH_START)).amax() < 1e-7, "{start}");
+    assert_eq!(start[6], SMOOTH_START[6]);
 
     // The slowest oscillation of the rod along itself is 7000 rad/s: thirty steps a period.
     let mut irk = Irk::<SliderCrank, Gauss<4>>::new(Options { steps: 3000, ..Default::default() }).unwrap();
@@ -190,7 +190,7 @@ fn the_rod_moves_as_by_its_modes_alone() {
 }
 
 #[test]
-fn three_constraints_are_differentiated_twice() {
+fn differentiated_constraints() {
     let reduction = SliderCrank::STRUCTURE.reduction.unwrap();
     assert_eq!(reduction.differentiated, [(14, 2), (15, 2), (16, 2)]);
     assert_eq!(reduction.singular[0], 0);

@@ -122,7 +122,7 @@ pub fn squeezer(xdot: [f64; 14], x: [f64; 14], z: [f64; 6]) -> [f64; 20] {
 
 /// The reference is of quadruple precision; the angles at the start are given to sixteen digits.
 #[test]
-fn angles_and_rates_are_those_of_the_test_set() {
+fn reference_angles_and_rates() {
     let record = Record::load("ivp/ends.json").unwrap().record("squeezer").unwrap();
     let x0: SVector<f64, 14> = record.vector("x0").unwrap();
     let expected = record.records("ends").unwrap()[0].list("y").unwrap();

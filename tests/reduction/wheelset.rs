@@ -247,7 +247,7 @@ const END: [f64; 15] = [
 const FORCES: [f64; 2] = [-0.10124044903201e-1, -0.56285630573753e-2];
 
 #[test]
-fn contacts_are_differentiated_with_the_constraints() {
+fn differentiated_contacts() {
     let reduction = Wheelset::STRUCTURE.reduction.unwrap();
     assert_eq!(reduction.differentiated, [(11, 1), (12, 1), (13, 1), (14, 1), (15, 1), (16, 1)]);
     assert_eq!(reduction.singular[0], 0);
@@ -257,7 +257,7 @@ fn contacts_are_differentiated_with_the_constraints() {
 /// steps. Runs with 1e-9 and 1e-10 lie on both sides of it: by up to 6e-8 in positions and 3e-6 in
 /// their rates, as those of 1e-8 are by 2e-7 and 1e-5.
 #[test]
-fn it_hunts_as_the_test_set_has_it() {
+fn hunting_of_the_wheelset() {
     let options = AdaptiveOptions { rtol: 1e-9, atol: 1e-9, ..Default::default() };
     let mut radau = Adaptive::<Wheelset, Radau>::new(options).unwrap();
     let end = radau.solve(&SVector::from(START), &Default::default(), 10.0).unwrap();

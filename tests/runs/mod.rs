@@ -9,68 +9,68 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Debug};
 use std::ops::Range;
 
-fn number(name: &str) -> Option<u64> {
+fn environment_number(name: &str) -> Option<u64> {
     std::env::var(name).ok().and_then(|number| number.parse().ok())
 }
 
 /// How many times as long as usual.
-pub fn times() -> u64 {
-    number("CASADOS_RANDOM").unwrap_or(1)
+pub fn case_multiplier() -> u64 {
+    environment_number("CASADOS_RANDOM").unwrap_or(1)
 }
 
 /// The seeds of so many cases, or the one that `CASADOS_RANDOM_SEED` names.
 pub fn seeds(few: u64) -> Range<u64> {
-    number("CASADOS_RANDOM_SEED").map_or(0..few * times(), |seed| seed..seed + 1)
+    environment_number("CASADOS_RANDOM_SEED").map_or(0..few * case_multiplier(), |seed| seed..seed + 1)
 }
 
 /// Whether cases with other verdicts than `Ok` are printed.
-pub fn shows() -> bool {
+pub fn prints_verdicts() -> bool {
     std::env::var("CASADOS_RANDOM_SHOW").is_ok()
 }
 
 /// How many cases of a class ended with each verdict.
 pub struct Counts {
     class: String,
-    of: BTreeMap<String, u64>,
+    verdict_counts: BTreeMap<String, u64>,
 }
 
 impl Counts {
     pub fn new(class: impl Into<String>) -> Self {
-        Self { class: class.into(), of: BTreeMap::new() }
+        Self { class: class.into(), verdict_counts: BTreeMap::new() }
     }
 
     /// One more of a verdict.
     pub fn count(&mut self, verdict: &str) {
-        *self.of.entry(verdict.into()).or_default() += 1;
+        *self.verdict_counts.entry(verdict.into()).or_default() += 1;
     }
 
     /// One more of `Ok`, or of the kind of an error.
-    pub fn result<T, E: Debug>(&mut self, found: &Result<T, E>) {
+    pub fn count_result<T, E: Debug>(&mut self, found: &Result<T, E>) {
         match found {
             Ok(_) => self.count("Ok"),
-            Err(error) => self.count(&kind(error)),
+            Err(error) => self.count(&error_kind(error)),
         }
     }
 
     /// How many of a verdict.
-    pub fn of(&self, verdict: &str) -> u64 {
-        self.of.get(verdict).copied().unwrap_or(0)
+    pub fn count_of(&self, verdict: &str) -> u64 {
+        self.verdict_counts.get(verdict).copied().unwrap_or(0)
     }
 
     /// How many of some verdicts.
-    pub fn among(&self, verdicts: &[&str]) -> u64 {
-        verdicts.iter().map(|verdict| self.of(verdict)).sum()
+    pub fn count_of_any(&self, verdicts: &[&str]) -> u64 {
+        verdicts.iter().map(|verdict| self.count_of(verdict)).sum()
     }
 
     pub fn all(&self) -> u64 {
-        self.of.values().sum()
+        self.verdict_counts.values().sum()
     }
 }
 
 impl fmt::Display for Counts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "| {} | {} | {} |", self.class, self.all(), self.of("Ok"))?;
-        let others: Vec<_> = self.of.iter().filter(|(verdict, _)| *verdict != "Ok").collect();
+        write!(f, "| {} | {} | {} |", self.class, self.all(), self.count_of("Ok"))?;
+        let others: Vec<_> = self.verdict_counts.iter().filter(|(verdict, _)| *verdict != "Ok").collect();
         let others: Vec<_> = others.iter().map(|(verdict, count)| format!("{verdict} {count}")).collect();
         write!(f, " {} |", others.join(", "))
     }
@@ -86,7 +86,7 @@ const VERDICTS: [(&str, &str); 5] = [
 ];
 
 /// What refused data are told by: how the text begins, a part of it, and the variant of the error.
-const CONTENTS: [(&str, &str, &str); 4] = [
+const REFUSAL_TEXTS: [(&str, &str, &str); 4] = [
     ("the option", "", "InvalidOption"),
     ("stage", " elements instead of ", "Length"),
     ("stage", " exceeds upper bound ", "CrossedBounds"),
@@ -94,9 +94,10 @@ const CONTENTS: [(&str, &str, &str); 4] = [
 ];
 
 /// The variant of a verdict; of other errors their text before the first number or name.
-pub fn kind(error: &impl Debug) -> String {
+pub fn error_kind(error: &impl Debug) -> String {
     let text = format!("{error:?}");
-    let by_content = CONTENTS.iter().find(|(start, part, _)| text.starts_with(start) && text.contains(part));
+    let by_content =
+        REFUSAL_TEXTS.iter().find(|(start, part, _)| text.starts_with(start) && text.contains(part));
     if let Some((.., variant)) = by_content {
         return (*variant).into();
     }

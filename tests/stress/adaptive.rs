@@ -62,7 +62,7 @@ macro_rules! explicit_and_implicit {
 }
 
 #[test]
-fn t30_blow_up() {
+fn t30_finite_escape_time() {
     macro_rules! check {
         ($method:ty) => {
             let mut adaptive = Adaptive::<Riccati, $method>::new(options(1e-8)).expect("valid");
@@ -80,7 +80,7 @@ fn t30_blow_up() {
 }
 
 #[test]
-fn t26_no_value_beyond_a_time() {
+fn t26_end_of_the_domain() {
     macro_rules! check {
         ($method:ty) => {
             let mut adaptive = Adaptive::<Root, $method>::new(options(1e-6)).expect("valid");
@@ -139,7 +139,7 @@ fn t24_inconsistent_start() {
 }
 
 #[test]
-fn t25_the_branch_of_the_start_is_kept() {
+fn t25_branch_of_the_start() {
     for sign in [1.0, -1.0] {
         let mut adaptive = Adaptive::<Branches, Radau>::new(options(1e-8)).expect("valid");
         adaptive.set_start(&zero(), &SVector::from([sign])).expect("finite");
@@ -155,7 +155,7 @@ fn t25_the_branch_of_the_start_is_kept() {
 /// A solution that slides along a jump of the model cannot be followed: there is an end, with an
 /// error or within the tolerance of steps that chatter.
 #[test]
-fn t29_a_jump() {
+fn t29_sliding_mode() {
     macro_rules! check {
         ($method:ty) => {
             let options = AdaptiveOptions { max_steps: 2000, ..options(1e-6) };

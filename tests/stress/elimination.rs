@@ -15,7 +15,7 @@ fn vanishing(xdot: f64, x: f64, z: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 
 
 /// A pivot that is small, zero or large: the algebraic states are the closed form to rounding.
 #[test]
-fn t21_pivots_that_vanish() {
+fn t21_vanishing_pivots() {
     let u = 0.25;
     for p in [0.0, 1e-300, 1e-20, 1e-9, 0.5, 2.0, 1e9] {
         let mut irk = Irk::<Vanishing, RadauIIA<3>>::new(Options::default()).unwrap();
@@ -39,7 +39,7 @@ fn t21_pivots_that_vanish() {
 /// Without memory to pivot the whole matrix: the same bits where the plan is good enough, in less
 /// memory, and an error where it is not; after which the integrator is as it was.
 #[test]
-fn without_a_fallback() {
+fn elimination_without_fallback() {
     fn check<const S: usize>(newton: Newton)
     where
         RadauIIA<S>: casados::Method<S>,
@@ -78,7 +78,7 @@ fn without_a_fallback() {
 /// A Jacobian for each step, as the option says, and a step for each Jacobian: with enough
 /// iterations the same as Newton's own.
 #[test]
-fn frozen_means_once_in_a_step() {
+fn jacobian_updates_once_per_step() {
     let run = |jacobian, fixed_iterations| {
         let newton = Newton { jacobian, fixed_iterations, ..Default::default() };
         let mut irk =
@@ -132,7 +132,7 @@ fn rotating(xdot: f64, x: f64, z: [f64; 2], t: f64) -> [f64; 3] {
 }
 
 #[test]
-fn a_pivot_crosses_zero() {
+fn pivot_that_crosses_zero() {
     let mut irk = Irk::<Rotating, RadauIIA<2>>::new(Options { steps: 1, ..Default::default() }).unwrap();
     let mut x = vector![1.0];
     for n in 0..400 {
@@ -154,7 +154,7 @@ fn a_pivot_crosses_zero() {
 /// The plan of a model has the pattern of its Newton matrix, and each unknown is the pivot of one
 /// equation.
 #[test]
-fn every_unknown_has_one_pivot() {
+fn pivots_of_the_plan() {
     fn check<M: Dae>(unknowns: usize) {
         let plan = M::STRUCTURE.elimination;
         assert_eq!(plan.pivots.len(), unknowns);
@@ -180,7 +180,7 @@ fn any_matrix(xdot: f64, x: f64, z: [f64; 2], p: [f64; 4]) -> [f64; 3] {
 /// Permutations, and matrices next to them: of two orders one has a pivot of zero, and the other
 /// one gives the answer.
 #[test]
-fn the_whole_matrix_is_pivoted_where_the_plan_fails() {
+fn dense_fallback() {
     let mut pivoted = 0;
     for tiny in [0.0, 1e-300, 1e-17, 1e-12] {
         for p in [[1.0, tiny, tiny, 1.0], [tiny, 1.0, 1.0, tiny]] {
@@ -208,7 +208,7 @@ fn out_of_range(xdot: f64, x: f64, z: [f64; 2], u: f64) -> [f64; 3] {
 }
 
 #[test]
-fn a_range_is_no_promise() {
+fn values_outside_of_declared_ranges() {
     let plan = OutOfRange::STRUCTURE.elimination;
     assert_eq!(plan.slot_of_equation, [0, 1, 2], "z₀ is found from the second equation");
     for u in [30.0, 30.0 + 1e-14, 30.0 - 1e-9, 29.0, 50.0, -100.0] {
@@ -230,7 +230,7 @@ fn a_range_is_no_promise() {
 
 /// A matrix that is singular is an error that names the unknown, and the integrator goes on.
 #[test]
-fn t20_singular_matrices_are_refused() {
+fn t20_singular_matrices() {
     let mut irk = Irk::<AnyMatrix, RadauIIA<2>>::new(Options::default()).unwrap();
     irk.set_parameters(&vector![1.0, 2.0, 2.0, 4.0]).unwrap();
     let error = irk.solve(&vector![1.0], &SVector::zeros(), 0.1).map(|step| step.x).unwrap_err();

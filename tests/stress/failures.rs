@@ -209,7 +209,7 @@ fn t26_models_without_a_value() {
 /// The polynomial of the last step of Van der Pol's oscillator satisfies its equations at the
 /// stages: `D x = h f(x)`, with the derivatives `D` of the Lagrange polynomials of the start and
 /// the stages, to rounding of the terms.
-fn is_collocation(irk: &mut Irk<VanDerPol, RadauIIA<3>>, mu: f64, h: f64) {
+fn satisfies_collocation_conditions(irk: &mut Irk<VanDerPol, RadauIIA<3>>, mu: f64, h: f64) {
     let root = 6.0f64.sqrt();
     let nodes = [0.0, (4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0];
     let values = nodes.map(|c| irk.dense(c * h).expect("inside of the step").x);
@@ -255,7 +255,7 @@ fn t31_newton_divergence() {
             assert!(irk.statistics().iterations >= 50);
         }
         // Or it finds another solution of the equations of collocation, far away.
-        Ok(_) => is_collocation(&mut irk, 1e6, 1e5),
+        Ok(_) => satisfies_collocation_conditions(&mut irk, 1e6, 1e5),
         Err(Error::Overflow { .. }) => {}
         Err(other) => panic!("{other}"),
     }
@@ -293,7 +293,7 @@ fn t31_newton_divergence() {
 /// With one stage the stage is known from outside: `k = (x₊ − x)/h`. Its residual is rounding, at a
 /// thousand points; and no iteration went round in circles.
 #[test]
-fn t32_newton_reaches_rounding() {
+fn t32_newton_to_rounding() {
     let mut seed = 3u64;
     let mut next = || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -77,7 +77,7 @@ where
 /// too. Each step rounds the update of a state and the residual of its stages: a few epsilon of the
 /// invariant, with random sign; here all of them are granted the same sign.
 #[test]
-fn gauss_keeps_quadratic_invariants() {
+fn quadratic_invariants_of_gauss_methods() {
     const INTERVALS: usize = 200;
     let bound = 8.0 * f64::EPSILON * INTERVALS as f64;
     assert!(drift(Irk::<RigidBody, Gauss<1>>::new(options(1)).expect("valid"), INTERVALS) <= bound);

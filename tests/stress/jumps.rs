@@ -12,7 +12,7 @@ fn switched(x: f64, u: f64, t: f64) -> f64 {
 }
 
 #[test]
-fn t29_discontinuity() {
+fn t29_discontinuous_force() {
     // x = 2 − e^{−t} until 5, and decays from there.
     let exact = (2.0 - f64::exp(-5.0)) * f64::exp(-3.0);
     let (x0, u) = (vector![1.0], vector![0.0]);
@@ -59,7 +59,7 @@ fn t29_discontinuity() {
 /// either end: a jump before the first one shows at the start alone. Of four stages the estimate is
 /// asked for 500 tolerances of 1e-10: no more than thirty of them may be left.
 #[test]
-fn jumps_anywhere() {
+fn jumps_anywhere_in_a_step() {
     macro_rules! check {
         ($method:ty, $allowed:literal) => {
             for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {

@@ -45,10 +45,10 @@ mod precision;
 mod roots;
 mod scaling;
 mod sensitivities;
-mod starts;
+mod start_values;
 
 #[test]
-fn every_number_has_a_test() {
+fn numbering_of_the_tests() {
     fn read(directory: &std::path::Path, sources: &mut String) {
         for entry in std::fs::read_dir(directory).expect("a directory") {
             let path = entry.expect("an entry").path();

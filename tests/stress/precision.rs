@@ -53,7 +53,7 @@ macro_rules! compare {
 }
 
 #[test]
-fn single_precision_is_what_conditions_predict() {
+fn single_precision() {
     let points = || {
         (0..40).map(|k| {
             let wave = |i: i32| (f64::from(7 * k + 3 * i)).sin();

@@ -50,7 +50,7 @@ struct Problem<const N: usize> {
 }
 
 /// The coefficients of an equation, one of its roots and the distance to the next.
-fn equation(random: &mut Random) -> ([f64; 8], f64, f64) {
+fn random_equation(random: &mut Random) -> ([f64; 8], f64, f64) {
     let mut c = [0.0; 8];
     let scale = (2.0 * random.symmetric()).exp() * if random.below(2) == 0 { 1.0 } else { -1.0 };
     let mut roots = [0.0; 4];
@@ -143,7 +143,7 @@ impl<const N: usize> Problem<N> {
 
     /// Newton's method with the current Jacobian in every iteration: where it ends, and how far it
     /// was from the solution on the way, in distances to the next root.
-    fn newton(&self, mut z: SVector<f64, N>) -> Option<(SVector<f64, N>, f64)> {
+    fn newton_iteration(&self, mut z: SVector<f64, N>) -> Option<(SVector<f64, N>, f64)> {
         let mut astray = 0.0f64;
         for _ in 0..50 {
             let (f, jacobian) = self.residual(&z);
@@ -163,7 +163,7 @@ impl<const N: usize> Problem<N> {
     }
 
     /// Whether these are at the solution, and not at another.
-    fn is_there(&self, z: &[f64]) -> bool {
+    fn is_at_solution(&self, z: &[f64]) -> bool {
         (0..N).all(|j| (z[j] - self.solution[j]).abs() < 0.2 * self.separation[j])
     }
 
@@ -179,7 +179,7 @@ impl<const N: usize> Problem<N> {
             };
             let mut w = SVector::<f64, N>::zeros();
             for j in 0..N {
-                (problem.coefficients[j], w[j], problem.separation[j]) = equation(random);
+                (problem.coefficients[j], w[j], problem.separation[j]) = random_equation(random);
             }
             if N > 1 {
                 problem.coupling = [0.2 * random.symmetric(), 0.1 * random.symmetric()];
@@ -190,9 +190,9 @@ impl<const N: usize> Problem<N> {
                 row[(j + 1) % N] += problem.coupling[0];
             }
             let Some(near) = solve(mixing, w) else { continue };
-            let Some((solution, _)) = problem.newton(near) else { continue };
+            let Some((solution, _)) = problem.newton_iteration(near) else { continue };
             problem.solution = solution;
-            if !problem.is_there(near.as_slice()) {
+            if !problem.is_at_solution(near.as_slice()) {
                 continue;
             }
             problem.start = solution;
@@ -207,23 +207,23 @@ impl<const N: usize> Problem<N> {
 /// What became of the starts from which Newton's method leads to the root of the start, and is
 /// never further from it than the next one is.
 #[derive(Debug, Default)]
-struct Count {
-    kept: usize,
+struct StartCounts {
+    at_nearest_root: usize,
     elsewhere: usize,
     failed: usize,
     /// Where Newton's method was thrown beyond other roots and came back by chance.
-    by_chance: [usize; 2],
+    at_nearest_root_by_chance: [usize; 2],
     /// Where it ends elsewhere: the root is reached all the same, or not.
     lost: [usize; 2],
 }
 
-impl Count {
-    fn take(&mut self, newton: Option<f64>, there: Option<bool>) {
+impl StartCounts {
+    fn count_start(&mut self, newton: Option<f64>, there: Option<bool>) {
         let reached = usize::from(there != Some(true));
         match (newton, there) {
             (None, _) => self.lost[reached] += 1,
-            (Some(astray), _) if astray > 1.0 => self.by_chance[reached] += 1,
-            (_, Some(true)) => self.kept += 1,
+            (Some(astray), _) if astray > 1.0 => self.at_nearest_root_by_chance[reached] += 1,
+            (_, Some(true)) => self.at_nearest_root += 1,
             (_, Some(false)) => self.elsewhere += 1,
             (_, None) => self.failed += 1,
         }
@@ -244,7 +244,7 @@ const METHODS: [&str; 11] = [
     "shooting",
     "collocation",
 ];
-type Counts = [Count; METHODS.len()];
+type Counts = [StartCounts; METHODS.len()];
 
 fn campaign<const N: usize>(random: &mut Random, starts: usize, reach: f64, counts: &mut Counts)
 where
@@ -252,9 +252,9 @@ where
 {
     for start in 0..starts {
         let problem = Problem::<N>::new(random, reach);
-        let newton = problem.newton(problem.start);
-        let newton = newton.filter(|(z, _)| problem.is_there(z.as_slice())).map(|(_, astray)| astray);
-        problem.run(start % 10 == 0, |method, there| counts[method].take(newton, there));
+        let newton = problem.newton_iteration(problem.start);
+        let newton = newton.filter(|(z, _)| problem.is_at_solution(z.as_slice())).map(|(_, astray)| astray);
+        problem.run(start % 10 == 0, |method, there| counts[method].count_start(newton, there));
     }
 }
 
@@ -340,7 +340,7 @@ macro_rules! runs {
 runs!(1, 2, 3, 4, 5);
 
 #[test]
-fn starts_near_a_root_end_there() {
+fn starts_near_a_root() {
     let mut counts = Counts::default();
     let mut random = Random::new(7);
     // In parts of the distance to the next root.
@@ -374,7 +374,7 @@ fn reactor(xdot: [f64; 4], x: [f64; 4], z: [f64; 3]) -> [f64; 7] {
 }
 
 #[test]
-fn the_reactor_has_positive_ions() {
+fn positive_concentrations_of_a_reactor() {
     let none = SVector::<f64, 0>::zeros();
     let states: Vec<_> = (0..100).map(|i| vector![0.5 + 0.01 * f64::from(i), 0.4, 310.0, 1.0]).collect();
     for jacobian in [Jacobian::Auto, Jacobian::Simplified, Jacobian::Full, Jacobian::Frozen] {
@@ -411,7 +411,7 @@ fn line(xdot: f64, x: f64, z: [f64; 2]) -> [f64; 3] {
 }
 
 #[test]
-fn a_voltage_collapse_names_the_voltage() {
+fn message_about_voltage_collapse() {
     let (x0, none) = (vector![0.1], SVector::<f64, 0>::zeros());
     let mut radau = Adaptive::<Line, Radau>::new(AdaptiveOptions::default()).unwrap();
     let error = radau.solve(&x0, &none, 1.0).unwrap_err();

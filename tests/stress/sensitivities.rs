@@ -150,7 +150,7 @@ fn t15_complex_step_and_differences() {
 
 /// Bit by bit.
 #[test]
-fn t16_hessians_are_symmetric() {
+fn t16_symmetry_of_hessians() {
     let (x0, u, p, lambda) = (vector![0.4, -0.7], vector![0.6], vector![1.3, 2.1], vector![0.3, -1.7]);
     macro_rules! check {
         ($integrator:expr, $end:expr) => {
@@ -173,7 +173,7 @@ fn t16_hessians_are_symmetric() {
 /// Solutions of linear equations have no second derivatives by `x₀` and `u`, not even rounding
 /// errors.
 #[test]
-fn t17_no_curvature() {
+fn t17_hessians_of_linear_equations() {
     let (x0, u, lambda) = (vector![1.0, -0.5], vector![0.8], vector![0.7, 0.9]);
     macro_rules! check {
         ($integrator:expr) => {
@@ -231,7 +231,7 @@ fn t18_cancellation() {
 /// Derivatives are those at the stages that the iteration found. If it stops short by `δ`, they are
 /// off by the second derivatives times that.
 #[test]
-fn t19_derivatives_of_what_was_iterated() {
+fn t19_derivatives_of_inexact_stages() {
     let (x0, u, p, h) = (vector![0.4, -0.7], vector![0.6], vector![9.81, 0.1], 0.2);
     let run = |fixed_iterations: Option<usize>| {
         let newton = Newton { fixed_iterations, ..Default::default() };

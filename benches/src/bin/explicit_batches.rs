@@ -23,7 +23,7 @@ const COUNT: usize = 40;
 type Failure = Box<dyn std::error::Error>;
 
 /// A wave around some numbers.
-fn wave<V: Matrix<f64>>(k: usize, size: f64, around: &[f64]) -> V {
+fn perturbed_by_wave<V: Matrix<f64>>(k: usize, size: f64, around: &[f64]) -> V {
     let mut vector = V::zeroed();
     for (i, element) in vector.as_mut_slice().iter_mut().enumerate() {
         let base = around.get(i).copied().unwrap_or(0.0);
@@ -47,15 +47,15 @@ fn by_turns(
             samples.push(1e6 * start.elapsed().as_secs_f64() / COUNT as f64);
         }
     }
-    let [alone, together] = samples.map(|samples| Summary::of(samples).median);
+    let [alone, together] = samples.map(|samples| Summary::from_samples(samples).median);
     Ok(format!(" {alone:.3} / {together:.3} = {:.2} |", alone / together))
 }
 
 /// A row of the table.
 fn row<M: Ode>(name: &str, x0: &[f64], h: f64, steps: usize, turns: usize) -> Result<(), Failure> {
-    let x0: Vec<VectorX<M, f64>> = (0..COUNT).map(|k| wave(k, 0.01, x0)).collect();
-    let u: Vec<VectorU<M, f64>> = (0..COUNT).map(|k| wave(k + 7, 0.3, &[])).collect();
-    let lambda: Vec<VectorX<M, f64>> = (0..COUNT).map(|k| wave(k + 9, 1.0, &[])).collect();
+    let x0: Vec<VectorX<M, f64>> = (0..COUNT).map(|k| perturbed_by_wave(k, 0.01, x0)).collect();
+    let u: Vec<VectorU<M, f64>> = (0..COUNT).map(|k| perturbed_by_wave(k + 7, 0.3, &[])).collect();
+    let lambda: Vec<VectorX<M, f64>> = (0..COUNT).map(|k| perturbed_by_wave(k + 9, 1.0, &[])).collect();
     let options = Options { steps, ..Default::default() };
     let mut erk = erk::Integrator::<M, Rk4, 4, f64, Heap>::new(options)?;
     let mut batch = batch::Integrator::<erk::Integrator<M, Rk4, 4, f64, Heap>>::new(options)?;

@@ -11,9 +11,9 @@
 //! what the calls cost.
 
 use casados::prelude::Start;
-use casados_benches::calls::{open, options};
+use casados_benches::calls::{open_calls, options};
 use casados_benches::case::{Case, Family, Mode};
-use casados_benches::record::repository;
+use casados_benches::record::repository_path;
 use std::fmt::Write;
 use std::process::{Command, ExitCode};
 
@@ -22,8 +22,8 @@ type Failure = Box<dyn std::error::Error>;
 const FILE: &str = "benches/instructions.txt";
 /// Code that nobody touched moves by this much when its neighbours are compiled anew.
 const TOLERANCE: f64 = 0.02;
-const FEW: usize = 2;
-const MANY: usize = 12;
+const FEW_CALLS: usize = 2;
+const MANY_CALLS: usize = 12;
 
 fn cases() -> Result<Vec<Case>, String> {
     let gauss = Family::Gauss;
@@ -39,17 +39,17 @@ fn cases() -> Result<Vec<Case>, String> {
 }
 
 /// What runs under valgrind.
-fn work(name: &str, mode: &str, calls: &str) -> Result<(), Failure> {
+fn run_case(name: &str, mode: &str, calls: &str) -> Result<(), Failure> {
     let case = cases()?.into_iter().find(|case| case.name == name).ok_or("no such case")?;
-    let mode = Mode::ALL.into_iter().find(|m| m.name() == mode).ok_or("no such mode")?;
-    let mut integrator = open(&case, options(&case, 1e-8, Start::Zero))?;
+    let mode = Mode::ALL_MODES.into_iter().find(|m| m.name() == mode).ok_or("no such mode")?;
+    let mut integrator = open_calls(&case, options(&case, 1e-8, Start::Zero))?;
     for _ in 0..calls.parse::<usize>()? {
-        integrator.call(mode, 0).map_err(|e| e.to_string())?;
+        integrator.call_input(mode, 0).map_err(|e| e.to_string())?;
     }
     Ok(())
 }
 
-fn count(case: &Case, mode: Mode, calls: usize) -> Result<f64, Failure> {
+fn count_instructions(case: &Case, mode: Mode, calls: usize) -> Result<f64, Failure> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(std::env::current_exe()?)
@@ -68,14 +68,14 @@ fn run() -> Result<bool, Failure> {
     let accept = match words[..] {
         [] => false,
         ["accept"] => true,
-        [case, mode, calls] => return work(case, mode, calls).map(|()| true),
+        [case, mode, calls] => return run_case(case, mode, calls).map(|()| true),
         _ => return Err("usage: instructions [accept]".into()),
     };
     if Command::new("valgrind").arg("--version").output().is_err() {
         println!("no valgrind here: nothing is counted");
         return Ok(true);
     }
-    let path = repository(FILE);
+    let path = repository_path(FILE);
     let reviewed = std::fs::read_to_string(&path).unwrap_or_default();
     let known = |key: &str| {
         let line =
@@ -87,9 +87,11 @@ fn run() -> Result<bool, Failure> {
     );
     let mut good = true;
     for case in cases()? {
-        for mode in Mode::ALL {
+        for mode in Mode::ALL_MODES {
             let key = format!("{} {}", case.name, mode.name());
-            let per_call = (count(&case, mode, MANY)? - count(&case, mode, FEW)?) / (MANY - FEW) as f64;
+            let per_call = (count_instructions(&case, mode, MANY_CALLS)?
+                - count_instructions(&case, mode, FEW_CALLS)?)
+                / (MANY_CALLS - FEW_CALLS) as f64;
             writeln!(new, "{key} = {per_call:.0}")?;
             let change = known(&key).map(|old| per_call / old - 1.0);
             let off = change.is_none_or(|change| change.abs() > TOLERANCE);

@@ -72,7 +72,7 @@ struct Model {
 }
 
 impl Model {
-    fn of<M: GraphDae>() -> Self {
+    fn by_name<M: GraphDae>() -> Self {
         let (residual, dual) = (M::residual_of::<f64>, M::residual_of::<Dual64>);
         Self { nx: M::Shape::NX, nz: M::Shape::NZ, residual, dual }
     }
@@ -81,7 +81,7 @@ impl Model {
 /// A call: values at the end, their derivatives by `(x₀, p)` row by row, steps.
 type Call = Result<(Vec<f64>, Vec<f64>, usize), String>;
 
-fn runs(model: Model, request: &Request) -> Vec<Value> {
+fn run_tolerances(model: Model, request: &Request) -> Vec<Value> {
     let mut runs = Vec::new();
     for name in ["BDF", "ESDIRK34", "TR-BDF2"] {
         for &tolerance in &request.tolerances {
@@ -332,28 +332,28 @@ fn forward(model: Model, request: &Request, name: &str, tolerance: f64, timed: T
     }
 }
 
-fn answer(line: &str) -> Option<Vec<Value>> {
+fn answer_request(line: &str) -> Option<Vec<Value>> {
     let value: Value = serde_json::from_str(line).ok()?;
     let request = Request::read(&value)?;
     let model = match value["problem"].as_str()? {
-        "robertson" => Model::of::<Robertson>(),
-        "hires" => Model::of::<Hires>(),
-        "van_der_pol_1e3" | "van_der_pol_1e6" => Model::of::<VanDerPol>(),
-        "oregonator" => Model::of::<Oregonator>(),
-        "e5" => Model::of::<E5Conserved>(),
-        "akzo_nobel" => Model::of::<AkzoNobel>(),
-        "transistor_amplifier" => Model::of::<TransistorCapacitors>(),
-        "ring_modulator" => Model::of::<RingModulator>(),
-        "pleiades" => Model::of::<Pleiades>(),
-        "squeezer" => Model::of::<Squeezer>(),
+        "robertson" => Model::by_name::<Robertson>(),
+        "hires" => Model::by_name::<Hires>(),
+        "van_der_pol_1e3" | "van_der_pol_1e6" => Model::by_name::<VanDerPol>(),
+        "oregonator" => Model::by_name::<Oregonator>(),
+        "e5" => Model::by_name::<E5Conserved>(),
+        "akzo_nobel" => Model::by_name::<AkzoNobel>(),
+        "transistor_amplifier" => Model::by_name::<TransistorCapacitors>(),
+        "ring_modulator" => Model::by_name::<RingModulator>(),
+        "pleiades" => Model::by_name::<Pleiades>(),
+        "squeezer" => Model::by_name::<Squeezer>(),
         _ => return None,
     };
-    Some(runs(model, &request))
+    Some(run_tolerances(model, &request))
 }
 
 fn main() {
     for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-        let reply = match answer(&line) {
+        let reply = match answer_request(&line) {
             Some(runs) => json!({ "runs": runs }),
             None => json!({ "error": "not a request" }),
         };

@@ -45,7 +45,7 @@ fn problems(most: f64) -> Result<Vec<HeapQp<f64>>, Failure> {
 }
 
 /// Solves all, so many times: iterations of all, the most of one, and the least milliseconds.
-fn solve(most: f64, rounds: usize) -> Result<(usize, usize, f64), Failure> {
+fn solve_one_by_one(most: f64, rounds: usize) -> Result<(usize, usize, f64), Failure> {
     let problems = problems(most)?;
     let mut solver = HeapInteriorPoint::new();
     let mut solution = HeapSolution::new(problems[0].dims())?;
@@ -65,7 +65,7 @@ fn solve(most: f64, rounds: usize) -> Result<(usize, usize, f64), Failure> {
 
 /// The same side by side: iterations of all, the most of one, and the least milliseconds of CPU
 /// time of one thread, and on the clock with all threads.
-fn together(most: f64, rounds: usize) -> Result<(usize, usize, [f64; 2]), Failure> {
+fn solve_side_by_side(most: f64, rounds: usize) -> Result<(usize, usize, [f64; 2]), Failure> {
     let mut instances = Vec::new();
     for qp in problems(most)? {
         let solution = HeapSolution::new(qp.dims())?;
@@ -92,18 +92,18 @@ fn main() -> Result<(), Failure> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     if let [most, rounds] = &arguments[..] {
         if std::env::var_os("TOGETHER").is_some() {
-            together(most.parse()?, rounds.parse()?)?;
+            solve_side_by_side(most.parse()?, rounds.parse()?)?;
         } else {
-            solve(most.parse()?, rounds.parse()?)?;
+            solve_one_by_one(most.parse()?, rounds.parse()?)?;
         }
         return Ok(());
     }
     println!("| 128 LQRs | iterations | most | ms | µs an iteration |");
     println!("| --- | --- | --- | --- | --- |");
     for most in [1e4, 1.0] {
-        let (sum, largest, best) = solve(most, 30)?;
+        let (sum, largest, best) = solve_one_by_one(most, 30)?;
         println!("| ±{most}, alone | {sum} | {largest} | {best:.2} | {:.1} |", best * 1e3 / sum as f64);
-        let (sum, largest, [best, clock]) = together(most, 60)?;
+        let (sum, largest, [best, clock]) = solve_side_by_side(most, 60)?;
         println!("| ±{most}, together | {sum} | {largest} | {best:.2} | {:.1} |", best * 1e3 / sum as f64);
         println!("| ±{most}, together, all threads | {sum} | {largest} | {clock:.2} on the clock | |");
     }

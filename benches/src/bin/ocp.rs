@@ -20,7 +20,7 @@ use casados::qp::{Condensing, HeapInteriorPoint};
 use casados_benches::models::Chain;
 use casados_benches::peer::Peer;
 use casados_benches::record::{load, numbers};
-use casados_benches::time::{measure, pin};
+use casados_benches::time::{measure, pin_to_last_core};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -133,7 +133,7 @@ macro_rules! row {
 }
 
 fn main() -> Result<(), Failure> {
-    println!("pinned: {}", pin());
+    println!("pinned: {}", pin_to_last_core());
     let mut peers = Peers::start();
     println!("Milliseconds; in brackets how many times those of casados.\n");
     println!(

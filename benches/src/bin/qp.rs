@@ -13,7 +13,7 @@ use casados::qp::{
     Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims,
 };
 use casados_benches::record::{load, numbers};
-use casados_benches::time::{Summary, measure, pin};
+use casados_benches::time::{Summary, measure, pin_to_last_core};
 use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
@@ -91,7 +91,7 @@ impl Entry {
 }
 
 fn main() -> Result<(), Failure> {
-    println!("pinned: {}", pin());
+    println!("pinned: {}", pin_to_last_core());
     println!("| masses | solver | start | iterations | ms | reference ms |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for (masses, [cold, warm, clarabel_there]) in REFERENCES {

@@ -19,7 +19,7 @@ impl<M: Dae> Results<M> {
 }
 
 /// So many places.
-pub(super) fn places<R: Default>(results: &mut Vec<R>, count: usize) -> &mut [R] {
+pub(super) fn allocate<R: Default>(results: &mut Vec<R>, count: usize) -> &mut [R] {
     results.resize_with(count, Default::default);
     results
 }
@@ -40,7 +40,7 @@ fn jacobian<M: Dae>(result: &Forward<M>) -> Vec<f64> {
     (0..M::Shape::NX).flat_map(|i| rows(&result.dx_dx0, i).chain(rows(&result.dx_du, i))).collect()
 }
 
-fn triangle<M: Dae>(result: &Hessian<M>) -> Vec<f64> {
+fn lower_triangle<M: Dae>(result: &Hessian<M>) -> Vec<f64> {
     let (nx, nw) = (M::Shape::NX, M::Shape::NX + M::Shape::NU);
     let lower = |i: usize, j: usize| match (i < nx, j < nx) {
         (true, _) => result.h_xx[(i, j)],
@@ -50,22 +50,22 @@ fn triangle<M: Dae>(result: &Hessian<M>) -> Vec<f64> {
     (0..nw).flat_map(|i| (0..=i).map(move |j| lower(i, j))).collect()
 }
 
-pub(super) fn of_nominal<M: Dae>(result: &Nominal<M>, values: &mut Values) {
+pub(super) fn values_of_nominal<M: Dae>(result: &Nominal<M>, values: &mut Values) {
     values.x = result.x.as_slice().to_vec();
 }
 
-pub(super) fn of_forward<M: Dae>(result: &Forward<M>, values: &mut Values) {
-    of_nominal(result, values);
+pub(super) fn values_of_forward<M: Dae>(result: &Forward<M>, values: &mut Values) {
+    values_of_nominal(result, values);
     values.forward = jacobian(result);
 }
 
-pub(super) fn of_adjoint<M: Dae>(result: &Adjoint<M>, values: &mut Values) {
-    of_nominal(result, values);
+pub(super) fn values_of_adjoint<M: Dae>(result: &Adjoint<M>, values: &mut Values) {
+    values_of_nominal(result, values);
     values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
 }
 
-pub(super) fn of_hessian<M: Dae>(result: &Hessian<M>, values: &mut Values) {
-    of_forward(result, values);
+pub(super) fn values_of_hessian<M: Dae>(result: &Hessian<M>, values: &mut Values) {
+    values_of_forward(result, values);
     values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
-    values.hessian = triangle(result);
+    values.hessian = lower_triangle(result);
 }

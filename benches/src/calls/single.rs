@@ -1,7 +1,9 @@
 //! One interval in each call.
 
-use super::Calls;
-use super::results::{Results, of_adjoint, of_forward, of_hessian, of_nominal, places, vector};
+use super::IntegratorCalls;
+use super::results::{
+    Results, allocate, values_of_adjoint, values_of_forward, values_of_hessian, values_of_nominal, vector,
+};
 use crate::case::{Case, Mode, Values};
 use casados::model::{VectorU, VectorX};
 use casados::prelude::*;
@@ -9,7 +11,7 @@ use casados::{Error, Integrator, Statistics};
 use std::hint::black_box;
 
 /// An integrator with its inputs and results.
-pub(super) struct Typed<M: Dae, I> {
+pub(super) struct SingleCalls<M: Dae, I> {
     integrator: I,
     inputs: Vec<(VectorX<M, f64>, VectorU<M, f64>)>,
     lambda: VectorX<M, f64>,
@@ -17,15 +19,15 @@ pub(super) struct Typed<M: Dae, I> {
     results: Results<M>,
 }
 
-impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Typed<M, I> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> SingleCalls<M, I> {
     pub(super) fn new(case: &Case, integrator: I) -> Self {
         let inputs = case.inputs.iter().map(|(x0, u)| (vector(x0), vector(u))).collect();
         Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t, results: Results::NONE }
     }
 }
 
-impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Calls for Typed<M, I> {
-    fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> IntegratorCalls for SingleCalls<M, I> {
+    fn call_input(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
         let (x0, u) = black_box(&self.inputs[input]);
         let lambda = black_box(&self.lambda);
         match mode {
@@ -42,7 +44,8 @@ impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Calls for Ty
         let (inputs, lambda, h) = (black_box(&**inputs), black_box(&*lambda), *h);
         macro_rules! keep {
             ($results:ident, |$x0:ident, $u:ident| $call:expr) => {{
-                for (place, ($x0, $u)) in places(&mut results.$results, inputs.len()).iter_mut().zip(inputs) {
+                for (place, ($x0, $u)) in allocate(&mut results.$results, inputs.len()).iter_mut().zip(inputs)
+                {
                     place.clone_from($call?);
                 }
                 black_box(&results.$results);
@@ -57,14 +60,18 @@ impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Calls for Ty
         Ok(())
     }
 
-    fn values(&mut self, mode: Mode, input: usize) -> Result<Values, Error> {
+    fn results_of(&mut self, mode: Mode, input: usize) -> Result<Values, Error> {
         let (x0, u) = &self.inputs[input];
         let mut values = Values::default();
         match mode {
-            Mode::Simulation => of_nominal(self.integrator.solve(x0, u, self.h)?, &mut values),
-            Mode::Forward => of_forward(self.integrator.forward(x0, u, self.h)?, &mut values),
-            Mode::Adjoint => of_adjoint(self.integrator.adjoint(x0, u, self.h, &self.lambda)?, &mut values),
-            Mode::Hessian => of_hessian(self.integrator.hessian(x0, u, self.h, &self.lambda)?, &mut values),
+            Mode::Simulation => values_of_nominal(self.integrator.solve(x0, u, self.h)?, &mut values),
+            Mode::Forward => values_of_forward(self.integrator.forward(x0, u, self.h)?, &mut values),
+            Mode::Adjoint => {
+                values_of_adjoint(self.integrator.adjoint(x0, u, self.h, &self.lambda)?, &mut values)
+            }
+            Mode::Hessian => {
+                values_of_hessian(self.integrator.hessian(x0, u, self.h, &self.lambda)?, &mut values)
+            }
         }
         Ok(values)
     }

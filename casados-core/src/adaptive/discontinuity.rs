@@ -17,26 +17,26 @@ pub enum BranchChange {
 /// A number of the conditions and linear tables of a model, and one of its splines.
 #[derive(Clone, Copy, Debug, Default, Zeroable)]
 pub struct Branches {
-    kinks: f64,
-    knots: f64,
+    switch_code: f64,
+    knot_code: f64,
 }
 
 impl Branches {
     /// Those at a point.
-    pub fn of<M: Dae, S: Lanes>(v: &ArrayV<M, S::Cell>) -> Self {
+    pub fn at_point<M: Dae, S: Lanes>(v: &ArrayV<M, S::Cell>) -> Self {
         let mut numbers = [S::Cell::zeroed(); 2];
         if const { M::BRANCHES > 0 } {
             M::branches::<S>(v, &mut numbers);
         }
-        Self { kinks: S::lane(&numbers[0], 0), knots: S::lane(&numbers[1], 0) }
+        Self { switch_code: S::lane(&numbers[0], 0), knot_code: S::lane(&numbers[1], 0) }
     }
 
     /// How the model changes in a step that has both.
-    pub fn change(self, other: Self) -> Option<BranchChange> {
-        if self.kinks != other.kinks {
+    pub fn change_to(self, other: Self) -> Option<BranchChange> {
+        if self.switch_code != other.switch_code {
             Some(BranchChange::Switch)
         } else {
-            (self.knots != other.knots).then_some(BranchChange::SplineKnot)
+            (self.knot_code != other.knot_code).then_some(BranchChange::SplineKnot)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What integrates with steps of variable size. Nobody outside can name it.
 
-use super::replay::{AcceptedStep, Differentiate, StepDifferentiator};
+use super::replay::{AcceptedStep, DynStepDifferentiator, StepDifferentiator};
 use super::step::{After, Run, Span};
 use super::tape::Entry;
 use crate::error::Error;
@@ -51,28 +51,28 @@ pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
 }
 
 /// The steps of a method again, for derivatives that take part in the choice of its steps.
-pub struct Replays<M: Dae, B: Engine<M, T>, T: Real> {
-    state: B::State,
+pub struct MethodStepDifferentiator<M: Dae, B: Engine<M, T>, T: Real> {
+    method_state: B::State,
     model: PhantomData<fn() -> (M, T)>,
 }
 
-impl<M: Dae, B: Engine<M, T>, T: Real> Default for Replays<M, B, T> {
+impl<M: Dae, B: Engine<M, T>, T: Real> Default for MethodStepDifferentiator<M, B, T> {
     fn default() -> Self {
-        Self { state: B::State::default(), model: PhantomData }
+        Self { method_state: B::State::default(), model: PhantomData }
     }
 }
 
-impl<M: Dae, B: Engine<M, T>, T: Real> Differentiate<M, T> for Replays<M, B, T> {
+impl<M: Dae, B: Engine<M, T>, T: Real> DynStepDifferentiator<M, T> for MethodStepDifferentiator<M, B, T> {
     fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error> {
-        B::replays(&mut self.state).forward(step, None)
+        B::replays(&mut self.method_state).forward(step, None)
     }
 
-    fn slopes(
+    fn rate_derivatives(
         &mut self,
         level: usize,
         weights: &[f64],
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        B::replays(&mut self.state).slopes(level, weights, to)
+        B::replays(&mut self.method_state).slopes(level, weights, to)
     }
 }

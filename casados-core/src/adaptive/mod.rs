@@ -21,7 +21,6 @@
 //! derivatives of runs, `integrator` what users see, `segment` one of several intervals,
 //! `piecewise` those with controls of their own, `events`, and `along` integrands.
 
-mod along;
 mod consistent;
 mod discontinuity;
 mod engine;
@@ -35,6 +34,7 @@ mod order;
 mod pairs;
 mod piecewise;
 mod point;
+mod quadrature;
 mod replay;
 mod segment;
 mod sensitivities;

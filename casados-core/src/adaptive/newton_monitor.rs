@@ -18,25 +18,25 @@ pub(super) const THET: f64 = 1e-3;
 /// Increments that shrink no more are rounding errors, if they are this small beside what is
 /// tolerated: of a state near zero that follows from large ones by an equation, they may be above
 /// the tolerance of the iteration.
-const NOISE: f64 = 0.01;
+const ROUNDING_INCREMENT: f64 = 0.01;
 
 /// How an iteration ended that did not converge.
-pub enum Failure {
+pub enum NewtonFailure {
     /// It converges, but not soon enough: the factor by which a shorter step would.
-    Slow(f64),
+    TooSlow(f64),
     /// It does not converge.
     Diverges,
     /// The model has a value that is not finite.
     NotFinite,
     /// It converges slowly, with the Jacobian of an earlier step.
-    Stale,
+    StaleJacobian,
     /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
-    Rough(f64),
+    Discontinuity(f64),
 }
 
 /// What keeps an iteration from converging.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Culprit {
+pub struct FailureLocation {
     /// The unknown with the largest increment.
     pub unknown: usize,
     /// The equation with the largest residual relative to its terms,
@@ -47,73 +47,73 @@ pub struct Culprit {
 
 /// Where the stages are, beside borders between branches of the model.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sides {
+pub struct SurfaceCrossing {
     /// One has passed a border by the last increment.
-    pub passed: bool,
+    pub crossed_last: bool,
     /// One is beyond a border from where the Jacobian was evaluated.
-    pub beyond: bool,
+    pub off_jacobian_branch: bool,
 }
 
 /// What is known about the convergence of the last iteration.
 #[derive(Clone, Copy, Debug)]
-pub struct Convergence {
+pub struct NewtonMonitor {
     /// How many iterations it took.
     pub iterations: usize,
     /// How many it might have taken.
-    pub most: usize,
+    pub max_iterations: usize,
     /// By what the increments shrank.
-    pub rate: f64,
+    pub contraction_rate: f64,
     /// `θ/(1 − θ)`, which carries over to the next step.
-    pub factor: f64,
+    pub eta: f64,
     /// Whether the Jacobian was evaluated for this step, and not kept from an earlier one.
-    pub fresh: bool,
+    pub jacobian_is_current: bool,
     /// The branches of the model where that was.
-    pub branches: Branches,
+    pub jacobian_branches: Branches,
     /// Where the stages are now, and where they were before the last increment.
-    sides: [Sides; 2],
+    crossings: [SurfaceCrossing; 2],
     /// The length of this step,
-    length: f64,
+    step_size: f64,
     /// and that of the last one whose rate was measured.
-    measured_length: f64,
+    measured_step_size: f64,
     /// The last increment and the last rate.
-    last: [f64; 2],
+    last_increment_and_rate: [f64; 2],
 }
 
-impl Default for Convergence {
+impl Default for NewtonMonitor {
     fn default() -> Self {
-        let (most, factor, last) = (EXPECTED_ITERATIONS as usize, Self::UNKNOWN, [0.0; 2]);
+        let (most, factor, last) = (EXPECTED_ITERATIONS as usize, Self::UNKNOWN_ETA, [0.0; 2]);
         Self {
             iterations: 0,
-            most,
-            rate: 0.0,
-            factor,
-            fresh: false,
-            branches: Branches::default(),
-            sides: [Sides::default(); 2],
-            length: 0.0,
-            measured_length: 0.0,
-            last,
+            max_iterations: most,
+            contraction_rate: 0.0,
+            eta: factor,
+            jacobian_is_current: false,
+            jacobian_branches: Branches::default(),
+            crossings: [SurfaceCrossing::default(); 2],
+            step_size: 0.0,
+            measured_step_size: 0.0,
+            last_increment_and_rate: last,
         }
     }
 }
 
-impl Convergence {
+impl NewtonMonitor {
     /// The factor where no step tells: an increment counts as what is left after it.
-    pub(super) const UNKNOWN: f64 = 1.0;
+    pub(super) const UNKNOWN_ETA: f64 = 1.0;
 
     /// Before an iteration for so many stages, in a step of this length.
-    pub(super) fn begin(&mut self, stages: usize, length: f64) {
-        self.length = length;
-        self.most = (EXPECTED_ITERATIONS + ITERATIONS_PER_STAGE * (stages as f64 - 3.0)) as usize;
-        self.factor = Scalar::powf(self.factor.max(f64::EPSILON), 0.8);
-        self.rate = THET;
-        self.sides = [Sides::default(); 2];
-        self.last = [0.0; 2];
+    pub(super) fn begin_iteration(&mut self, stages: usize, length: f64) {
+        self.step_size = length;
+        self.max_iterations = (EXPECTED_ITERATIONS + ITERATIONS_PER_STAGE * (stages as f64 - 3.0)) as usize;
+        self.eta = Scalar::powf(self.eta.max(f64::EPSILON), 0.8);
+        self.contraction_rate = THET;
+        self.crossings = [SurfaceCrossing::default(); 2];
+        self.last_increment_and_rate = [0.0; 2];
     }
 
     /// The stages were moved.
-    pub(super) fn moved(&mut self, to: Sides) {
-        self.sides = [to, self.sides[0]];
+    pub(super) fn record_crossing(&mut self, to: SurfaceCrossing) {
+        self.crossings = [to, self.crossings[0]];
     }
 
     /// After an increment relative to what is tolerated: whether what is left is below the
@@ -121,67 +121,74 @@ impl Convergence {
     ///
     /// # Errors
     /// It does not converge, or not soon enough.
-    pub(super) fn after(&mut self, increment: f64, tolerance: f64) -> Result<bool, Failure> {
-        let (iteration, most, [last, last_rate]) = (self.iterations, self.most, self.last);
-        if iteration > 1 && increment <= NOISE && 2.0 * increment >= last && !self.sides[0].beyond {
+    pub(super) fn check_increment(&mut self, increment: f64, tolerance: f64) -> Result<bool, NewtonFailure> {
+        let (iteration, most, [last, last_rate]) =
+            (self.iterations, self.max_iterations, self.last_increment_and_rate);
+        if iteration > 1
+            && increment <= ROUNDING_INCREMENT
+            && 2.0 * increment >= last
+            && !self.crossings[0].off_jacobian_branch
+        {
             // So does what converges slowly with the Jacobian of an earlier step: the next one gets
             // its own, too.
-            self.rate = 2.0 * THET;
-            return if self.fresh { Ok(true) } else { Err(Failure::Stale) };
+            self.contraction_rate = 2.0 * THET;
+            return if self.jacobian_is_current { Ok(true) } else { Err(NewtonFailure::StaleJacobian) };
         }
         if iteration > 1 && iteration < most {
             let rate = increment / last;
-            self.rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
-            self.last[1] = rate;
+            self.contraction_rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
+            self.last_increment_and_rate[1] = rate;
             // Written so that NaN, after an increment of zero, is no divergence.
-            if self.rate >= 0.99 {
-                return Err(Failure::Diverges);
+            if self.contraction_rate >= 0.99 {
+                return Err(NewtonFailure::Diverges);
             }
-            if self.rate.is_finite() {
-                self.factor = self.rate / (1.0 - self.rate);
+            if self.contraction_rate.is_finite() {
+                self.eta = self.contraction_rate / (1.0 - self.contraction_rate);
                 let left = (most - 1 - iteration) as i32;
-                let expected = self.factor * increment * Scalar::powi(self.rate, left) / tolerance;
+                let expected = self.eta * increment * Scalar::powi(self.contraction_rate, left) / tolerance;
                 if expected >= 1.0 {
                     let excess = expected.min(20.0);
-                    return Err(Failure::Slow(0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left)))));
+                    return Err(NewtonFailure::TooSlow(
+                        0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left))),
+                    ));
                 }
             }
         }
-        self.last[0] = increment.max(f64::EPSILON);
-        Ok(self.factor * increment <= tolerance)
+        self.last_increment_and_rate[0] = increment.max(f64::EPSILON);
+        Ok(self.eta * increment <= tolerance)
     }
 
     /// Whether another increment is to follow a small one: an exact matrix is that of one side of a
     /// border, and a stage has just passed one.
-    pub(super) fn goes_on(&self, exact: bool) -> bool {
-        exact && self.sides[0].passed && self.iterations < self.most
+    pub(super) fn needs_another_iteration(&self, exact: bool) -> bool {
+        exact && self.crossings[0].crossed_last && self.iterations < self.max_iterations
     }
 
     /// Whether it is known how fast the iteration converges, whose last increment is `small` or
     /// not: the matrix is exact, or two increments were compared. The rate of an earlier step holds
     /// on its side of a border, and for steps that are no longer: it grows with their length.
-    pub(super) fn is_measured(&self, exact: bool, small: bool) -> bool {
-        let [now, before] = self.sides;
-        let here = !now.beyond && !before.beyond;
-        let known = small && self.length <= self.measured_length;
-        exact || self.is_compared() || here && (self.iterations > 1 || known)
+    pub(super) fn is_rate_known(&self, exact: bool, small: bool) -> bool {
+        let [now, before] = self.crossings;
+        let here = !now.off_jacobian_branch && !before.off_jacobian_branch;
+        let known = small && self.step_size <= self.measured_step_size;
+        exact || self.has_comparable_increments() || here && (self.iterations > 1 || known)
     }
 
     /// Whether there are two increments that no border is between.
-    fn is_compared(&self) -> bool {
-        self.iterations > 1 && !self.sides[1].passed
+    fn has_comparable_increments(&self) -> bool {
+        self.iterations > 1 && !self.crossings[1].crossed_last
     }
 
     /// The iteration is over.
-    pub(super) fn end(&mut self) {
-        if self.is_compared() {
-            self.measured_length = self.length;
+    pub(super) fn end_iteration(&mut self) {
+        if self.has_comparable_increments() {
+            self.measured_step_size = self.step_size;
         }
     }
 
     /// The last increment was small, and has left this part of the residual.
-    pub(super) fn confirmed(&mut self, rate: f64) {
-        self.factor = self.factor.min(rate);
-        self.measured_length = self.length;
+    pub(super) fn record_confirmed_rate(&mut self, rate: f64) {
+        self.eta = self.eta.min(rate);
+        self.measured_step_size = self.step_size;
     }
 }

@@ -66,15 +66,15 @@ impl Default for AdaptiveOptions {
 
 /// The smallest relative tolerance, in ε: below, rounding errors are taken for errors of the
 /// method.
-const FINEST: f64 = 10.0;
+const MIN_RTOL_ROUNDOFFS: f64 = 10.0;
 
 impl AdaptiveOptions {
     /// # Errors
     /// [`Error::InvalidOption`] for the first value that makes no sense with the number type.
     pub fn check<T: Real>(&self) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
-        check_relative::<T>(self.rtol)?;
-        check_absolute::<T>(self.atol)?;
+        check_rtol::<T>(self.rtol)?;
+        check_atol::<T>(self.atol)?;
         if let Some(step) = self.initial_step
             && !(step > 0.0 && step.is_finite())
         {
@@ -95,8 +95,8 @@ impl AdaptiveOptions {
 
 /// # Errors
 /// [`Error::InvalidOption`]
-pub(super) fn check_relative<T: Real>(rtol: f64) -> Result<(), Error> {
-    if rtol >= FINEST * T::EPSILON && rtol <= 1.0 {
+pub(super) fn check_rtol<T: Real>(rtol: f64) -> Result<(), Error> {
+    if rtol >= MIN_RTOL_ROUNDOFFS * T::EPSILON && rtol <= 1.0 {
         return Ok(());
     }
     Err(Error::InvalidOption {
@@ -108,7 +108,7 @@ pub(super) fn check_relative<T: Real>(rtol: f64) -> Result<(), Error> {
 
 /// # Errors
 /// [`Error::InvalidOption`]
-pub(super) fn check_absolute<T: Real>(atol: f64) -> Result<(), Error> {
+pub(super) fn check_atol<T: Real>(atol: f64) -> Result<(), Error> {
     let number = T::from_f64(atol);
     if number > T::ZERO && number.is_finite() {
         return Ok(());

@@ -1,6 +1,6 @@
 //! The order: methods of a family, opened when they are needed, and which of them is next.
 
-use super::newton_monitor::Convergence;
+use super::newton_monitor::NewtonMonitor;
 use super::replay::StepDifferentiator;
 use super::stages::Stages;
 use crate::error::Error;
@@ -12,13 +12,13 @@ use crate::shape::Matrix;
 use alloc::boxed::Box;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
-const EASY: f64 = 0.01;
+const FAST_CONTRACTION_RATE: f64 = 0.01;
 /// and falls where it converges at this rate or slower,
-const HARD: f64 = 0.8;
+const SLOW_CONTRACTION_RATE: f64 = 0.8;
 /// but grows only if the step size hardly changes,
-const STEADY: (f64, f64) = (0.8, 1.2);
+const STEADY_STEP_RATIO: (f64, f64) = (0.8, 1.2);
 /// and not before so many steps have been taken with it.
-const SETTLED: usize = 5;
+const MIN_STEPS_BEFORE_INCREASE: usize = 5;
 
 /// The methods that an integrator may change between.
 pub trait Family: 'static {
@@ -37,63 +37,64 @@ pub trait Family: 'static {
 
 /// The number of stages, and what speaks for another one.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Order {
-    pub level: usize,
+pub struct OrderSelection {
+    pub order_index: usize,
     /// How fast Newton's method converged.
-    rate: f64,
+    contraction_rate: f64,
     /// How many steps were taken with it.
-    settled: usize,
+    steps_with_order: usize,
     /// Whether an iteration did not converge, or a matrix was singular,
-    pub unexpected: bool,
+    pub iteration_failed: bool,
     /// or converged only with a much shorter step.
-    pub much_shorter: bool,
+    pub step_was_halved: bool,
 }
 
-impl Order {
+impl OrderSelection {
     /// The level for the next matrix, for a step that is `ratio` times as long as the last one.
-    pub fn next(&mut self, convergence: &Convergence, ratio: f64, levels: usize) -> usize {
-        self.settled += 1;
-        self.rate = convergence.rate.max(0.5 * self.rate).min(10.0);
-        let steady = ratio > STEADY.0 && ratio < STEADY.1;
-        let easy = convergence.iterations > 1 && self.rate <= EASY;
-        let hard = self.rate >= HARD || self.unexpected || self.much_shorter;
-        (self.unexpected, self.much_shorter) = (false, false);
+    pub fn select_order(&mut self, convergence: &NewtonMonitor, ratio: f64, levels: usize) -> usize {
+        self.steps_with_order += 1;
+        self.contraction_rate = convergence.contraction_rate.max(0.5 * self.contraction_rate).min(10.0);
+        let steady = ratio > STEADY_STEP_RATIO.0 && ratio < STEADY_STEP_RATIO.1;
+        let easy = convergence.iterations > 1 && self.contraction_rate <= FAST_CONTRACTION_RATE;
+        let hard =
+            self.contraction_rate >= SLOW_CONTRACTION_RATE || self.iteration_failed || self.step_was_halved;
+        (self.iteration_failed, self.step_was_halved) = (false, false);
         if hard {
-            self.level.saturating_sub(1)
-        } else if easy && steady && self.settled > SETTLED {
-            (self.level + 1).min(levels - 1)
+            self.order_index.saturating_sub(1)
+        } else if easy && steady && self.steps_with_order > MIN_STEPS_BEFORE_INCREASE {
+            (self.order_index + 1).min(levels - 1)
         } else {
-            self.level
+            self.order_index
         }
     }
 
     /// Counts a step with the matrix of the last one; whether the number of stages is worth a new
     /// matrix instead.
-    pub fn keeps(&mut self, levels: usize) -> bool {
-        self.settled += 1;
-        self.settled >= SETTLED && self.level + 1 < levels
+    pub fn may_increase_order(&mut self, levels: usize) -> bool {
+        self.steps_with_order += 1;
+        self.steps_with_order >= MIN_STEPS_BEFORE_INCREASE && self.order_index + 1 < levels
     }
 
-    pub fn change(&mut self, level: usize) {
-        (self.level, self.settled) = (level, 1);
+    pub fn set_order(&mut self, level: usize) {
+        (self.order_index, self.steps_with_order) = (level, 1);
     }
 }
 
 /// The levels of a family that are in use.
 pub struct Orders<M: Dae, T: Real> {
-    open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
+    methods: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
 }
 
 impl<M: Dae, T: Real> Default for Orders<M, T> {
     fn default() -> Self {
-        Self { open: [None, None, None] }
+        Self { methods: [None, None, None] }
     }
 }
 
 impl<M: Dae, T: Real> Orders<M, T> {
     pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
         let missing = Error::OutOfMemory { bytes: 0 };
-        let place = self.open.get_mut(level).ok_or(missing)?;
+        let place = self.methods.get_mut(level).ok_or(missing)?;
         if place.is_none() {
             *place = Some(B::open::<M, T>(level)?);
         }
@@ -104,10 +105,10 @@ impl<M: Dae, T: Real> Orders<M, T> {
     }
 
     /// The last accepted step of one level becomes that of another.
-    pub fn change<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
+    pub fn transfer_last_step<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
         self.get::<B>(from)?;
         self.get::<B>(to)?;
-        let [first, second, third] = &mut self.open;
+        let [first, second, third] = &mut self.methods;
         let (old, new) = match (from, to) {
             (0, 1) => (first, second),
             (1, 0) => (second, first),
@@ -116,7 +117,7 @@ impl<M: Dae, T: Real> Orders<M, T> {
             _ => return Ok(()),
         };
         if let (Some(old), Some(new)) = (old, new) {
-            new.adopt(&**old);
+            new.adopt_last_step(&**old);
         }
         Ok(())
     }
@@ -124,7 +125,7 @@ impl<M: Dae, T: Real> Orders<M, T> {
 
 /// `Σ_i weight_i y_i`, a loop of its own, which is not unrolled.
 #[inline(never)]
-pub(super) fn weighted<T: Real>(weights: &[f64], y: &[T]) -> T {
+pub(super) fn weighted_sum<T: Real>(weights: &[f64], y: &[T]) -> T {
     weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
 }
 
@@ -133,7 +134,7 @@ pub(super) fn weighted<T: Real>(weights: &[f64], y: &[T]) -> T {
 ///
 /// # Errors
 /// [`Error::Overflow`]
-pub(super) fn interpolate<M: Dae, T: Real>(
+pub(super) fn interpolate_step<M: Dae, T: Real>(
     stages: &dyn Stages<M, T>,
     x: &[T],
     y: &[T],
@@ -143,12 +144,12 @@ pub(super) fn interpolate<M: Dae, T: Real>(
 ) -> Result<(), Error> {
     let theta = (passed / h).to_f64();
     let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
-    let mut unknowns = y.chunks_exact(stages.count());
+    let mut unknowns = y.chunks_exact(stages.stage_count());
     for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
-        *to = *x + h * weighted(&weights, k);
+        *to = *x + h * weighted_sum(&weights, k);
     }
     for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
-        *to = weighted(&lagrange, z);
+        *to = weighted_sum(&lagrange, z);
     }
     check_output(dense.x.as_slice(), 0)?;
     check_output(dense.z.as_slice(), 0)

@@ -4,15 +4,15 @@
 //! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5,
 //! II.6 and II.10; the coefficients of the codes DOPRI5 and DOP853.
 
-use crate::adaptive::step_size::Control;
+use crate::adaptive::step_size::PiParameters;
 use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 
 /// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the
 /// end of the step.
-pub trait Pair<const S: usize>: Method<S> {
+pub trait EmbeddedPair<const S: usize>: Method<S> {
     /// The difference to the other method: of the stages, and of the one at the end.
-    const DIFFERENCE: ([f64; S], f64);
+    const ERROR_COEFFICIENTS: ([f64; S], f64);
     /// The difference to a third one of low order: the estimate is then that of higher order, as
     /// far as the two agree.
     const THIRD_ORDER: Option<[f64; S]>;
@@ -31,16 +31,16 @@ pub trait Pair<const S: usize>: Method<S> {
         last
     };
     /// How the step size follows the error.
-    const CONTROL: Control;
+    const CONTROL: PiParameters;
     /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one
     /// at the end and of the ones before it.
-    const DENSE_STAGES: &'static [More<S>];
+    const DENSE_STAGES: &'static [DenseStage<S>];
     /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end,
     /// of those above.
-    const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
+    const DENSE_POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
 
     /// The estimate from the two differences; what is not finite stays so.
-    fn combined(fine: f64, coarse: Option<f64>) -> f64 {
+    fn combined_estimate(fine: f64, coarse: Option<f64>) -> f64 {
         let Some(coarse) = coarse else { return fine };
         let both = fine * fine + 0.01 * coarse * coarse;
         if both > 0.0 && both.is_finite() { fine * fine / Scalar::sqrt(both) } else { both }
@@ -52,9 +52,9 @@ pub trait Pair<const S: usize>: Method<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct GlobalErrorFactor {
     /// Once for so many steps of this length as the interval has,
-    pub steps: f64,
+    pub steps_per_unit: f64,
     /// but no more often than the first number; in long intervals, than up to the second one:
-    pub most: (f64, f64),
+    pub max_factor: (f64, f64),
     /// once for so many steps of a run with a tolerance of one, whatever the tolerance is. Over an
     /// oscillation, errors of a step in tolerances add up to the same at every tolerance, since
     /// the error is of one order more than the estimate.
@@ -64,37 +64,43 @@ pub struct GlobalErrorFactor {
 impl GlobalErrorFactor {
     /// In an interval of so many steps, each `unit` times as long as with a tolerance of one; once
     /// at least.
-    pub fn count(&self, steps: f64, unit: f64) -> f64 {
-        let most = (steps * unit / self.unit_steps).clamp(self.most.0, self.most.1);
-        (steps / self.steps).min(most).max(1.0)
+    pub fn evaluate(&self, steps: f64, unit: f64) -> f64 {
+        let most = (steps * unit / self.unit_steps).clamp(self.max_factor.0, self.max_factor.1);
+        (steps / self.steps_per_unit).min(most).max(1.0)
     }
 }
 
 /// A stage for dense output.
-pub struct More<const S: usize> {
+pub struct DenseStage<const S: usize> {
     /// `c`
     pub node: f64,
     /// Of the stages.
     pub stages: [f64; S],
     /// Of the one at the end.
-    pub end: f64,
+    pub end_coefficient: f64,
     /// Of the stages for dense output before it.
-    pub more: [f64; 2],
+    pub dense_coefficients: [f64; 2],
 }
 
-impl Pair<6> for DormandPrince5 {
-    const DIFFERENCE: ([f64; 6], f64) = (
+impl EmbeddedPair<6> for DormandPrince5 {
+    const ERROR_COEFFICIENTS: ([f64; 6], f64) = (
         [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0],
         -1.0 / 40.0,
     );
     const THIRD_ORDER: Option<[f64; 6]> = None;
     const GLOBAL_ERROR_FACTOR: GlobalErrorFactor =
-        GlobalErrorFactor { steps: 180.0, most: (16.0, 16.0), unit_steps: 1.0 };
+        GlobalErrorFactor { steps_per_unit: 180.0, max_factor: (16.0, 16.0), unit_steps: 1.0 };
     const STABILITY_BOUND: f64 = 3.25;
-    const CONTROL: Control =
-        Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
-    const DENSE_STAGES: &'static [More<6>] = &[];
-    const POLYNOMIAL: &'static [([f64; 6], f64, [f64; 3])] = &[(
+    const CONTROL: PiParameters = PiParameters {
+        order: 5.0,
+        beta: 0.04,
+        initial_error: 1e-4,
+        safety: 0.9,
+        uses_prediction: false,
+        factor_range: (0.2, 10.0),
+    };
+    const DENSE_STAGES: &'static [DenseStage<6>] = &[];
+    const DENSE_POLYNOMIAL: &'static [([f64; 6], f64, [f64; 3])] = &[(
         [
             -12715105075.0 / 11282082432.0,
             0.0,
@@ -108,8 +114,8 @@ impl Pair<6> for DormandPrince5 {
     )];
 }
 
-impl Pair<12> for DormandPrince8 {
-    const DIFFERENCE: ([f64; 12], f64) = (
+impl EmbeddedPair<12> for DormandPrince8 {
+    const ERROR_COEFFICIENTS: ([f64; 12], f64) = (
         [
             0.01312004499419488,
             0.0,
@@ -134,19 +140,19 @@ impl Pair<12> for DormandPrince8 {
         Some(coarse)
     };
     const GLOBAL_ERROR_FACTOR: GlobalErrorFactor =
-        GlobalErrorFactor { steps: 10.0, most: (16.0, 40.0), unit_steps: 40.0 };
+        GlobalErrorFactor { steps_per_unit: 10.0, max_factor: (16.0, 40.0), unit_steps: 40.0 };
     const STABILITY_BOUND: f64 = 6.1;
     // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
-    const CONTROL: Control = Control {
+    const CONTROL: PiParameters = PiParameters {
         order: 8.0,
-        memory: 0.05,
-        before: 1.0,
+        beta: 0.05,
+        initial_error: 1.0,
         safety: 0.965,
-        predicts: true,
-        range: (1.0 / 3.0, 6.0),
+        uses_prediction: true,
+        factor_range: (1.0 / 3.0, 6.0),
     };
-    const DENSE_STAGES: &'static [More<12>] = &[
-        More {
+    const DENSE_STAGES: &'static [DenseStage<12>] = &[
+        DenseStage {
             node: 0.1,
             stages: [
                 0.056167502283047954,
@@ -162,10 +168,10 @@ impl Pair<12> for DormandPrince8 {
                 0.00820105229563469,
                 0.007567897660545699,
             ],
-            end: -0.008298,
-            more: [0.0; 2],
+            end_coefficient: -0.008298,
+            dense_coefficients: [0.0; 2],
         },
-        More {
+        DenseStage {
             node: 0.2,
             stages: [
                 0.03183464816350214,
@@ -181,10 +187,10 @@ impl Pair<12> for DormandPrince8 {
                 -0.00010834732869724932,
                 0.0003825710908356584,
             ],
-            end: -0.00034046500868740456,
-            more: [0.1413124436746325, 0.0],
+            end_coefficient: -0.00034046500868740456,
+            dense_coefficients: [0.1413124436746325, 0.0],
         },
-        More {
+        DenseStage {
             node: 7.0 / 9.0,
             stages: [
                 -0.42889630158379194,
@@ -200,11 +206,11 @@ impl Pair<12> for DormandPrince8 {
                 0.0,
                 0.0,
             ],
-            end: -0.0013990241651590145,
-            more: [2.9475147891527724, -9.15095847217987],
+            end_coefficient: -0.0013990241651590145,
+            dense_coefficients: [2.9475147891527724, -9.15095847217987],
         },
     ];
-    const POLYNOMIAL: &'static [([f64; 12], f64, [f64; 3])] = &[
+    const DENSE_POLYNOMIAL: &'static [([f64; 12], f64, [f64; 3])] = &[
         (
             [
                 -8.428938276109013,
@@ -286,9 +292,9 @@ mod tests {
 
     /// Over more oscillations errors count more often, over as many with more steps as often.
     #[test]
-    fn long_intervals_count_more_often() {
-        let factor = <DormandPrince8 as Pair<12>>::GLOBAL_ERROR_FACTOR;
-        let count = |steps: f64, tolerance: f64| factor.count(steps, f64::powf(tolerance, 0.125));
+    fn global_error_factor_of_long_intervals() {
+        let factor = <DormandPrince8 as EmbeddedPair<12>>::GLOBAL_ERROR_FACTOR;
+        let count = |steps: f64, tolerance: f64| factor.evaluate(steps, f64::powf(tolerance, 0.125));
         assert_eq!(count(5.0, 1e-8), 1.0);
         assert_eq!(count(50.0, 1e-8), 5.0);
         assert_eq!([count(1000.0, 1e-8), count(1000.0, 1e-4)], [16.0; 2]);
@@ -298,8 +304,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_no_error_of_zero() {
-        let combined = <DormandPrince8 as Pair<12>>::combined;
+    fn combined_estimate_of_non_finite_differences() {
+        let combined = <DormandPrince8 as EmbeddedPair<12>>::combined_estimate;
         assert_eq!((combined(0.0, Some(0.0)), combined(0.3, Some(0.0))), (0.0, 0.3));
         assert!((combined(0.3, Some(4.0)) - 0.09 / 0.5).abs() < 1e-15);
         for [fine, coarse] in [[f64::NAN, 1.0], [1.0, f64::NAN], [1.0, f64::INFINITY], [1e200, 1.0]] {

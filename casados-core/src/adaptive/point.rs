@@ -5,7 +5,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
 /// A point in time at which the state is known.
-pub struct At<'a, M: Dae, T: Real> {
+pub struct ModelPoint<'a, M: Dae, T: Real> {
     pub x: &'a VectorX<M, T>,
     pub u: &'a VectorU<M, T>,
     pub p: &'a VectorP<M, T>,
@@ -13,12 +13,12 @@ pub struct At<'a, M: Dae, T: Real> {
 }
 
 /// Where an unknown of `(ẋ, z)` lies among the variables `(ẋ, x, z, u, p, t)`.
-pub(super) const fn variable<M: Dae>(unknown: usize) -> usize {
+pub(super) const fn variable_of_unknown<M: Dae>(unknown: usize) -> usize {
     if unknown < M::Shape::NX { unknown } else { unknown + M::Shape::NX }
 }
 
 /// Writes `u` and `p` to where they lie in the variables of a model: after `(ẋ, x, z)`.
-pub(super) fn place_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
+pub(super) fn write_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
     let begin = 2 * M::Shape::NX + M::Shape::NZ;
     for (to, from) in point.iter_mut().skip(begin).zip(u.as_slice().iter().chain(p.as_slice())) {
         *to = *from;

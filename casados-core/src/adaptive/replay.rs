@@ -4,7 +4,7 @@
 //! Nothing here is called through a table of functions: a program contains the derivatives that it
 //! asks for, and no others.
 
-use super::point::At;
+use super::point::ModelPoint;
 use crate::error::Error;
 use crate::integrator::Integrator as _;
 use crate::irk::Integrator;
@@ -22,16 +22,16 @@ use alloc::boxed::Box;
 /// A step that was taken.
 pub struct AcceptedStep<'a, M: Dae, T: Real> {
     /// Its start.
-    pub at: At<'a, M, T>,
+    pub start: ModelPoint<'a, M, T>,
     /// Its length.
     pub h: T,
     /// The unknowns of its stages, or values near them.
-    pub y: &'a [T],
+    pub stage_unknowns: &'a [T],
     /// Which method of the family took it.
-    pub level: usize,
+    pub order_index: usize,
     /// Whether these values are those of the step but for their last digits: then the step is
     /// differentiated at them where Newton's method leads away, and never fails to converge.
-    pub near: bool,
+    pub stages_are_solved: bool,
 }
 
 /// Takes steps of given size.
@@ -43,7 +43,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     fn solve(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error>;
     /// The same with derivatives.
     ///
@@ -52,7 +52,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
     fn forward(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
     /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for
     /// each direction.
@@ -73,7 +73,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
     /// The gradient of `λᵀx` at its end.
     ///
@@ -83,7 +83,7 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>;
     /// The unknowns of the stages that a method of the family found last.
     ///
@@ -94,13 +94,13 @@ pub trait StepDifferentiator<M: Dae, T: Real> {
 
 /// What differentiates a step, whatever the method is: a program that does not ask for it contains
 /// none of it.
-pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
+pub trait DynStepDifferentiator<M: Dae, T: Real>: Send + Sync {
     /// # Errors
     /// Those of Newton's method; a singular matrix.
     fn forward(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&Forward<M, T>, Error>;
     /// # Errors
     /// [`Error::NoResult`]
-    fn slopes(
+    fn rate_derivatives(
         &mut self,
         level: usize,
         weights: &[f64],
@@ -109,10 +109,10 @@ pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
 }
 
 /// The integrator of one step.
-type Step<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
+type OneStepIntegrator<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap<OneStep>>;
 
 /// That of the method `B` with `S` stages, from its first call on.
-pub struct OneMethod<M: Dae, B, T: Real, const S: usize>(Option<Box<Step<M, B, T, S>>>);
+pub struct OneMethod<M: Dae, B, T: Real, const S: usize>(Option<Box<OneStepIntegrator<M, B, T, S>>>);
 
 impl<M: Dae, B, T: Real, const S: usize> Default for OneMethod<M, B, T, S> {
     fn default() -> Self {
@@ -122,7 +122,10 @@ impl<M: Dae, B, T: Real, const S: usize> Default for OneMethod<M, B, T, S> {
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
     /// At the start of a step.
-    fn go(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Step<M, B, T, S>, Error> {
+    fn prepare_step(
+        &mut self,
+        step: &AcceptedStep<'_, M, T>,
+    ) -> Result<&mut OneStepIntegrator<M, B, T, S>, Error> {
         let single = match &mut self.0 {
             Some(single) => single,
             none => {
@@ -131,11 +134,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> OneMethod<M, B, T, S> {
             }
         };
         if M::Shape::NP > 0 {
-            single.set_parameters(step.at.p)?;
+            single.set_parameters(step.start.p)?;
         }
-        single.set_time(step.at.t)?;
-        single.run.set_stages(step.y)?;
-        single.run.set_near(step.near)?;
+        single.set_time(step.start.t)?;
+        single.run.set_stages(step.stage_unknowns)?;
+        single.run.set_start_near_solution(step.stages_are_solved)?;
         Ok(single)
     }
 }
@@ -144,39 +147,52 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> StepDifferentiator<M, T> for
     fn solve(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.go(step)?.solve_with_quadrature(step.at.x, step.at.u, step.h, along)
+        self.prepare_step(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
     }
 
     fn forward(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        self.go(step)?.forward_refined(step.at.x, step.at.u, step.h, along)
+        self.prepare_step(step)?.forward_refined(step.start.x, step.start.u, step.h, integrand)
     }
 
     fn hessian(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.go(step)?.hessian_with_quadrature(step.at.x, step.at.u, step.h, lambda, &[], along)
+        self.prepare_step(step)?.hessian_with_quadrature(
+            step.start.x,
+            step.start.u,
+            step.h,
+            lambda,
+            &[],
+            integrand,
+        )
     }
 
     fn adjoint(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.go(step)?.adjoint_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
+        self.prepare_step(step)?.adjoint_with_quadrature(
+            step.start.x,
+            step.start.u,
+            step.h,
+            lambda,
+            integrand,
+        )
     }
 
     fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {
-        self.0.as_mut().ok_or(Error::NoResult)?.slopes(weights, to)
+        self.0.as_mut().ok_or(Error::NoResult)?.slope_derivatives(weights, to)
     }
 
     fn stages(&mut self, _: usize) -> Result<&[T], Error> {
@@ -205,35 +221,35 @@ impl<M: Dae, T: Real, A: StepDifferentiator<M, T>, B: StepDifferentiator<M, T>, 
     fn solve(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        of_level!(self, step.level, solve(step, along))
+        of_level!(self, step.order_index, solve(step, integrand))
     }
 
     fn forward(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        of_level!(self, step.level, forward(step, along))
+        of_level!(self, step.order_index, forward(step, integrand))
     }
 
     fn hessian(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        of_level!(self, step.level, hessian(step, lambda, along))
+        of_level!(self, step.order_index, hessian(step, lambda, integrand))
     }
 
     fn adjoint(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        of_level!(self, step.level, adjoint(step, lambda, along))
+        of_level!(self, step.order_index, adjoint(step, lambda, integrand))
     }
 
     fn slopes(

@@ -1,9 +1,9 @@
 //! The steps of one of several intervals that follow each other.
 
 use super::engine::Engine;
-use super::integrator::{Integrator, inside};
-use super::point::place_inputs;
-use super::sensitivities::{Frozen, Memory};
+use super::integrator::{Integrator, is_inside_interval};
+use super::point::write_inputs;
+use super::sensitivities::{RecordedSteps, SensitivityMemory};
 use super::step::Span;
 use super::tape::Tape;
 use crate::error::{Argument, Error};
@@ -19,32 +19,32 @@ use bytemuck::Zeroable;
 pub(super) struct Segment<M: Dae, T: Real> {
     pub tape: Tape<T>,
     /// See [`Frozen::chosen`].
-    pub chosen: bool,
+    pub steps_were_chosen: bool,
     pub span: Span<T>,
     /// That of steps that are kept, where these are stretched.
-    pub kept: Span<T>,
+    pub frozen_span: Span<T>,
     pub u: VectorU<M, T>,
     pub x: VectorX<M, T>,
     /// Start values of `(ẋ, z)`.
-    pub given: ArrayK<M, T>,
+    pub start_guess: ArrayK<M, T>,
     /// Derivatives at the start of each step.
-    pub history: Vec<T>,
+    pub step_sensitivities: Vec<T>,
     /// `V_k`, row after row.
-    pub v: Vec<T>,
+    pub start_sensitivities: Vec<T>,
 }
 
 impl<M: Dae, T: Real> Default for Segment<M, T> {
     fn default() -> Self {
         Self {
             tape: Tape::default(),
-            chosen: false,
+            steps_were_chosen: false,
             span: Span { start: T::ZERO, end: T::ZERO },
-            kept: Span { start: T::ZERO, end: T::ZERO },
+            frozen_span: Span { start: T::ZERO, end: T::ZERO },
             u: Zeroable::zeroed(),
             x: Zeroable::zeroed(),
-            given: Zeroable::zeroed(),
-            history: Vec::new(),
-            v: Vec::new(),
+            start_guess: Zeroable::zeroed(),
+            step_sensitivities: Vec::new(),
+            start_sensitivities: Vec::new(),
         }
     }
 }
@@ -52,16 +52,33 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
 impl<M: Dae, T: Real> Segment<M, T> {
     /// The steps of this interval, to be taken again and differentiated; `V_k`.
     #[allow(clippy::type_complexity)]
-    pub fn open<'a, B: Engine<M, T>>(
+    pub fn load<'a, B: Engine<M, T>>(
         &'a mut self,
         integrator: &'a mut Integrator<M, B, T>,
-    ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
-        let Integrator { base, consistent, state, memory, .. } = integrator;
+    ) -> Result<(RecordedSteps<'a, M, T>, &'a mut B::State, &'a mut SensitivityMemory<M, T>, &'a [T]), Error>
+    {
+        let Integrator {
+            workspace: base, consistent, method_state: state, derivative_memory: memory, ..
+        } = integrator;
         base.u = self.u;
-        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+        let missing = Error::OutOfMemory { bytes: size_of::<SensitivityMemory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        let Self { tape, chosen, span, given, v, .. } = self;
-        Ok((Frozen { base, consistent, tape, span: *span, given: *given, chosen: *chosen }, state, memory, v))
+        let Self {
+            tape, steps_were_chosen: chosen, span, start_guess: given, start_sensitivities: v, ..
+        } = self;
+        Ok((
+            RecordedSteps {
+                workspace: base,
+                consistent,
+                tape,
+                span: *span,
+                start_guess: *given,
+                steps_were_chosen: *chosen,
+            },
+            state,
+            memory,
+            v,
+        ))
     }
 }
 
@@ -69,7 +86,7 @@ impl<M: Dae, T: Real> Segment<M, T> {
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]
-pub(super) fn add<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -> Result<(), Error> {
+pub(super) fn push_segment<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -> Result<(), Error> {
     push(segments, Segment::default())
 }
 
@@ -77,7 +94,7 @@ pub(super) fn add<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -> Result<
 ///
 /// # Errors
 /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
-pub(super) fn dense<'a, M: Dae, B: Engine<M, T>, T: Real>(
+pub(super) fn dense_at<'a, M: Dae, B: Engine<M, T>, T: Real>(
     integrator: &'a mut Integrator<M, B, T>,
     segments: &mut [Segment<M, T>],
     end: &Nominal<M, T>,
@@ -89,28 +106,28 @@ pub(super) fn dense<'a, M: Dae, B: Engine<M, T>, T: Real>(
     };
     let (start, last) = (first.span.start.to_f64(), last.span.end.to_f64());
     let outside = Error::OutsideInterval { t: t.to_f64(), start, end: last };
-    let holds = |segment: &&mut Segment<M, T>| inside(t, segment.span.start, segment.span.end);
+    let holds = |segment: &&mut Segment<M, T>| is_inside_interval(t, segment.span.start, segment.span.end);
     let segment = segments.iter_mut().find(holds);
     let segment = segment.ok_or(outside)?;
     if segment.tape.entries().is_empty() {
         // An interval without length; `z` there is that of the end, if all are.
-        (integrator.base.dense.x, integrator.base.dense.z) = (segment.x, end.z);
-        return Ok(&integrator.base.dense);
+        (integrator.workspace.dense.x, integrator.workspace.dense.z) = (segment.x, end.z);
+        return Ok(&integrator.workspace.dense);
     }
-    let parameters = integrator.base.parameters;
-    place_inputs::<M, T>(integrator.base.point.as_mut(), &segment.u, &parameters);
+    let parameters = integrator.workspace.parameters;
+    write_inputs::<M, T>(integrator.workspace.point.as_mut(), &segment.u, &parameters);
     core::mem::swap(&mut integrator.tape, &mut segment.tape);
     let result = integrator.dense_in(segment.span, t).map(|_| ());
     core::mem::swap(&mut integrator.tape, &mut segment.tape);
     result?;
-    Ok(&integrator.base.dense)
+    Ok(&integrator.workspace.dense)
 }
 
 /// # Errors
 /// [`Error::OutOfMemory`]
-pub(super) fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
+pub(super) fn filled_vec<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
     let mut list = Vec::new();
-    refill(&mut list, length, value)?;
+    refill_vec(&mut list, length, value)?;
     Ok(list)
 }
 
@@ -118,7 +135,7 @@ pub(super) fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> 
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]
-pub(super) fn refill<V: Copy>(list: &mut Vec<V>, length: usize, value: V) -> Result<(), Error> {
+pub(super) fn refill_vec<V: Copy>(list: &mut Vec<V>, length: usize, value: V) -> Result<(), Error> {
     let bytes = length.saturating_mul(size_of::<V>());
     list.clear();
     list.try_reserve_exact(length).map_err(|_| Error::OutOfMemory { bytes })?;

@@ -13,9 +13,9 @@ pub struct Entry<T> {
     /// Its length.
     pub h: T,
     /// Which method of the family took it.
-    pub level: usize,
+    pub order_index: usize,
     /// Where its numbers begin.
-    begin: usize,
+    offset: usize,
 }
 
 /// Steps one after the other, with the numbers of each: the states at its start, then the unknowns
@@ -24,15 +24,20 @@ pub struct Entry<T> {
 pub struct Tape<T> {
     entries: Vec<Entry<T>>,
     /// As they were when they were kept.
-    kept: Vec<Entry<T>>,
+    frozen_entries: Vec<Entry<T>>,
     numbers: Vec<T>,
     /// The numbers of steps that are being taken again.
-    again: Vec<T>,
+    replayed_numbers: Vec<T>,
 }
 
 impl<T> Default for Tape<T> {
     fn default() -> Self {
-        Self { entries: Vec::new(), kept: Vec::new(), numbers: Vec::new(), again: Vec::new() }
+        Self {
+            entries: Vec::new(),
+            frozen_entries: Vec::new(),
+            numbers: Vec::new(),
+            replayed_numbers: Vec::new(),
+        }
     }
 }
 
@@ -52,22 +57,22 @@ impl<T: Real> Tape<T> {
         let begin = self.numbers.len();
         extend(&mut self.numbers, x)?;
         extend(&mut self.numbers, stages)?;
-        push(&mut self.entries, Entry { t, h, level, begin })
+        push(&mut self.entries, Entry { t, h, order_index: level, offset: begin })
     }
 
     /// The states at the start of a step, and the unknowns of its stages.
-    pub fn numbers(&self, step: usize, states: usize) -> (&[T], &[T]) {
-        let begin = self.entries.get(step).map_or(self.numbers.len(), |entry| entry.begin);
-        let end = self.entries.get(step + 1).map_or(self.numbers.len(), |entry| entry.begin);
+    pub fn step_numbers(&self, step: usize, states: usize) -> (&[T], &[T]) {
+        let begin = self.entries.get(step).map_or(self.numbers.len(), |entry| entry.offset);
+        let end = self.entries.get(step + 1).map_or(self.numbers.len(), |entry| entry.offset);
         let numbers = self.numbers.get(begin..end).unwrap_or_default();
         numbers.split_at(states.min(numbers.len()))
     }
 
     /// The last step has another length, and stages to it.
-    pub fn set_last(&mut self, h: T, states: usize, stages: &[T]) {
+    pub fn replace_last_step(&mut self, h: T, states: usize, stages: &[T]) {
         let Some(entry) = self.entries.last_mut() else { return };
         entry.h = h;
-        let numbers = self.numbers.iter_mut().skip(entry.begin + states);
+        let numbers = self.numbers.iter_mut().skip(entry.offset + states);
         for (to, from) in numbers.zip(stages) {
             *to = *from;
         }
@@ -77,47 +82,49 @@ impl<T: Real> Tape<T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn keep(&mut self) -> Result<(), Error> {
-        self.kept.clear();
-        extend(&mut self.kept, &self.entries)
+    pub fn freeze(&mut self) -> Result<(), Error> {
+        self.frozen_entries.clear();
+        extend(&mut self.frozen_entries, &self.entries)
     }
 
     /// The steps that were kept fill another interval, each its part of it; whatever they were
     /// stretched to before.
     pub fn stretch(&mut self, start: T, end: T) {
-        let (Some(first), Some(last)) = (self.kept.first(), self.kept.last()) else { return };
+        let (Some(first), Some(last)) = (self.frozen_entries.first(), self.frozen_entries.last()) else {
+            return;
+        };
         let (begin, length) = (first.t, last.t + last.h - first.t);
         let factor = (end - start) / length;
         if factor.is_finite() {
-            for (entry, kept) in self.entries.iter_mut().zip(&self.kept) {
+            for (entry, kept) in self.entries.iter_mut().zip(&self.frozen_entries) {
                 (entry.t, entry.h) = (start + factor * (kept.t - begin), factor * kept.h);
             }
         }
     }
 
     /// The steps are taken again:
-    pub fn rewrite(&mut self) {
-        self.again.clear();
+    pub fn begin_replay(&mut self) {
+        self.replayed_numbers.clear();
     }
 
     /// one after the other, all of the same lengths as before;
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn write(&mut self, x: &[T], stages: &[T]) -> Result<(), Error> {
-        extend(&mut self.again, x)?;
-        extend(&mut self.again, stages)
+    pub fn write_replayed_step(&mut self, x: &[T], stages: &[T]) -> Result<(), Error> {
+        extend(&mut self.replayed_numbers, x)?;
+        extend(&mut self.replayed_numbers, stages)
     }
 
     /// and then they count.
-    pub fn commit(&mut self) {
-        if self.again.len() == self.numbers.len() {
-            core::mem::swap(&mut self.again, &mut self.numbers);
+    pub fn commit_replay(&mut self) {
+        if self.replayed_numbers.len() == self.numbers.len() {
+            core::mem::swap(&mut self.replayed_numbers, &mut self.numbers);
         }
     }
 
     /// The step that contains a time; the last one that begins before it.
-    pub fn find(&self, t: T) -> usize {
+    pub fn find_step(&self, t: T) -> usize {
         let forward = self.entries.first().is_none_or(|entry| entry.h >= T::ZERO);
         let after = self.entries.partition_point(|entry| if forward { entry.t <= t } else { entry.t >= t });
         after.saturating_sub(1)

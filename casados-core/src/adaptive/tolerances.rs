@@ -26,7 +26,7 @@ pub struct Tolerances<M: Dae, T: Plain> {
     pub rtol: ArrayK<M, T>,
     pub atol: ArrayK<M, T>,
     /// as the estimate needs them, relative and absolute,
-    pub estimator: ArrayK<M, (T, T)>,
+    pub estimator_tolerances: ArrayK<M, (T, T)>,
     /// the reciprocals of the errors that it tolerates,
     pub scale: ArrayK<M, T>,
     /// and how many times as large those of the tolerances are that were asked for.
@@ -36,7 +36,7 @@ pub struct Tolerances<M: Dae, T: Plain> {
     /// The estimate behaves like `h` to this power.
     pub estimate_order: f64,
     /// Where Newton's method may stop.
-    pub newton: f64,
+    pub newton_tolerance: f64,
     /// Estimated errors that are smaller are of rounding.
     pub noise: f64,
 }
@@ -44,11 +44,20 @@ pub struct Tolerances<M: Dae, T: Plain> {
 impl<M: Dae, T: Real> Tolerances<M, T> {
     /// Those of a method with so many stages: its estimate is of order `s`, its steps of `2s − 1`
     /// or more.
-    pub fn tighten(&mut self, stages: usize, damps: bool) {
+    pub fn set_estimator_tolerances(&mut self, stages: usize, damps: bool) {
         let s = stages as f64;
         self.estimate_order = s + 1.0;
         let exponent = (s + 1.0) / (2.0 * s);
-        let Self { estimator, user_ratio, tolerance_ratio, rtol, atol, newton, noise, .. } = self;
+        let Self {
+            estimator_tolerances: estimator,
+            user_ratio,
+            tolerance_ratio,
+            rtol,
+            atol,
+            newton_tolerance: newton,
+            noise,
+            ..
+        } = self;
         let mut finest: f64 = 1.0;
         *tolerance_ratio = 0.0;
         let mut before = (T::ZERO, T::ZERO);
@@ -81,15 +90,15 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
     }
 
     /// What the estimate tolerates at these `(x, z)`.
-    pub fn measure(&mut self, states: &[T]) {
-        let Self { estimator, scale, .. } = self;
+    pub fn update_scales(&mut self, states: &[T]) {
+        let Self { estimator_tolerances: estimator, scale, .. } = self;
         for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(estimator.as_ref()).zip(states) {
             *scale = T::ONE / (*atol + *rtol * state.abs());
         }
     }
 
     /// What the user tolerates at these `(x, z)`.
-    pub fn measure_user(&mut self, states: &[T]) {
+    pub fn update_user_scales(&mut self, states: &[T]) {
         let Self { rtol, atol, scale, .. } = self;
         let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
         for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tolerances).zip(states) {
@@ -99,17 +108,21 @@ impl<M: Dae, T: Real> Tolerances<M, T> {
 }
 
 /// Loops over more elements are functions of their own, and not unrolled.
-pub(super) const FEW: usize = 6;
+pub(super) const MAX_UNROLLED_LENGTH: usize = 6;
 
 /// `√(Σ (v/scale)² / n)`, with the reciprocals of the scales.
 #[inline(always)]
 pub(super) fn norm<T: Real>(values: &[T], scale: &[T]) -> f64 {
-    let sum = if values.len() <= FEW { squares(values, scale) } else { many_squares(values, scale) };
-    mean(sum.to_f64(), values.len())
+    let sum = if values.len() <= MAX_UNROLLED_LENGTH {
+        sum_of_squares(values, scale)
+    } else {
+        looped_sum_of_squares(values, scale)
+    };
+    root_mean_square(sum.to_f64(), values.len())
 }
 
 #[inline(always)]
-fn squares<T: Real>(values: &[T], scale: &[T]) -> T {
+fn sum_of_squares<T: Real>(values: &[T], scale: &[T]) -> T {
     let mut sum = T::ZERO;
     for (value, scale) in values.iter().zip(scale) {
         let relative = *value * *scale;
@@ -119,11 +132,11 @@ fn squares<T: Real>(values: &[T], scale: &[T]) -> T {
 }
 
 #[inline(never)]
-fn many_squares<T: Real>(values: &[T], scale: &[T]) -> T {
-    squares(values, scale)
+fn looped_sum_of_squares<T: Real>(values: &[T], scale: &[T]) -> T {
+    sum_of_squares(values, scale)
 }
 
 /// The root of a mean of squares.
-pub(super) fn mean(sum: f64, count: usize) -> f64 {
+pub(super) fn root_mean_square(sum: f64, count: usize) -> f64 {
     Scalar::sqrt(sum / count.max(1) as f64)
 }

@@ -17,12 +17,12 @@
 
 use super::consistent::Consistent;
 use super::error_estimate::RelativeErrors;
-use super::newton_monitor::Failure;
-use super::pairs::Pair;
-use super::point::At;
-use super::replay::{AcceptedStep, Differentiate};
-use super::stages::{FilteredDefect, MOST, Stages, StepContext};
-use super::tolerances::{Tolerances, mean};
+use super::newton_monitor::NewtonFailure;
+use super::pairs::EmbeddedPair;
+use super::point::ModelPoint;
+use super::replay::{AcceptedStep, DynStepDifferentiator};
+use super::stages::{FilteredDefect, MAX_STAGES, Stages, StepContext};
+use super::tolerances::{Tolerances, root_mean_square};
 use crate::error::Error;
 use crate::linalg::axpy;
 use crate::memory::allocate;
@@ -36,14 +36,14 @@ use bytemuck::Zeroable;
 /// Memory of derivatives, a row for each direction.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-struct Memory<M: Dae, T: Plain> {
+struct VariationalMemory<M: Dae, T: Plain> {
     /// Of `(x, z)` at the start of the step, and at its end.
-    before: ArrayW<M, ArrayK<M, T>>,
-    after: ArrayW<M, ArrayK<M, T>>,
+    start_sensitivities: ArrayW<M, ArrayK<M, T>>,
+    end_sensitivities: ArrayW<M, ArrayK<M, T>>,
     /// Of a sum of slopes, by `(x_n, u, p)`.
-    local: ArrayW<M, ArrayX<M, T>>,
+    local_derivatives: ArrayW<M, ArrayX<M, T>>,
     /// Of two such sums, by `(x₀, u, p)`.
-    slopes: [ArrayW<M, ArrayX<M, T>>; 2],
+    rate_derivatives: [ArrayW<M, ArrayX<M, T>>; 2],
     jacobian: M::Jacobian<T>,
     f: ArrayK<M, T>,
     point: ArrayV<M, T>,
@@ -52,23 +52,23 @@ struct Memory<M: Dae, T: Plain> {
 
 /// The derivatives along a run.
 pub struct Variational<M: Dae, T: Real> {
-    replays: Box<dyn Differentiate<M, T>>,
-    memory: Box<Memory<M, T>>,
+    differentiator: Box<dyn DynStepDifferentiator<M, T>>,
+    memory: Box<VariationalMemory<M, T>>,
     /// The unknowns of the stages of a step.
-    unknowns: Vec<T>,
+    stage_unknowns: Vec<T>,
 }
 
 impl<M: Dae, T: Real> Variational<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn new(replays: Box<dyn Differentiate<M, T>>) -> Result<Self, Error> {
-        let mut memory: Box<Memory<M, T>> = allocate()?;
+    pub fn new(replays: Box<dyn DynStepDifferentiator<M, T>>) -> Result<Self, Error> {
+        let mut memory: Box<VariationalMemory<M, T>> = allocate()?;
         M::jacobian_constants::<T>(&mut memory.jacobian);
-        let (length, mut unknowns) = (M::Shape::NK * MOST, Vec::new());
+        let (length, mut unknowns) = (M::Shape::NK * MAX_STAGES, Vec::new());
         unknowns
             .try_reserve_exact(length)
             .map_err(|_| Error::OutOfMemory { bytes: length * size_of::<T>() })?;
-        Ok(Self { replays, memory, unknowns })
+        Ok(Self { differentiator: replays, memory, stage_unknowns: unknowns })
     }
 
     /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of
@@ -76,14 +76,15 @@ impl<M: Dae, T: Real> Variational<M, T> {
     ///
     /// # Errors
     /// As [`Consistent::forward`].
-    pub fn begin(
+    pub fn begin_run(
         &mut self,
-        at: &At<'_, M, T>,
+        at: &ModelPoint<'_, M, T>,
         start: &ArrayK<M, T>,
         given: &ArrayW<M, T>,
         consistent: &mut Consistent<M, T>,
     ) -> Result<(), Error> {
-        let (nx, Memory { before, magnitudes, .. }) = (M::Shape::NX, &mut *self.memory);
+        let (nx, VariationalMemory { start_sensitivities: before, magnitudes, .. }) =
+            (M::Shape::NX, &mut *self.memory);
         for (direction, column) in before.as_mut().iter_mut().enumerate() {
             column.as_mut().fill(T::ZERO);
             if let Some(element) = column.as_mut()[..nx].get_mut(direction) {
@@ -107,15 +108,17 @@ impl<M: Dae, T: Real> Variational<M, T> {
     }
 
     /// A step was accepted.
-    pub fn accept(&mut self) {
-        let Memory { before, after, .. } = &mut *self.memory;
+    pub fn accept_step(&mut self) {
+        let VariationalMemory { start_sensitivities: before, end_sensitivities: after, .. } =
+            &mut *self.memory;
         before.as_mut().copy_from_slice(after.as_ref());
     }
 
     /// The derivatives at the end of a step.
-    fn take(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<(), Error> {
-        let (nx, Memory { before, after, .. }) = (M::Shape::NX, &mut *self.memory);
-        let forward = self.replays.forward(step)?;
+    fn differentiate_step(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<(), Error> {
+        let (nx, VariationalMemory { start_sensitivities: before, end_sensitivities: after, .. }) =
+            (M::Shape::NX, &mut *self.memory);
+        let forward = self.differentiator.forward(step)?;
         let x = [forward.dx_dx0.as_slice(), forward.dx_du.as_slice(), forward.dx_dp.as_slice()];
         let z = [forward.dz_dx0.as_slice(), forward.dz_du.as_slice(), forward.dz_dp.as_slice()];
         let own = |parts: [&'_ [T]; 3], rows: usize, direction: usize, to: &mut [T]| {
@@ -142,9 +145,17 @@ impl<M: Dae, T: Real> Variational<M, T> {
     }
 
     /// The derivatives of `Σ_i weight_i k_i` of the step that was taken.
-    fn slopes(&mut self, level: usize, weights: &[f64], which: usize) -> Result<(), Error> {
-        let (nx, Memory { before, local, slopes, .. }) = (M::Shape::NX, &mut *self.memory);
-        self.replays.slopes(level, weights, local)?;
+    fn set_rate_derivatives(&mut self, level: usize, weights: &[f64], which: usize) -> Result<(), Error> {
+        let (
+            nx,
+            VariationalMemory {
+                start_sensitivities: before,
+                local_derivatives: local,
+                rate_derivatives: slopes,
+                ..
+            },
+        ) = (M::Shape::NX, &mut *self.memory);
+        self.differentiator.rate_derivatives(level, weights, local)?;
         let Some(slopes) = slopes.get_mut(which) else { return Ok(()) };
         let (by_states, others) = local.as_ref().split_at(nx);
         for (direction, (slope, before)) in slopes.as_mut().iter_mut().zip(before.as_ref()).enumerate() {
@@ -165,26 +176,41 @@ impl<M: Dae, T: Real> Variational<M, T> {
     ///
     /// # Errors
     /// The step cannot be differentiated.
-    pub fn implicit(
+    pub fn implicit_error(
         &mut self,
         stages: &mut dyn Stages<M, T>,
-        at: At<'_, M, T>,
+        at: ModelPoint<'_, M, T>,
         level: usize,
         start: &StepContext<'_, M, T>,
         tolerances: &Tolerances<M, T>,
         again: bool,
-    ) -> Result<f64, Failure> {
-        let diverges = |_: Error| Failure::Diverges;
-        self.unknowns.clear();
-        stages.unknowns(&mut self.unknowns);
-        let unknowns = core::mem::take(&mut self.unknowns);
-        let taken = self.take(&AcceptedStep { at, h: start.h, y: &unknowns, level, near: true });
-        self.unknowns = unknowns;
+    ) -> Result<f64, NewtonFailure> {
+        let diverges = |_: Error| NewtonFailure::Diverges;
+        self.stage_unknowns.clear();
+        stages.append_unknowns(&mut self.stage_unknowns);
+        let unknowns = core::mem::take(&mut self.stage_unknowns);
+        let taken = self.differentiate_step(&AcceptedStep {
+            start: at,
+            h: start.h,
+            stage_unknowns: &unknowns,
+            order_index: level,
+            stages_are_solved: true,
+        });
+        self.stage_unknowns = unknowns;
         taken.map_err(diverges)?;
-        let at_end = stages.estimates(start, &mut self.memory.point);
-        self.slopes(level, &stages.lagrange(if at_end { 1.0 } else { 0.0 }), 0).map_err(diverges)?;
-        let Memory { before, after, slopes: [slopes, _], jacobian, f, point, magnitudes, .. } =
-            &mut *self.memory;
+        let at_end = stages.estimate_point(start, &mut self.memory.point);
+        self.set_rate_derivatives(level, &stages.lagrange(if at_end { 1.0 } else { 0.0 }), 0)
+            .map_err(diverges)?;
+        let VariationalMemory {
+            start_sensitivities: before,
+            end_sensitivities: after,
+            rate_derivatives: [slopes, _],
+            jacobian,
+            f,
+            point,
+            magnitudes,
+            ..
+        } = &mut *self.memory;
         M::residual_jacobian::<T>(point, f, jacobian);
         let there = if at_end { &*after } else { &*before };
         let mut worst = 0.0f64;
@@ -193,30 +219,30 @@ impl<M: Dae, T: Real> Variational<M, T> {
             let mut relative = 0.0;
             for look in 0..2 {
                 let mut error = ArrayK::<M, T>::zeroed();
-                variation::<M, T>(jacobian, slope.as_ref(), y.as_ref(), direction, error.as_mut());
-                stages.filter(start.h, &mut error);
+                variational_residual::<M, T>(jacobian, slope.as_ref(), y.as_ref(), direction, error.as_mut());
+                stages.filter_residual(start.h, &mut error);
                 // As for the states: what is extrapolated of `z` is not kept.
                 let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
                 let states = [before.as_ref(), after.as_ref()]
                     .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref()));
                 let magnitude = magnitudes[direction];
-                let estimator = tolerances.estimator.as_ref().iter().copied();
-                let first = measure(&error.as_ref()[..counted], states, estimator, magnitude);
+                let estimator = tolerances.estimator_tolerances.as_ref().iter().copied();
+                let first = scaled_norm(&error.as_ref()[..counted], states, estimator, magnitude);
                 let asked = tolerances.rtol.as_ref().iter().zip(tolerances.atol.as_ref());
-                let scales = scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
+                let scales = column_scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
                 let [filtered, divided]: FilteredDefect<M, T> = stages.filtered_defect(start.h);
                 let mut errors = RelativeErrors::default();
                 for ((error, divided), scale) in filtered.as_ref().iter().zip(divided.as_ref()).zip(scales) {
                     errors.add((*error / scale).to_f64(), (*divided / scale).to_f64());
                 }
-                relative = stages.defect_filter().larger(first, start.tolerance_ratio, &errors);
+                relative = stages.defect_filter().max_estimate(first, start.tolerance_ratio, &errors);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }
                 axpy(T::ONE, error.as_ref(), y.as_mut());
             }
             if !relative.is_finite() {
-                return Err(Failure::Diverges);
+                return Err(NewtonFailure::Diverges);
             }
             worst = worst.max(relative);
         }
@@ -227,27 +253,35 @@ impl<M: Dae, T: Real> Variational<M, T> {
 impl<M: Ode, T: Real> Variational<M, T> {
     /// The same of a step of an explicit pair with its end; not finite if it cannot be
     /// differentiated.
-    pub fn explicit<B: Pair<S>, const S: usize>(
+    pub fn explicit_error<B: EmbeddedPair<S>, const S: usize>(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         end: &[T],
         inputs: &[T],
         tolerances: impl Iterator<Item = (T, T)> + Clone,
     ) -> Result<f64, Error> {
-        let (nx, (weights, last)) = (M::Shape::NX, B::DIFFERENCE);
-        self.take(step)?;
-        self.slopes(0, &weights, 0)?;
+        let (nx, (weights, last)) = (M::Shape::NX, B::ERROR_COEFFICIENTS);
+        self.differentiate_step(step)?;
+        self.set_rate_derivatives(0, &weights, 0)?;
         if let Some(coarse) = B::THIRD_ORDER {
-            self.slopes(0, &coarse, 1)?;
+            self.set_rate_derivatives(0, &coarse, 1)?;
         }
-        let Memory { before, after, slopes: [fine, coarse], jacobian, f, point, magnitudes, .. } =
-            &mut *self.memory;
+        let VariationalMemory {
+            start_sensitivities: before,
+            end_sensitivities: after,
+            rate_derivatives: [fine, coarse],
+            jacobian,
+            f,
+            point,
+            magnitudes,
+            ..
+        } = &mut *self.memory;
         if last != 0.0 {
             point.as_mut().copy_from_slice(inputs);
             point.as_mut()[..nx].fill(T::ZERO);
             point.as_mut()[nx..2 * nx].copy_from_slice(end);
             if let Some(time) = point.as_mut().last_mut() {
-                *time = step.at.t + step.h;
+                *time = step.start.t + step.h;
             }
             M::residual_jacobian::<T>(point, f, jacobian);
         }
@@ -257,19 +291,25 @@ impl<M: Ode, T: Real> Variational<M, T> {
             if last != 0.0 {
                 // ẋ = −f/c at ẋ = 0.
                 let mut defect = ArrayK::<M, T>::zeroed();
-                variation::<M, T>(jacobian, zero.as_ref(), after.as_ref(), direction, defect.as_mut());
+                variational_residual::<M, T>(
+                    jacobian,
+                    zero.as_ref(),
+                    after.as_ref(),
+                    direction,
+                    defect.as_mut(),
+                );
                 for (error, (row, coefficient)) in error.as_mut().iter_mut().zip(M::ROWS) {
                     *error = *error - T::from_f64(last / coefficient) * defect[*row as usize];
                 }
             }
             let size = |error: &ArrayX<M, T>| {
                 let states = [before, after].map(|v| v.as_ref());
-                let relative = measure(error.as_ref(), states, tolerances.clone(), magnitudes[direction]);
+                let relative = scaled_norm(error.as_ref(), states, tolerances.clone(), magnitudes[direction]);
                 relative * step.h.abs().to_f64()
             };
             let fine = size(&error);
             let coarse = B::THIRD_ORDER.and_then(|_| coarse.as_ref().get(direction)).map(size);
-            let combined = B::combined(fine, coarse);
+            let combined = B::combined_estimate(fine, coarse);
             if !combined.is_finite() {
                 return Ok(f64::NAN);
             }
@@ -280,7 +320,7 @@ impl<M: Ode, T: Real> Variational<M, T> {
 }
 
 /// `f_ẋ ẋ' + f_(x,z) y' + f_w e_c`
-fn variation<M: Dae, T: Real>(
+fn variational_residual<M: Dae, T: Real>(
     jacobian: &M::Jacobian<T>,
     slope: &[T],
     y: &[T],
@@ -306,7 +346,7 @@ fn variation<M: Dae, T: Real>(
 }
 
 /// What is tolerated of a column: `(rtol, atol)` are of the states.
-fn scales<'a, T: Real>(
+fn column_scales<'a, T: Real>(
     [before, after]: [&'a [T]; 2],
     tolerances: impl Iterator<Item = (T, T)> + 'a,
     magnitude: T,
@@ -319,16 +359,16 @@ fn scales<'a, T: Real>(
 }
 
 /// The root of the mean of the squares relative to what is tolerated.
-fn measure<'a, T: Real>(
+fn scaled_norm<'a, T: Real>(
     error: &[T],
     states: [&'a [T]; 2],
     tolerances: impl Iterator<Item = (T, T)> + 'a,
     magnitude: T,
 ) -> f64 {
     let mut sum = 0.0;
-    for (error, scale) in error.iter().zip(scales(states, tolerances, magnitude)) {
+    for (error, scale) in error.iter().zip(column_scales(states, tolerances, magnitude)) {
         let relative = (*error / scale).to_f64();
         sum += relative * relative;
     }
-    mean(sum, error.len())
+    root_mean_square(sum, error.len())
 }

@@ -3,7 +3,7 @@
 use super::intervals::{Interval, vector};
 use super::lanes::{MOST_LANES, Verdict};
 use super::single::{self, Single, Standard, gather};
-use crate::erk::{Engine, Grid, Integrator, Nothing, Panels};
+use crate::erk::{ColumnPanels, Engine, Grid, Integrator, NoIntegrand};
 use crate::error::Error;
 use crate::memory::{Heap, Memory};
 use crate::model::{ArrayX, Ode};
@@ -77,12 +77,12 @@ pub struct Group<M: Ode, E: Lanes, const S: usize> {
     engine: Engine<M, E, S, Heap>,
     grid: Grid<E>,
     lambda: <Heap as Memory>::Nominal<ArrayX<M, E>>,
-    panels: <Heap as Memory>::Nominal<Panels<M, E, S>>,
+    panels: <Heap as Memory>::Nominal<ColumnPanels<M, E, S>>,
 }
 
 impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
     /// What a call answers.
-    fn call<'e, R>(
+    fn run_engine<'e, R>(
         &'e mut self,
         call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> Verdict<'e, E, R>,
     ) -> Verdict<'e, E, R> {
@@ -91,13 +91,13 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
     }
 
     /// The same of one with derivatives in all directions.
-    fn sweep<'e, R>(
+    fn run_engine_with_panels<'e, R>(
         &'e mut self,
         call: impl FnOnce(
             &'e mut Engine<M, E, S, Heap>,
             &Grid<E>,
             &[E],
-            &mut Panels<M, E, S>,
+            &mut ColumnPanels<M, E, S>,
         ) -> Verdict<'e, E, R>,
     ) -> Verdict<'e, E, R> {
         let Self { engine, grid, lambda, panels } = self;
@@ -110,12 +110,12 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
 {
     fn new(options: &Options, tableau: &Tableau<S>) -> Self {
         let Options { steps, compensated, .. } = *options;
-        let grid = Grid { start: E::zeroed(), h: E::zeroed(), steps, compensated };
+        let grid = Grid { start_time: E::zeroed(), h: E::zeroed(), steps, compensated };
         let (lambda, panels) = (Default::default(), Default::default());
         Self { engine: Engine::new(tableau), grid, lambda, panels }
     }
 
-    fn place(
+    fn load_intervals(
         &mut self,
         intervals: &[&Interval<'_, M, T>],
         _: Option<[&[T]; 2]>,
@@ -128,38 +128,42 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         let (u, p) = variables[2 * M::Shape::NX..].split_at_mut(M::Shape::NU);
         gather(intervals, u, |interval| interval.u);
         gather(intervals, &mut p[..M::Shape::NP], |interval| interval.p);
-        gather(intervals, from_mut(&mut grid.start), |interval| from_ref(&interval.t0));
+        gather(intervals, from_mut(&mut grid.start_time), |interval| from_ref(&interval.t0));
         gather(intervals, from_mut(&mut grid.h), |interval| from_ref(&interval.h));
         grid.h = grid.h / E::from_whole(grid.steps);
         gather(intervals, <Heap>::nominal(lambda)?.as_mut(), |interval| interval.lambda);
         Ok(())
     }
 
-    fn stages(&mut self, _: usize, _: &mut [()]) -> Result<(), Error> {
+    fn copy_stages(&mut self, _: usize, _: &mut [()]) -> Result<(), Error> {
         Ok(())
     }
 
-    fn work(&self) -> Statistics {
+    fn statistics(&self) -> Statistics {
         self.engine.statistics()
     }
 
     fn solve(&mut self) -> Verdict<'_, E, Nominal<M, E>> {
-        self.call(|engine, grid, _| engine.solve(grid, &mut Nothing))
+        self.run_engine(|engine, grid, _| engine.solve(grid, &mut NoIntegrand))
     }
 
     fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
-        self.sweep(|engine, grid, _, panels| engine.forward(grid, panels, &mut Nothing))
+        self.run_engine_with_panels(|engine, grid, _, panels| engine.forward(grid, panels, &mut NoIntegrand))
     }
 
     fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
-        self.call(|engine, grid, lambda| engine.adjoint(grid, lambda, &mut Nothing))
+        self.run_engine(|engine, grid, lambda| engine.adjoint(grid, lambda, &mut NoIntegrand))
     }
 
     fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
-        self.sweep(|engine, grid, lambda, panels| engine.forward_adjoint(grid, lambda, panels))
+        self.run_engine_with_panels(|engine, grid, lambda, panels| {
+            engine.forward_adjoint(grid, lambda, panels)
+        })
     }
 
     fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
-        self.sweep(|engine, grid, lambda, panels| engine.hessian(grid, lambda, panels, &mut Nothing))
+        self.run_engine_with_panels(|engine, grid, lambda, panels| {
+            engine.hessian(grid, lambda, panels, &mut NoIntegrand)
+        })
     }
 }

@@ -1,16 +1,16 @@
 //! The batch as its users see it.
 
-use super::answer::Answer;
+use super::batch_output::Answer;
+use super::chunk::{BatchTask, IntervalChunk, Sink, lanes_per_group, try_resize};
 use super::error::BatchError;
-use super::intervals::{Inputs, Intervals};
-use super::share::{Share, Sink, Work, fill, width};
+use super::intervals::{BatchInputs, Intervals};
 use super::single::{Single, Standard};
 use super::statistics::BatchStatistics;
 #[cfg(feature = "parallel")]
-use super::work::parallel;
-use super::work::{Worker, threads};
+use super::worker::run_parallel;
+use super::worker::{Worker, default_threads};
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
+use crate::finite::check_model_input;
 use crate::integrator::Integrator as Alone;
 use crate::model::{Dae, VectorX, VectorZ};
 use crate::options::{Newton, Options, Start};
@@ -21,7 +21,7 @@ use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
 /// Start values `ẋ` and `z`.
-type Given<I> =
+type StartValues<I> =
     (VectorX<<I as Alone>::Model, <I as Alone>::Number>, VectorZ<<I as Alone>::Model, <I as Alone>::Number>);
 
 /// Weights `λ` of the ends of intervals and `ν` of the algebraic states at their starts.
@@ -64,14 +64,14 @@ pub struct Integrator<I: Single> {
     /// One for each thread.
     workers: Vec<Worker<I>>,
     threads: usize,
-    given: Option<Given<I>>,
+    start_values: Option<StartValues<I>>,
     status: Vec<Result<(), Error>>,
     /// The stages of every step of every interval, and whether there are any.
     stages: Vec<I::Stages>,
-    warm: Vec<bool>,
+    has_stages: Vec<bool>,
     /// Whether stages are remembered without a warm start, too; and whether those are solutions.
-    keeps: bool,
-    solved: bool,
+    stores_stages: bool,
+    reuses_solutions: bool,
     statistics: BatchStatistics,
 }
 
@@ -110,14 +110,14 @@ impl<I: Single> Clone for Integrator<I> {
         Self {
             options: self.options,
             tableau: self.tableau,
-            workers: self.workers.iter().take(1).map(Worker::fresh).collect(),
+            workers: self.workers.iter().take(1).map(Worker::clone_settings).collect(),
             threads: self.threads,
-            given: self.given,
+            start_values: self.start_values,
             status: Vec::new(),
             stages: Vec::new(),
-            warm: Vec::new(),
-            keeps: false,
-            solved: false,
+            has_stages: Vec::new(),
+            stores_stages: false,
+            reuses_solutions: false,
             statistics: BatchStatistics::default(),
         }
     }
@@ -132,13 +132,13 @@ impl<I: Single> Integrator<I> {
             options,
             tableau,
             workers,
-            threads: threads(),
-            given: None,
+            threads: default_threads(),
+            start_values: None,
             status: Vec::new(),
             stages: Vec::new(),
-            warm: Vec::new(),
-            keeps: false,
-            solved: false,
+            has_stages: Vec::new(),
+            stores_stages: false,
+            reuses_solutions: false,
             statistics: BatchStatistics::default(),
         })
     }
@@ -154,9 +154,9 @@ impl<I: Single> Integrator<I> {
         xdot: &VectorX<I::Model, I::Number>,
         z: &VectorZ<I::Model, I::Number>,
     ) -> Result<(), Error> {
-        check_named::<I::Model, I::Number>(Argument::StartXdot, xdot.as_slice())?;
-        check_named::<I::Model, I::Number>(Argument::StartZ, z.as_slice())?;
-        self.given = Some((*xdot, *z));
+        check_model_input::<I::Model, I::Number>(Argument::StartXdot, xdot.as_slice())?;
+        check_model_input::<I::Model, I::Number>(Argument::StartZ, z.as_slice())?;
+        self.start_values = Some((*xdot, *z));
         Ok(())
     }
 
@@ -169,14 +169,14 @@ impl<I: Single> Integrator<I> {
 
     /// Forgets the warm start.
     pub fn reset(&mut self) {
-        self.warm.fill(false);
+        self.has_stages.fill(false);
     }
 
     /// From now on all calls remember their stages. With `solved` those of the following calls are
     /// those of the last one, where it was successful: they are at the same inputs, and only
     /// differentiate.
-    pub(crate) fn keep_stages(&mut self, solved: bool) {
-        (self.keeps, self.solved) = (true, solved);
+    pub(crate) fn store_stages(&mut self, reuse_as_solutions: bool) {
+        (self.stores_stages, self.reuses_solutions) = (true, reuse_as_solutions);
     }
 
     /// The options.
@@ -208,7 +208,7 @@ impl<I: Single> Integrator<I> {
         intervals: &Intervals<'_, I::Model, I::Number>,
         results: &mut [Nominal<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, None, results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, None, None, results.len())?, results, None)
     }
 
     /// The solutions, and their derivatives with respect to `x₀`, `u` and `p`.
@@ -220,7 +220,7 @@ impl<I: Single> Integrator<I> {
         intervals: &Intervals<'_, I::Model, I::Number>,
         results: &mut [Forward<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, None, results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, None, None, results.len())?, results, None)
     }
 
     /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for
@@ -234,7 +234,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [Adjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients of `λᵀx₊`.
@@ -247,7 +247,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [ForwardAdjoint<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
@@ -260,7 +260,7 @@ impl<I: Single> Integrator<I> {
         lambda: &[VectorX<I::Model, I::Number>],
         results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, Some(lambda), None, results.len())?, results, None)
     }
 
     /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the
@@ -285,7 +285,7 @@ impl<I: Single> Integrator<I> {
         nu: &[VectorZ<I::Model, I::Number>],
         results: &mut [Hessian<I::Model, I::Number>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results, None)
+        self.run(&BatchInputs::new(intervals, Some(lambda), Some(nu), results.len())?, results, None)
     }
 
     /// An integrator of single intervals that solves the stages of this one, also of
@@ -293,10 +293,10 @@ impl<I: Single> Integrator<I> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(crate) fn single(&self) -> Result<I, Error> {
+    pub(crate) fn single_integrator(&self) -> Result<I, Error> {
         let newton = Newton { fixed_iterations: None, ..self.options.newton };
         let mut single = I::of(&Options { newton, ..self.options }, &self.tableau)?;
-        if let Some((xdot, z)) = &self.given {
+        if let Some((xdot, z)) = &self.start_values {
             single.give([xdot.as_slice(), z.as_slice()])?;
         }
         Ok(single)
@@ -306,9 +306,9 @@ impl<I: Single> Integrator<I> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(crate) fn start(&self, interval: usize, single: &mut I) -> Result<(), Error> {
+    pub(crate) fn warm_start_single(&self, interval: usize, single: &mut I) -> Result<(), Error> {
         let stages = self.stages.chunks_exact(self.options.steps).nth(interval);
-        let warm = self.warm.get(interval) == Some(&true) && self.options.start == Start::Warm;
+        let warm = self.has_stages.get(interval) == Some(&true) && self.options.start == Start::Warm;
         single.start(stages.filter(|_| warm), false)
     }
 
@@ -318,63 +318,74 @@ impl<I: Single> Integrator<I> {
     ///
     /// # Errors
     /// See [`Integrator`].
-    pub(crate) fn each<R: Answer<I::Model, I::Number> + Zeroable>(
+    pub(crate) fn for_each_result<R: Answer<I::Model, I::Number> + Zeroable>(
         &mut self,
         intervals: &Intervals<'_, I::Model, I::Number>,
         (lambda, nu): Weights<'_, I>,
-        room: &mut Vec<R>,
+        result_buffer: &mut Vec<R>,
         sink: Sink<'_, R>,
     ) -> Result<(), BatchError> {
-        let inputs = &Inputs::new(intervals, lambda, nu, intervals.x0.len())?;
-        let places = if self.threads == 1 { self.widths::<R>()[0] } else { inputs.len() };
-        fill(room, places.min(inputs.len()), Zeroable::zeroed())?;
-        self.run(inputs, room, Some(sink))
+        let inputs = &BatchInputs::new(intervals, lambda, nu, intervals.x0.len())?;
+        let buffer_length = if self.threads == 1 { self.group_sizes::<R>()[0] } else { inputs.len() };
+        try_resize(result_buffer, buffer_length.min(inputs.len()), Zeroable::zeroed())?;
+        self.run(inputs, result_buffer, Some(sink))
     }
 
     /// How many intervals are computed together for such a result, and how many are simulated
     /// together before each is differentiated alone: stages of models that are too large to be
     /// differentiated side by side may still be found so.
-    fn widths<R: Answer<I::Model, I::Number>>(&self) -> [usize; 2] {
-        let missing = I::ITERATES && self.options.start == Start::Given && self.given.is_none();
-        match if missing { 1 } else { width::<I, R>(&self.options) } {
-            1 if I::ITERATES && !missing => [1, width::<I, Nominal<I::Model, I::Number>>(&self.options)],
+    fn group_sizes<R: Answer<I::Model, I::Number>>(&self) -> [usize; 2] {
+        let lacks_start_values =
+            I::ITERATES && self.options.start == Start::Given && self.start_values.is_none();
+        match if lacks_start_values { 1 } else { lanes_per_group::<I, R>(&self.options) } {
+            1 if I::ITERATES && !lacks_start_values => {
+                [1, lanes_per_group::<I, Nominal<I::Model, I::Number>>(&self.options)]
+            }
             lanes => [lanes, 1],
         }
     }
 
     fn run<R: Answer<I::Model, I::Number>>(
         &mut self,
-        inputs: &Inputs<'_, I::Model, I::Number>,
+        inputs: &BatchInputs<'_, I::Model, I::Number>,
         results: &mut [R],
         sink: Option<Sink<'_, R>>,
     ) -> Result<(), BatchError> {
         let (count, steps) = (inputs.len(), self.options.steps);
         self.status.clear();
-        fill(&mut self.status, count, Ok(()))?;
-        if I::ITERATES && (self.options.start == Start::Warm || self.keeps) {
-            fill(&mut self.warm, count, false)?;
-            fill(&mut self.stages, count.saturating_mul(steps), Zeroable::zeroed())?;
+        try_resize(&mut self.status, count, Ok(()))?;
+        if I::ITERATES && (self.options.start == Start::Warm || self.stores_stages) {
+            try_resize(&mut self.has_stages, count, false)?;
+            try_resize(&mut self.stages, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
-        let [lanes, simulated] = self.widths::<R>();
+        let [lanes, simulated] = self.group_sizes::<R>();
         let (options, tableau) = (&self.options, &self.tableau);
-        let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
-        let work = Work { inputs, options, tableau, given, lanes, simulated, solved: self.solved };
+        let start_values = self.start_values.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
+        let task = BatchTask {
+            inputs,
+            options,
+            tableau,
+            start_values,
+            lanes,
+            simulation_lanes: simulated,
+            reuses_solutions: self.reuses_solutions,
+        };
         let threads = self.threads;
-        let share = Share {
-            first: 0,
+        let chunk = IntervalChunk {
+            first_interval: 0,
             results: &mut *results,
             status: &mut self.status,
             stages: &mut self.stages,
-            warm: &mut self.warm,
+            has_stages: &mut self.has_stages,
         };
         match (sink, self.workers.first_mut()) {
-            (Some(sink), Some(worker)) if threads == 1 => worker.each(&work, share, sink),
+            (Some(sink), Some(worker)) if threads == 1 => worker.for_each_result(&task, chunk, sink),
             (sink, _) => {
                 #[cfg(feature = "parallel")]
-                parallel(&work, &mut self.workers, threads, share)?;
+                run_parallel(&task, &mut self.workers, threads, chunk)?;
                 #[cfg(not(feature = "parallel"))]
                 if let Some(worker) = self.workers.first_mut() {
-                    worker.run(&work, share);
+                    worker.run(&task, chunk);
                 }
                 let good = results.iter().zip(&self.status).take_while(|(_, status)| status.is_ok());
                 if let Some(sink) = sink {

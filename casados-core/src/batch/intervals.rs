@@ -2,7 +2,7 @@
 
 use super::error::{BatchError, Slice};
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, check_named};
+use crate::finite::{check_input, check_model_input};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape, copy};
@@ -68,13 +68,13 @@ pub struct Interval<'a, M: Dae, T: Plain> {
 copy!(['a, M: Dae, T: Plain] Interval<'a, M, T>);
 
 /// All that a call was given, of the right lengths.
-pub struct Inputs<'a, M: Dae, T: Plain> {
+pub struct BatchInputs<'a, M: Dae, T: Plain> {
     intervals: &'a Intervals<'a, M, T>,
     lambda: Option<&'a [VectorX<M, T>]>,
     nu: Option<&'a [VectorZ<M, T>]>,
 }
 
-impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
+impl<'a, M: Dae, T: Real> BatchInputs<'a, M, T> {
     /// # Errors
     /// [`BatchError::Length`]
     pub fn new(
@@ -120,26 +120,29 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
         let Intervals { x0, u, p, h, t0 } = *self.intervals;
         let interval: Interval<'a, M, T> = Interval {
             x0: x0.get(index).ok_or(Error::NoResult)?,
-            u: of(u, index).map_or(&[], Matrix::as_slice),
-            p: of(p, index).map_or(&[], Matrix::as_slice),
-            h: of(h, index).map_or(T::ZERO, |h| *h),
-            t0: of(t0, index).map_or(T::ZERO, |t| *t),
-            lambda: self.lambda.and_then(|lambda| of(lambda, index)).map_or(&[], Matrix::as_slice),
-            nu: self.nu.and_then(|nu| of(nu, index)).map_or(&[], Matrix::as_slice),
+            u: interval_element(u, index).map_or(&[], Matrix::as_slice),
+            p: interval_element(p, index).map_or(&[], Matrix::as_slice),
+            h: interval_element(h, index).map_or(T::ZERO, |h| *h),
+            t0: interval_element(t0, index).map_or(T::ZERO, |t| *t),
+            lambda: self
+                .lambda
+                .and_then(|lambda| interval_element(lambda, index))
+                .map_or(&[], Matrix::as_slice),
+            nu: self.nu.and_then(|nu| interval_element(nu, index)).map_or(&[], Matrix::as_slice),
         };
-        check_named::<M, T>(Argument::X0, interval.x0.as_slice())?;
-        check_named::<M, T>(Argument::U, interval.u)?;
-        check_named::<M, T>(Argument::P, interval.p)?;
+        check_model_input::<M, T>(Argument::X0, interval.x0.as_slice())?;
+        check_model_input::<M, T>(Argument::U, interval.u)?;
+        check_model_input::<M, T>(Argument::P, interval.p)?;
         check_input(Argument::H, &[interval.h])?;
         check_input(Argument::T, &[interval.t0])?;
-        check_named::<M, T>(Argument::Lambda, interval.lambda)?;
-        check_named::<M, T>(Argument::Nu, interval.nu)?;
+        check_model_input::<M, T>(Argument::Lambda, interval.lambda)?;
+        check_model_input::<M, T>(Argument::Nu, interval.nu)?;
         Ok(interval)
     }
 }
 
 /// The element of an interval, which may be that of all.
-fn of<V>(slice: &[V], index: usize) -> Option<&V> {
+fn interval_element<V>(slice: &[V], index: usize) -> Option<&V> {
     if slice.len() == 1 { slice.first() } else { slice.get(index) }
 }
 

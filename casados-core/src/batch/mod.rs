@@ -16,20 +16,20 @@
 //! integrates an interval alone or several in `lanes`, `implicit` and `explicit` the methods that
 //! do, `work` who computes what, `integrator` what users see.
 
-mod answer;
+mod batch_output;
+mod chunk;
 mod error;
 mod explicit;
+mod group_call;
 mod implicit;
 mod integrator;
 mod intervals;
 mod lanes;
-mod share;
 mod single;
 mod statistics;
-mod together;
-mod work;
+mod worker;
 
-pub(crate) use answer::Answer;
+pub(crate) use batch_output::Answer;
 pub use error::{BatchError, Slice};
 pub use integrator::Integrator;
 pub use intervals::Intervals;

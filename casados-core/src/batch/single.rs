@@ -80,7 +80,7 @@ pub trait Single:
     /// # Errors
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
-    fn start(&mut self, stages: Option<&[Self::Stages]>, solved: bool) -> Result<(), Error>;
+    fn start(&mut self, stages: Option<&[Self::Stages]>, reuses_solutions: bool) -> Result<(), Error>;
     /// The stages of the last call.
     ///
     /// # Errors
@@ -95,7 +95,7 @@ pub trait Single:
     #[doc(hidden)]
     fn forward_to(
         &mut self,
-        at: &At<'_, Self>,
+        at: &IntervalOf<'_, Self>,
         to: &mut Forward<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
     /// The same with gradients.
@@ -105,7 +105,7 @@ pub trait Single:
     #[doc(hidden)]
     fn forward_adjoint_to(
         &mut self,
-        at: &At<'_, Self>,
+        at: &IntervalOf<'_, Self>,
         to: &mut ForwardAdjoint<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
     /// The same with second derivatives.
@@ -115,13 +115,13 @@ pub trait Single:
     #[doc(hidden)]
     fn hessian_to(
         &mut self,
-        at: &At<'_, Self>,
+        at: &IntervalOf<'_, Self>,
         to: &mut Hessian<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
 }
 
 /// An interval of an integrator.
-type At<'a, I> = Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>;
+type IntervalOf<'a, I> = Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>;
 
 /// An integrator whose method has a tableau: all but those of [`Custom`](crate::Custom).
 ///
@@ -153,20 +153,20 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn place(
+    fn load_intervals(
         &mut self,
         intervals: &[&Interval<'_, I::Model, I::Number>],
         given: Option<[&[I::Number]; 2]>,
         stages: Option<&[&[I::Stages]; MOST_LANES]>,
-        solved: bool,
+        reuses_solutions: bool,
     ) -> Result<(), Error>;
     /// The stages of a lane in the last call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn stages(&mut self, lane: usize, to: &mut [I::Stages]) -> Result<(), Error>;
+    fn copy_stages(&mut self, lane: usize, to: &mut [I::Stages]) -> Result<(), Error>;
     /// What the last call did.
-    fn work(&self) -> Statistics;
+    fn statistics(&self) -> Statistics;
 
     fn solve(&mut self) -> Verdict<'_, E, Nominal<I::Model, E>>;
     fn forward(&mut self) -> Verdict<'_, E, Forward<I::Model, E>>;
@@ -184,7 +184,7 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
         Self
     }
 
-    fn place(
+    fn load_intervals(
         &mut self,
         _: &[&Interval<'_, I::Model, I::Number>],
         _: Option<[&[I::Number]; 2]>,
@@ -194,11 +194,11 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
         Err(Error::NoResult)
     }
 
-    fn stages(&mut self, _: usize, _: &mut [I::Stages]) -> Result<(), Error> {
+    fn copy_stages(&mut self, _: usize, _: &mut [I::Stages]) -> Result<(), Error> {
         Err(Error::NoResult)
     }
 
-    fn work(&self) -> Statistics {
+    fn statistics(&self) -> Statistics {
         Statistics::default()
     }
 
@@ -227,14 +227,14 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
 pub fn gather<M: Dae, T: Plain, E: Lanes<Cell: AsMut<[T]>>>(
     intervals: &[&Interval<'_, M, T>],
     to: &mut [E],
-    of: impl for<'i> Fn(&'i Interval<'_, M, T>) -> &'i [T],
+    field: impl for<'i> Fn(&'i Interval<'_, M, T>) -> &'i [T],
 ) {
     if to.is_empty() {
         return;
     }
     let mut from: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
     for (from, interval) in from.iter_mut().zip(intervals) {
-        *from = of(interval);
+        *from = field(interval);
     }
     pack(&from, to);
 }

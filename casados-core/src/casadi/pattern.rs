@@ -3,7 +3,7 @@
 
 use super::dependence::{self, Dimensions};
 use super::sparsity::Dependence;
-use crate::ocp::{Constraints, Cost, Dynamics, Entry, Formulation, Origin, Problem};
+use crate::ocp::{Constraints, Cost, DerivativeEntry, Dynamics, Formulation, Origin, Problem};
 use crate::shape::Shape;
 use crate::structure::Pattern;
 
@@ -29,13 +29,13 @@ struct Stage {
 
 impl Stage {
     /// What a function at the node says about itself; everything if it says nothing.
-    fn add(&mut self, first: usize, tell: impl FnOnce(&mut dyn FnMut(Entry)) -> bool) {
+    fn add(&mut self, first: usize, tell: impl FnOnce(&mut dyn FnMut(DerivativeEntry)) -> bool) {
         let Self { pattern: StagePattern { jacobian, node, .. }, variables, .. } = self;
         let is_known = tell(&mut |entry| match entry {
-            Entry::Slope(row, variable) => {
+            DerivativeEntry::Jacobian(row, variable) => {
                 jacobian.add_row(first + row, variables, variable);
             }
-            Entry::Curvature(one, other) => node.add_row_products(variables, one, other),
+            DerivativeEntry::Hessian(one, other) => node.add_row_products(variables, one, other),
         });
         if !is_known {
             (first..jacobian.rows()).for_each(|row| jacobian.fill(row));
@@ -99,13 +99,13 @@ pub fn stage_pattern<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: 
     let mut stage = Stage { pattern, variables, next };
     let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
     if is_last {
-        stage.add(next, |visit| terminal.pattern(visit));
-        stage.add(next + rows, |visit| terminal_cost.pattern(visit));
+        stage.add(next, |visit| terminal.visit_sparsity(visit));
+        stage.add(next + rows, |visit| terminal_cost.visit_sparsity(visit));
     } else {
         let dimensions = Dimensions { nx, nz, nw: P::Shape::NW };
         stage.add_interval_end(<P::Dynamics as Dynamics<f64>>::ORIGIN, dimensions, nu);
-        stage.add(next, |visit| path.pattern(visit));
-        stage.add(next + rows, |visit| stage_cost.pattern(visit));
+        stage.add(next, |visit| path.visit_sparsity(visit));
+        stage.add(next + rows, |visit| stage_cost.visit_sparsity(visit));
     }
     stage.pattern
 }

@@ -149,15 +149,15 @@ where
 
     fn limits(&self, stage: usize) -> Vec<[SoftBound; 2]> {
         let Some(view) = HeapOcp::qp(self).stages().nth(stage) else { return Vec::new() };
-        let values = (0..).map(|row| HeapOcp::limits(self, stage, row));
+        let values = (0..).map(|row| HeapOcp::given_bounds(self, stage, row));
         constraint_bounds(&view.g_bounds(), values)
     }
 
     fn check(&mut self) -> Result<(), String> {
-        if self.layout().free > 0 {
+        if self.layout().free_count > 0 {
             return Err(OcpError::FreeParameters.to_string());
         }
-        if self.layout().inner > 0 {
+        if self.layout().inner_rows > 0 {
             let what = "CasADi functions of problems with constraints at points inside intervals, or bounds of \
                 algebraic states";
             let remedy = "Write these as path constraints at nodes";
@@ -210,14 +210,14 @@ fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
     Derivatives { clear, interval }: Derivatives<'_>,
 ) -> Result<f64, OcpError> {
     ends.clear();
-    ocp.linearise_apart(curvature, clear, &mut |k, step| {
+    ocp.linearise_separately(curvature, clear, &mut |k, step| {
         ends.extend(step.x);
         let [xx, xu, uu] = step.hessian;
         interval(k, &[step.dx, step.du, xx, xu, uu]);
     })?;
     let phi = ends.len();
     ends.resize(ocp.ends(), 0.0);
-    ocp.constraints(ends.get_mut(phi..).unwrap_or_default())
+    ocp.evaluate_constraints(ends.get_mut(phi..).unwrap_or_default())
 }
 
 /// States, controls and multipliers to where the problem reads them.

@@ -73,8 +73,8 @@ struct ConsistencyWorkspace<M: Constrained, T: Real> {
     /// `L`
     lower: MatrixYY<Invariants<M>, T>,
     /// `Σ |G_ij| |x_j|` over the states that are held; zero if there are none.
-    held: ArrayY<Invariants<M>, T>,
-    step: ArrayX<M, T>,
+    held_magnitude: ArrayY<Invariants<M>, T>,
+    correction: ArrayX<M, T>,
 }
 
 impl<M: Constrained> Consistent<M> {
@@ -88,13 +88,13 @@ impl<M: Constrained> Consistent<M> {
     /// # Errors
     /// [`Inconsistent::NoSuchState`]
     pub fn hold(mut self, name: &'static str) -> Result<Self, Inconsistent> {
-        let mut found = false;
+        let mut iterate = false;
         for (held, state) in self.held.as_mut().iter_mut().zip(M::STRUCTURE.x) {
             if name_matches(name, state) {
-                (*held, found) = (true, true);
+                (*held, iterate) = (true, true);
             }
         }
-        if found { Ok(self) } else { Err(Inconsistent::NoSuchState { name }) }
+        if iterate { Ok(self) } else { Err(Inconsistent::NoSuchState { name }) }
     }
 
     /// The states nearest to `x`, in the sum of squares.
@@ -111,24 +111,24 @@ impl<M: Constrained> Consistent<M> {
             [(Argument::X0, x.as_slice()), (Argument::P, p.as_slice()), (Argument::T, &[t])]
         {
             if let Some((index, value)) = find_non_finite(values) {
-                let name = crate::finite::name::<M>(argument, index);
+                let name = crate::finite::element_name::<M>(argument, index);
                 return Err(Inconsistent::NonFiniteInput { argument, index, name, value });
             }
         }
         let mut work = ConsistencyWorkspace::<M, T>::new(p, t);
-        let (mut found, mut last) = (*x, f64::INFINITY);
+        let (mut iterate, mut last_change) = (*x, f64::INFINITY);
         let epsilon = T::EPSILON;
         for _ in 0..MAX_ITERATIONS {
-            work.linearise(&self.held, &found)?;
+            work.linearise(&self.held, &iterate)?;
             work.factorise()?;
-            let moved = work.gauss_newton_step(x, &mut found);
+            let change = work.gauss_newton_step(x, &mut iterate);
             // Once it is at rounding, it does not shrink any more.
-            if moved <= 4.0 * epsilon || (moved < 1e3 * epsilon && moved > 0.5 * last) {
-                return Ok(found);
+            if change <= 4.0 * epsilon || (change < 1e3 * epsilon && change > 0.5 * last_change) {
+                return Ok(iterate);
             }
-            last = moved;
+            last_change = change;
         }
-        work.linearise(&self.held, &found)?;
+        work.linearise(&self.held, &iterate)?;
         let (output, residual) = work.largest_violation();
         let (equation, derivative) = equation_and_derivative::<M>(output);
         Err(Inconsistent::NotConverged { equation, derivative, residual })
@@ -157,15 +157,19 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
         self.v.as_mut()[nx..2 * nx].copy_from_slice(x.as_slice());
         <Invariants<M> as Function>::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
         self.rows.as_mut_slice().fill(T::ZERO);
-        self.held.as_mut().fill(T::ZERO);
+        self.held_magnitude.as_mut().fill(T::ZERO);
         let pattern = &<Invariants<M> as Function>::STRUCTURE.jacobian;
-        let mut bad = find_non_finite(self.y.as_ref());
+        let mut non_finite = find_non_finite(self.y.as_ref());
         for ((output, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
             if !value.is_finite() {
-                bad = bad.or(Some((output, value.to_f64())));
+                non_finite = non_finite.or(Some((output, value.to_f64())));
             }
             let state = variable.wrapping_sub(nx);
-            match (held.as_ref().get(state), x.as_slice().get(state), self.held.as_mut().get_mut(output)) {
+            match (
+                held.as_ref().get(state),
+                x.as_slice().get(state),
+                self.held_magnitude.as_mut().get_mut(output),
+            ) {
                 (Some(false), ..) => update_entry(&mut self.rows, output, state, |_| value),
                 (Some(true), Some(x), Some(sum)) => {
                     *sum = *sum + value.abs() * (x.abs() + T::from_f64(MIN_STATE_SIZE));
@@ -173,7 +177,7 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
                 _ => {}
             }
         }
-        let Some((output, value)) = bad else { return Ok(()) };
+        let Some((output, value)) = non_finite else { return Ok(()) };
         let (equation, derivative) = equation_and_derivative::<M>(output);
         Err(Inconsistent::NonFinite { equation, derivative, value })
     }
@@ -186,9 +190,9 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
             let norm = |rows: &MatrixYX<Invariants<M>, T>| {
                 (0..nx).fold(T::ZERO, |sum, state| sum + rows[(i, state)] * rows[(i, state)]).sqrt()
             };
-            let whole = norm(&self.rows);
-            let rounding = T::from_f64(16.0 * T::EPSILON) * self.held[i];
-            if whole == T::ZERO && self.held[i] > T::ZERO && self.y[i].abs() <= rounding {
+            let row_norm = norm(&self.rows);
+            let rounding = T::from_f64(16.0 * T::EPSILON) * self.held_magnitude[i];
+            if row_norm == T::ZERO && self.held_magnitude[i] > T::ZERO && self.y[i].abs() <= rounding {
                 self.y[i] = T::ZERO;
                 self.lower[(i, i)] = T::ONE;
                 continue;
@@ -203,17 +207,18 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
                     }
                 }
             }
-            let rest = norm(&self.rows);
+            let remaining_norm = norm(&self.rows);
             // What remains of equal rows is rounding; squares of it say whether anything does.
-            let independent = rest.to_f64() * rest.to_f64() > T::EPSILON * whole.to_f64() * whole.to_f64();
+            let independent = remaining_norm.to_f64() * remaining_norm.to_f64()
+                > T::EPSILON * row_norm.to_f64() * row_norm.to_f64();
             if !independent {
                 let (equation, derivative) = equation_and_derivative::<M>(i);
                 let residual = self.y[i].to_f64();
                 return Err(Inconsistent::Dependent { equation, derivative, residual });
             }
-            self.lower[(i, i)] = rest;
+            self.lower[(i, i)] = remaining_norm;
             for state in 0..nx {
-                self.rows[(i, state)] = self.rows[(i, state)] / rest;
+                self.rows[(i, state)] = self.rows[(i, state)] / remaining_norm;
             }
         }
         Ok(())
@@ -223,8 +228,8 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
     /// not finite.
     fn gauss_newton_step(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
         let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
-        let (given, found) = (given.as_slice(), found.as_mut_slice());
-        self.step.as_mut().fill(T::ZERO);
+        let (given, iterate) = (given.as_slice(), found.as_mut_slice());
+        self.correction.as_mut().fill(T::ZERO);
         // `y` becomes `L⁻¹ y`; the part of `x − x̂` in the rows of `Q` is taken away by it.
         for i in 0..ny {
             let mut value = self.y[i];
@@ -232,24 +237,25 @@ impl<M: Constrained, T: Real> ConsistencyWorkspace<M, T> {
                 value = value - self.lower[(i, j)] * self.y[j];
             }
             self.y[i] = value / self.lower[(i, i)];
-            let along = (0..nx)
-                .fold(T::ZERO, |sum, state| sum + self.rows[(i, state)] * (found[state] - given[state]));
+            let projection = (0..nx)
+                .fold(T::ZERO, |sum, state| sum + self.rows[(i, state)] * (iterate[state] - given[state]));
             for state in 0..nx {
-                self.step[state] = self.step[state] + self.rows[(i, state)] * (along - self.y[i]);
+                self.correction[state] =
+                    self.correction[state] + self.rows[(i, state)] * (projection - self.y[i]);
             }
         }
-        let (mut moved, mut size) = (0.0f64, 0.0f64);
+        let (mut change, mut size) = (0.0f64, 0.0f64);
         for state in 0..nx {
-            let next = given[state] + self.step[state];
-            moved = moved.max((next - found[state]).to_f64().abs());
+            let next = given[state] + self.correction[state];
+            change = change.max((next - iterate[state]).to_f64().abs());
             size = size.max(next.to_f64().abs());
-            found[state] = next;
+            iterate[state] = next;
         }
         // A maximum does not show what is not a number.
-        if find_non_finite(found).is_some() {
+        if find_non_finite(iterate).is_some() {
             return f64::NAN;
         }
-        if size > 0.0 { moved / size } else { moved }
+        if size > 0.0 { change / size } else { change }
     }
 
     /// The invariant that is violated most.

@@ -29,12 +29,12 @@ pub(super) const fn equation_count<M: Projectable>() -> usize {
     <ProjectionFunction<M> as Function>::Outputs::NY
 }
 /// Where `x̂` begins among the variables `(ẋ, x, ν, x̂, p, t)` of `F`.
-const fn given_states_begin<M: Projectable>() -> usize {
+const fn given_states_offset<M: Projectable>() -> usize {
     M::Shape::NX + equation_count::<M>()
 }
 /// Where `p` begins.
-const fn parameters<M: Projectable>() -> usize {
-    given_states_begin::<M>() + M::Shape::NX
+const fn parameters_offset<M: Projectable>() -> usize {
+    given_states_offset::<M>() + M::Shape::NX
 }
 
 /// The projection at a state.
@@ -47,7 +47,7 @@ pub(super) struct Kkt<M: Projectable, T: Real> {
     /// `K`, and then its factors: `L` with a diagonal of ones, and `U`.
     factors: MatrixYY<ProjectionFunction<M>, T>,
     /// The row that was exchanged with each.
-    exchanged: ArrayY<ProjectionFunction<M>, usize>,
+    pivot_rows: ArrayY<ProjectionFunction<M>, usize>,
 }
 
 impl<M: Projectable, T: Real> Kkt<M, T> {
@@ -61,11 +61,11 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         let v = self.v.as_mut();
         v.fill(T::ZERO);
         v[nx..2 * nx].copy_from_slice(x.as_slice());
-        v[given_states_begin::<M>()..][..nx].copy_from_slice(x.as_slice());
-        v[parameters::<M>()..][..M::Shape::NP].copy_from_slice(p.as_slice());
-        v[parameters::<M>() + M::Shape::NP] = t;
+        v[given_states_offset::<M>()..][..nx].copy_from_slice(x.as_slice());
+        v[parameters_offset::<M>()..][..M::Shape::NP].copy_from_slice(p.as_slice());
+        v[parameters_offset::<M>() + M::Shape::NP] = t;
         <ProjectionFunction<M> as Function>::jacobian_constants::<T>(&mut self.jacobian);
-        let mut last = f64::INFINITY;
+        let mut last_change = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             self.linearise()?;
             let mut step = self.f;
@@ -78,14 +78,16 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
                     (moved, size) = (moved.max(step.to_f64().abs()), size.max(value.to_f64().abs()));
                 }
             }
-            let relative = if size > 0.0 { moved / size } else { moved };
+            let relative_change = if size > 0.0 { moved / size } else { moved };
             // Once it is at rounding, it does not shrink any more.
-            if relative <= 4.0 * T::EPSILON || (relative < 1e3 * T::EPSILON && relative > 0.25 * last) {
+            if relative_change <= 4.0 * T::EPSILON
+                || (relative_change < 1e3 * T::EPSILON && relative_change > 0.25 * last_change)
+            {
                 self.linearise()?;
                 x.as_mut_slice().copy_from_slice(&self.v.as_ref()[nx..2 * nx]);
                 return Ok(());
             }
-            last = relative;
+            last_change = relative_change;
         }
         Err(self.largest_violation_error())
     }
@@ -112,13 +114,13 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     /// parameter.
     pub fn check_parameters(&self) -> Result<(), Error> {
         // Of the invariants, if they have one; those of `Gᵀν` are in the rows before.
-        let mut found: Option<(usize, T)> = None;
+        let mut non_finite: Option<(usize, T)> = None;
         self.visit_parameter_jacobian(|row, _, value| {
-            if !value.is_finite() && found.is_none_or(|(last, _)| last < row) {
-                found = Some((row, value));
+            if !value.is_finite() && non_finite.is_none_or(|(last, _)| last < row) {
+                non_finite = Some((row, value));
             }
         });
-        let Some((row, value)) = found else { return Ok(()) };
+        let Some((row, value)) = non_finite else { return Ok(()) };
         let (equation, _) = invariant::<M>(row.saturating_sub(M::Shape::NX));
         let at = Place { step: 0, stage: 0, iteration: 0 };
         let (quantity, equation) = (Quantity::Jacobian, equation as usize);
@@ -127,14 +129,14 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
 
     /// What is violated most.
     fn largest_violation_error(&self) -> Error {
-        let (mut worst, mut residual) = (0, 0.0f64);
+        let (mut largest_index, mut residual) = (0, 0.0f64);
         for (output, value) in self.f.as_ref()[M::Shape::NX..].iter().enumerate() {
             let value = value.to_f64();
             if value.is_nan() || value.abs() > residual.abs() {
-                (worst, residual) = (output, value);
+                (largest_index, residual) = (output, value);
             }
         }
-        let (equation, derivative) = invariant::<M>(worst);
+        let (equation, derivative) = invariant::<M>(largest_index);
         Error::NotProjected { equation, derivative, residual }
     }
 
@@ -148,11 +150,11 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
                     pivot = row;
                 }
             }
-            self.exchanged[step] = pivot;
+            self.pivot_rows[step] = pivot;
             for column in 0..count {
-                let other = entry(&self.factors, pivot, column);
-                let own = core::mem::replace(&mut self.factors[(step, column)], other);
-                update_entry(&mut self.factors, pivot, column, |_| own);
+                let pivot_element = entry(&self.factors, pivot, column);
+                let current_element = core::mem::replace(&mut self.factors[(step, column)], pivot_element);
+                update_entry(&mut self.factors, pivot, column, |_| current_element);
             }
             let diagonal = self.factors[(step, step)];
             if diagonal == T::ZERO || !diagonal.is_finite() {
@@ -176,7 +178,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     pub fn solve(&self, b: &mut ArrayY<ProjectionFunction<M>, T>) {
         let count = equation_count::<M>();
         for step in 0..count {
-            exchange(b.as_mut(), step, self.exchanged[step]);
+            exchange(b.as_mut(), step, self.pivot_rows[step]);
         }
         for row in 0..count {
             for column in 0..row {
@@ -206,22 +208,22 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
             }
         }
         for step in (0..count).rev() {
-            exchange(b.as_mut(), step, self.exchanged[step]);
+            exchange(b.as_mut(), step, self.pivot_rows[step]);
         }
     }
 
     /// `d(x, ν)` where the given state changes by `change` and the parameters by `dp`.
     pub fn direction(
         &self,
-        change: impl Fn(usize) -> T,
-        dp: impl Fn(usize) -> T,
+        state_direction: impl Fn(usize) -> T,
+        parameter_direction: impl Fn(usize) -> T,
     ) -> ArrayY<ProjectionFunction<M>, T> {
         let mut b = ArrayY::<ProjectionFunction<M>, T>::from_fn(|row| {
-            if row < M::Shape::NX { change(row) } else { T::ZERO }
+            if row < M::Shape::NX { state_direction(row) } else { T::ZERO }
         });
         self.visit_parameter_jacobian(|row, parameter, value| {
             if let Some(b) = b.as_mut().get_mut(row) {
-                *b = *b - value * dp(parameter);
+                *b = *b - value * parameter_direction(parameter);
             }
         });
         self.solve(&mut b);
@@ -241,7 +243,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     pub fn visit_parameter_jacobian(&self, mut visit: impl FnMut(usize, usize, T)) {
         let pattern = &<ProjectionFunction<M> as Function>::STRUCTURE.jacobian;
         for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
-            if let Some(parameter) = variable.checked_sub(parameters::<M>()) {
+            if let Some(parameter) = variable.checked_sub(parameters_offset::<M>()) {
                 visit(row, parameter, value);
             }
         }
@@ -264,8 +266,8 @@ fn invariant<M: Projectable>(index: usize) -> (u32, u32) {
 
 /// Exchanges two elements.
 fn exchange<T: Copy>(b: &mut [T], first: usize, second: usize) {
-    if let (Some(&one), Some(&other)) = (b.get(first), b.get(second)) {
-        b[first] = other;
+    if let (Some(&one), Some(&pivot_element)) = (b.get(first), b.get(second)) {
+        b[first] = pivot_element;
         b[second] = one;
     }
 }
@@ -279,7 +281,7 @@ pub(super) enum Variable {
 
 /// Which variable an index of the pattern of `∇²(μᵀF)` is.
 pub(super) fn variable<M: Projectable>(index: usize) -> Variable {
-    match index.checked_sub(parameters::<M>()) {
+    match index.checked_sub(parameters_offset::<M>()) {
         Some(parameter) => Variable::Parameter(parameter),
         None => Variable::Unknown(index.saturating_sub(M::Shape::NX)),
     }

@@ -3,7 +3,7 @@
 use super::Projectable;
 use super::kkt::{Kkt, ProjectionFunction, Variable, variable};
 use crate::error::{Argument, Error};
-use crate::finite::{check_forward, check_named, check_output, check_second};
+use crate::finite::{check_forward, check_model_input, check_output, check_second_derivatives};
 use crate::function::{ArrayY, Function};
 use crate::integrator::Integrator;
 use crate::memory::{Family, Memory, WithAdjoint, WithForward, WithHessian};
@@ -85,11 +85,11 @@ struct HessianMemory<M: Projectable, T: Real> {
     by_x: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYX<M::Shape, T>,
     by_u: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYU<M::Shape, T>,
     by_p: <<ProjectionFunction<M> as Function>::Outputs as Outputs>::MatrixYP<M::Shape, T>,
-    second: <ProjectionFunction<M> as Function>::Hessian<T>,
+    hessian_entries: <ProjectionFunction<M> as Function>::Hessian<T>,
 }
 
 /// `A + B` element by element.
-fn add<T: Real>(to: &mut [T], from: &[T]) {
+fn add_assign<T: Real>(to: &mut [T], from: &[T]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *to + *from);
 }
 
@@ -137,12 +137,12 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I>
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&mut NominalMemory<M, T>, Error> {
         let p = self.prepare_integrator()?;
-        let end = *self.integrator.solve_with_quadrature(x0, u, h, along)?;
+        let nominal = *self.integrator.solve_with_quadrature(x0, u, h, integrand)?;
         let memory = I::Memory::nominal(&mut self.nominal)?;
-        memory.result = end;
+        memory.result = nominal;
         memory.kkt.project(&mut memory.result.x, &p, self.time + h)?;
         Ok(memory)
     }
@@ -153,16 +153,16 @@ fn write_projected_columns<M: Projectable, T: Real, V: Matrix<T>>(
     kkt: &Kkt<M, T>,
     block: &mut V,
     parameters: bool,
-    mut keep: impl FnMut(usize, usize, T),
+    mut visit_row: impl FnMut(usize, usize, T),
 ) {
     for column in 0..V::COLUMNS {
-        let one = |parameter| if parameters && parameter == column { T::ONE } else { T::ZERO };
-        let change = kkt.direction(|row| block[(row, column)], one);
-        for (row, value) in change.as_ref().iter().enumerate() {
+        let parameter_seed = |parameter| if parameters && parameter == column { T::ONE } else { T::ZERO };
+        let direction = kkt.direction(|row| block[(row, column)], parameter_seed);
+        for (row, value) in direction.as_ref().iter().enumerate() {
             if row < V::ROWS {
                 block[(row, column)] = *value;
             }
-            keep(row, column, *value);
+            visit_row(row, column, *value);
         }
     }
 }
@@ -197,9 +197,9 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        Ok(&self.project(x0, u, h, along)?.result)
+        Ok(&self.project(x0, u, h, integrand)?.result)
     }
 
     fn forward_with_quadrature(
@@ -207,13 +207,13 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         I::Memory: WithForward,
     {
         let p = self.prepare_integrator()?;
-        let forward = self.integrator.forward_with_quadrature(x0, u, h, along)?;
+        let forward = self.integrator.forward_with_quadrature(x0, u, h, integrand)?;
         let result = I::Memory::forward(&mut self.forward)?;
         result.clone_from(forward);
         let memory = I::Memory::nominal(&mut self.nominal)?;
@@ -232,20 +232,20 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error>
     where
         I::Memory: WithAdjoint<1>,
     {
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let memory = self.project(x0, u, h, None)?;
         memory.kkt.check_parameters()?;
         let mu = memory.kkt.multipliers(lambda);
         check_output(mu.as_ref(), 0)?;
-        let mut of_integrator = VectorX::<M, T>::zeroed();
-        of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
+        let mut integrator_seed = VectorX::<M, T>::zeroed();
+        integrator_seed.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
-        let adjoint = self.integrator.adjoint_with_quadrature(x0, u, h, &of_integrator, along)?;
+        let adjoint = self.integrator.adjoint_with_quadrature(x0, u, h, &integrator_seed, integrand)?;
         let result = I::Memory::adjoint(&mut self.adjoint)?;
         result.clone_from(adjoint);
         result.nominal.x = x;
@@ -266,20 +266,20 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         I::Memory: WithHessian,
     {
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let memory = self.project(x0, u, h, None)?;
         memory.kkt.check_parameters()?;
         let mu = memory.kkt.multipliers(lambda);
         check_output(mu.as_ref(), 0)?;
-        let mut of_integrator = VectorX::<M, T>::zeroed();
-        of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
+        let mut integrator_seed = VectorX::<M, T>::zeroed();
+        integrator_seed.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
         let x = memory.result.x;
-        let hessian = self.integrator.hessian_with_quadrature(x0, u, h, &of_integrator, along)?;
+        let hessian = self.integrator.hessian_with_quadrature(x0, u, h, &integrator_seed, integrand)?;
         let memory = I::Memory::hessian(&mut self.hessian)?;
         memory.result.clone_from(hessian);
         let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
@@ -287,7 +287,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         let result = &memory.result;
         check_forward(&result.first.forward, 0)?;
         check_output(result.first.grad_p.as_slice(), 0)?;
-        check_second(result)?;
+        check_second_derivatives(result)?;
         Ok(result)
     }
 }
@@ -300,7 +300,7 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
         mu: &ArrayY<ProjectionFunction<M>, T>,
         x: VectorX<M, T>,
     ) {
-        let Self { result, by_x, by_u, by_p, second } = self;
+        let Self { result, by_x, by_u, by_p, hessian_entries: second } = self;
         let first = &mut result.first;
         first.forward.nominal.x = x;
         write_projected_columns(kkt, &mut first.forward.dx_dx0, false, |row, column, value| {
@@ -319,9 +319,9 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
                 *gradient = *gradient - value * *mu;
             }
         });
-        add(first.grad_p.as_mut_slice(), gradient.as_slice());
+        add_assign(first.grad_p.as_mut_slice(), gradient.as_slice());
         kkt.hessian(mu, second);
-        let row_of = |index: usize| {
+        let direction_row = |index: usize| {
             let (nx, nu) = (M::Shape::NX, M::Shape::NU);
             ArrayW::<M, T>::from_fn(|w| match (variable::<M>(index), w.checked_sub(nx + nu)) {
                 (Variable::Parameter(parameter), p) => {
@@ -340,22 +340,27 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
         };
         let pattern = &<ProjectionFunction<M> as Function>::STRUCTURE.hessian;
         for ((i, j), &value) in pattern.iter().zip(second.as_ref()) {
-            let (a, b) = (row_of(i), row_of(j));
-            subtract(result, &a, &b, if i == j { value * T::from_f64(0.5) } else { value });
+            let (a, b) = (direction_row(i), direction_row(j));
+            subtract_rank_two(result, &a, &b, if i == j { value * T::from_f64(0.5) } else { value });
         }
     }
 }
 
 /// `H −= value (a bᵀ + b aᵀ)`
-fn subtract<M: Dae, T: Real>(result: &mut Hessian<M, T>, a: &ArrayW<M, T>, b: &ArrayW<M, T>, value: T) {
+fn subtract_rank_two<M: Dae, T: Real>(
+    result: &mut Hessian<M, T>,
+    a: &ArrayW<M, T>,
+    b: &ArrayW<M, T>,
+    value: T,
+) {
     let (a, b) = (split_row::<M, T>(a), split_row::<M, T>(b));
     let [x, u, p] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
-    block(&mut result.h_xx, x, x, value);
-    block(&mut result.h_xu, x, u, value);
-    block(&mut result.h_uu, u, u, value);
-    block(&mut result.h_xp, x, p, value);
-    block(&mut result.h_up, u, p, value);
-    block(&mut result.h_pp, p, p, value);
+    subtract_rank_two_block(&mut result.h_xx, x, x, value);
+    subtract_rank_two_block(&mut result.h_xu, x, u, value);
+    subtract_rank_two_block(&mut result.h_uu, u, u, value);
+    subtract_rank_two_block(&mut result.h_xp, x, p, value);
+    subtract_rank_two_block(&mut result.h_up, u, p, value);
+    subtract_rank_two_block(&mut result.h_pp, p, p, value);
 }
 
 /// What belongs to `x₀`, `u` and `p`.
@@ -366,7 +371,12 @@ fn split_row<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
 }
 
 /// The same of one block, with the parts of its rows and of its columns.
-fn block<T: Real, V: Matrix<T>>(matrix: &mut V, rows: [&[T]; 2], columns: [&[T]; 2], value: T) {
+fn subtract_rank_two_block<T: Real, V: Matrix<T>>(
+    matrix: &mut V,
+    rows: [&[T]; 2],
+    columns: [&[T]; 2],
+    value: T,
+) {
     for (j, (a_j, b_j)) in columns[0].iter().zip(columns[1]).enumerate() {
         for (i, (a_i, b_i)) in rows[0].iter().zip(rows[1]).enumerate() {
             update_entry(matrix, i, j, |element| element - value * (*a_i * *b_j + *b_i * *a_j));

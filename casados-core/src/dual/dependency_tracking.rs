@@ -11,26 +11,26 @@ use num_dual::{DualNum, DualStruct, Mappable};
 use num_traits::{FromPrimitive, Inv, Num, One, Signed, Zero};
 
 std::thread_local! {
-    static TAPE: RefCell<Tape> = const { RefCell::new(Tape::empty()) };
+    static TAPE: RefCell<DependencyTape> = const { RefCell::new(DependencyTape::empty()) };
 }
 
 /// What the numbers of one run depend on, and whether the run looked at one that depends on
 /// anything.
 #[derive(Debug)]
-pub(super) struct Tape {
+pub(super) struct DependencyTape {
     /// Words of one set of variables.
-    words: usize,
+    words_per_set: usize,
     /// One set for each number; the first is empty.
     sets: Vec<u64>,
     /// Symmetric: which pairs of variables have a second derivative of some number.
-    pairs: Vec<u64>,
-    looked: bool,
+    interactions: Vec<u64>,
+    value_was_read: bool,
 }
 
 /// A set of variables.
-pub(super) struct Set(Vec<u64>);
+pub(super) struct VariableSet(Vec<u64>);
 
-impl Set {
+impl VariableSet {
     /// Whether a variable is in it.
     pub(super) fn contains(&self, variable: usize) -> bool {
         has_bit(&self.0, variable)
@@ -52,38 +52,43 @@ enum Kind {
     General,
 }
 
-impl Tape {
+impl DependencyTape {
     const fn empty() -> Self {
-        Self { words: 0, sets: Vec::new(), pairs: Vec::new(), looked: false }
+        Self { words_per_set: 0, sets: Vec::new(), interactions: Vec::new(), value_was_read: false }
     }
 
     /// Records a run with so many variables. A run inside a run would take the tape away from it:
     /// none happens, because a model does not differentiate itself.
     pub(super) fn record(variables: usize, run: impl FnOnce()) -> Self {
         let words = variables.div_ceil(64);
-        let tape = Self { words, sets: vec![0; words], pairs: vec![0; variables * words], looked: false };
+        let tape = Self {
+            words_per_set: words,
+            sets: vec![0; words],
+            interactions: vec![0; variables * words],
+            value_was_read: false,
+        };
         TAPE.with_borrow_mut(|current| *current = tape);
         run();
         TAPE.replace(Self::empty())
     }
 
     pub(super) fn depends_on_value(&self) -> bool {
-        self.looked
+        self.value_was_read
     }
 
     /// Whether a number has a second derivative with respect to two variables.
     pub(super) fn interacts(&self, a: usize, b: usize) -> bool {
-        has_bit(self.pairs.get(a * self.words..).unwrap_or_default(), b)
+        has_bit(self.interactions.get(a * self.words_per_set..).unwrap_or_default(), b)
     }
 
     fn dependencies_of(&self, node: usize) -> Vec<u64> {
-        let start = node * self.words;
-        self.sets.get(start..start + self.words).unwrap_or_default().to_vec()
+        let start = node * self.words_per_set;
+        self.sets.get(start..start + self.words_per_set).unwrap_or_default().to_vec()
     }
 
     fn push(&mut self, set: &[u64]) -> usize {
         self.sets.extend_from_slice(set);
-        (self.sets.len() / self.words.max(1)).saturating_sub(1)
+        (self.sets.len() / self.words_per_set.max(1)).saturating_sub(1)
     }
 
     fn combine(&mut self, kind: Kind, a: usize, b: usize) -> usize {
@@ -105,10 +110,10 @@ impl Tape {
     }
 
     fn mark_interactions(&mut self, x: &[u64], y: &[u64]) {
-        let variables = self.pairs.len() / self.words.max(1);
+        let variables = self.interactions.len() / self.words_per_set.max(1);
         for (x, y) in [(x, y), (y, x)] {
             for variable in (0..variables).filter(|&variable| has_bit(x, variable)) {
-                let row = self.pairs.iter_mut().skip(variable * self.words);
+                let row = self.interactions.iter_mut().skip(variable * self.words_per_set);
                 row.zip(y).for_each(|(pairs, y)| *pairs |= y);
             }
         }
@@ -127,7 +132,7 @@ pub struct Tracked {
 impl Tracked {
     pub(super) fn variable(value: f64, index: usize) -> Self {
         let node = TAPE.with_borrow_mut(|tape| {
-            let mut set = vec![0; tape.words];
+            let mut set = vec![0; tape.words_per_set];
             if let Some(word) = set.get_mut(index / 64) {
                 *word |= 1 << (index % 64);
             }
@@ -136,8 +141,8 @@ impl Tracked {
         Self { value, node }
     }
 
-    pub(super) fn dependencies(self) -> Set {
-        TAPE.with_borrow(|tape| Set(tape.dependencies_of(self.node)))
+    pub(super) fn dependencies(self) -> VariableSet {
+        TAPE.with_borrow(|tape| VariableSet(tape.dependencies_of(self.node)))
     }
 
     const fn constant(value: f64) -> Self {
@@ -155,14 +160,14 @@ impl Tracked {
         Self::combine(Kind::General, value, self, self)
     }
 
-    fn linear(self, value: f64) -> Self {
+    fn linear_function(self, value: f64) -> Self {
         Self { value, node: self.node }
     }
 
     /// The value, for a decision.
     fn decision_value(&self) -> f64 {
         if self.node != 0 {
-            TAPE.with_borrow_mut(|tape| tape.looked = true);
+            TAPE.with_borrow_mut(|tape| tape.value_was_read = true);
         }
         self.value
     }
@@ -212,7 +217,7 @@ operator! {
 impl Neg for Tracked {
     type Output = Self;
     fn neg(self) -> Self {
-        self.linear(-self.value)
+        self.linear_function(-self.value)
     }
 }
 
@@ -372,7 +377,7 @@ impl DualNum for Tracked {
         Self::constant(re)
     }
     fn scale(self, factor: &f64) -> Self {
-        self.linear(self.value * factor)
+        self.linear_function(self.value * factor)
     }
     fn powi(&self, n: i32) -> Self {
         self.function(self.value.powi(n))

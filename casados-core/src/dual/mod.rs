@@ -63,9 +63,9 @@ pub trait DualModel: Dae {
 
 /// The passes of a model, found when it is first differentiated. Which point it is differentiated
 /// at does not matter: a model that looks at its variables gets dense passes.
-fn passes<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
+fn colouring<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
     M::passes().get_or_init(|| {
-        Passes::find(M::Shape::NV, M::Shape::NK, point, |variable, equation| {
+        Passes::colour_model(M::Shape::NV, M::Shape::NK, point, |variable, equation| {
             M::evaluate::<Tracked>(variable, equation);
         })
     })
@@ -89,7 +89,7 @@ pub fn residual_jacobian<M: DualModel, S: Lanes>(
         S::from_f64(0.0).store(entry);
     }
     for lane in 0..S::LANES {
-        first_order::<M>(
+        jacobian_entries::<M>(
             |i| S::lane(&v[i], lane),
             |row, column, value| {
                 S::set_lane(&mut jacobian[jacobian_entry::<M::Shape>(row, column)], lane, value);
@@ -132,7 +132,7 @@ pub fn adjoint<M: DualModel, S: Lanes>(
         S::from_f64(0.0).store(element);
     }
     for lane in 0..S::LANES {
-        first_order::<M>(
+        jacobian_entries::<M>(
             |i| S::lane(&v[i], lane),
             |row, column, value| {
                 let sum = S::lane(&gradient[column], lane) + S::lane(&mu[row], lane) * value;
@@ -152,7 +152,7 @@ pub fn hessian<M: DualModel, S: Lanes>(
         S::from_f64(0.0).store(entry);
     }
     for lane in 0..S::LANES {
-        let passes = passes::<M>(|i| S::lane(&v[i], lane));
+        let passes = colouring::<M>(|i| S::lane(&v[i], lane));
         for &(first, second) in passes.pairs() {
             M::evaluate::<HyperDual64>(
                 |i| {
@@ -175,8 +175,8 @@ pub fn hessian<M: DualModel, S: Lanes>(
 }
 
 /// Every structural non-zero of the Jacobian at one point.
-fn first_order<M: DualModel>(point: impl Fn(usize) -> f64, mut entry: impl FnMut(usize, usize, f64)) {
-    let passes = passes::<M>(&point);
+fn jacobian_entries<M: DualModel>(point: impl Fn(usize) -> f64, mut entry: impl FnMut(usize, usize, f64)) {
+    let passes = colouring::<M>(&point);
     for colour in 0..passes.len() {
         M::evaluate::<Dual64>(
             |i| Dual64::new(point(i), f64::from(passes.contains(colour, i))),

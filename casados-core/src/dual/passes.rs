@@ -1,6 +1,6 @@
 //! Which variables are differentiated in one evaluation.
 
-use super::dependency_tracking::{Tape, Tracked};
+use super::dependency_tracking::{DependencyTape, Tracked};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -22,7 +22,7 @@ pub struct Passes {
 
 impl Passes {
     /// Runs the model on numbers that track what they depend on. `variables` counts `t`.
-    pub(super) fn find(
+    pub(super) fn colour_model(
         variables: usize,
         equations: usize,
         point: impl Fn(usize) -> f64,
@@ -30,7 +30,7 @@ impl Passes {
     ) -> Self {
         let columns = variables - 1;
         let mut depends = vec![vec![false; columns]; equations];
-        let tape = Tape::record(variables, || {
+        let tape = DependencyTape::record(variables, || {
             model(&|i| Tracked::variable(point(i), i), &mut |row, value: Tracked| {
                 let depends_on = value.dependencies();
                 if let Some(row) = depends.get_mut(row) {
@@ -42,11 +42,15 @@ impl Passes {
             depends.iter_mut().for_each(|row| row.fill(true));
         }
         let interacts = |a: usize, b: usize| tape.depends_on_value() || tape.interacts(a, b);
-        Self::colour(columns, &depends, interacts)
+        Self::colour_greedily(columns, &depends, interacts)
     }
 
     /// Colours greedily: each variable takes the first colour that is free.
-    fn colour(variables: usize, depends: &[Vec<bool>], interacts: impl Fn(usize, usize) -> bool) -> Self {
+    fn colour_greedily(
+        variables: usize,
+        depends: &[Vec<bool>],
+        interacts: impl Fn(usize, usize) -> bool,
+    ) -> Self {
         let mut colours = Vec::with_capacity(variables);
         let mut columns: Vec<Vec<Option<usize>>> = Vec::new();
         for variable in 0..variables {

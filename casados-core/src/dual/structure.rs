@@ -6,7 +6,7 @@ use crate::shape::Shape;
 #[must_use]
 pub const fn jacobian_pattern<M: Shape, const N: usize>() -> ([u32; N], [u32; N]) {
     let (mut rows, mut columns) = ([0; N], [0; N]);
-    let widths = widths::<M>();
+    let widths = block_widths::<M>();
     let (mut entry, mut block, mut start) = (0, 0, 0);
     while block < 5 {
         let mut row = 0;
@@ -48,7 +48,7 @@ pub const fn hessian_pattern<const N: usize>() -> ([u32; N], [u32; N]) {
 /// Where an entry is in the Jacobian.
 pub fn jacobian_entry<M: Shape>(row: usize, column: usize) -> usize {
     let mut start = 0;
-    for width in widths::<M>() {
+    for width in block_widths::<M>() {
         if column < start + width {
             return M::NK * start + row * width + column - start;
         }
@@ -64,7 +64,7 @@ pub fn hessian_entry(a: usize, b: usize) -> usize {
 }
 
 /// Numbers of columns of the five blocks.
-const fn widths<M: Shape>() -> [usize; 5] {
+const fn block_widths<M: Shape>() -> [usize; 5] {
     [M::NX, M::NX, M::NZ, M::NU, M::NP]
 }
 
@@ -74,7 +74,7 @@ mod tests {
     use crate::shape::Dims;
 
     #[test]
-    fn entries_are_where_the_patterns_say() {
+    fn positions_of_entries() {
         type Shape = Dims<2, 1, 3, 2, 3, 11, 7>;
         let (rows, columns) = jacobian_pattern::<Shape, 30>();
         for entry in 0..30 {

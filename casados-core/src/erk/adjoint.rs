@@ -5,10 +5,10 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
-use super::along::Beside;
 use super::forward::Variation;
 use super::scheme::{Grid, Scheme, is_zero};
-use super::step::{Own, Point, Record, add};
+use super::stage_integrand::StageIntegrand;
+use super::step::{StagePoint, StepRecord, UnitStride, add};
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
@@ -20,7 +20,7 @@ use bytemuck::Zeroable;
 /// `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Sweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
+pub(super) struct AdjointSweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
     /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the
     /// current stage is in `dxi`, `ξ̄_i` in `dk`.
     pub forward: Variation<M, E, R, S>,
@@ -33,16 +33,16 @@ pub(super) struct Sweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
 pub(super) type Multipliers<M, E, const S: usize> = [ArrayK<M, [E; 1]>; S];
 
 /// The way back over the steps.
-pub(super) struct Way<'a, M: Ode, E: Lanes, const S: usize> {
+pub(super) struct AdjointProblem<'a, M: Ode, E: Lanes, const S: usize> {
     pub scheme: &'a Scheme<M, E, S>,
     pub grid: &'a Grid<E>,
     /// How many seeds there are.
     pub columns: usize,
 }
 
-impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
+impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> AdjointSweep<M, E, R, S> {
     /// Seeds: of each state the columns.
-    pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> E) {
+    pub fn set_seeds(&mut self, columns: usize, seed: impl Fn(usize, usize) -> E) {
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
             for (column, value) in lambda.as_mut()[..columns].iter_mut().enumerate() {
                 *value = seed(x, column);
@@ -52,50 +52,50 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
 
     /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of
     /// every stage for the Hessian. An integrand takes part if there is one seed.
-    pub fn run(
+    pub fn integrate_backwards(
         &mut self,
-        way: Way<'_, M, E, S>,
-        point: &mut Point<M, E>,
-        records: &[Record<M, E, S>],
+        problem: AdjointProblem<'_, M, E, S>,
+        point: &mut StagePoint<M, E>,
+        records: &[StepRecord<M, E, S>],
         mut multipliers: Option<&mut [Multipliers<M, E, S>]>,
-        along: &mut impl Beside<M, E>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<(), Error> {
-        let columns = way.columns.min(R::LEN);
-        M::jacobian_constants::<Own<E>>(&mut self.forward.jacobian);
+        let columns = problem.columns.min(R::LEN);
+        M::jacobian_constants::<UnitStride<E>>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
             lambda.as_mut()[..columns].fill(E::zeroed());
         }
         for (step, record) in records.iter().enumerate().rev() {
             let multipliers = multipliers.as_deref_mut().and_then(|of_steps| of_steps.get_mut(step));
-            self.step(&way, point, (step, record), multipliers, along)?;
+            self.step_backwards(&problem, point, (step, record), multipliers, integrand)?;
         }
         Ok(())
     }
 
-    fn step(
+    fn step_backwards(
         &mut self,
-        &Way { scheme, grid, columns }: &Way<'_, M, E, S>,
-        point: &mut Point<M, E>,
-        (step, record): (usize, &Record<M, E, S>),
+        &AdjointProblem { scheme, grid, columns }: &AdjointProblem<'_, M, E, S>,
+        point: &mut StagePoint<M, E>,
+        (step, record): (usize, &StepRecord<M, E, S>),
         mut multipliers: Option<&mut Multipliers<M, E, S>>,
-        along: &mut impl Beside<M, E>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<(), Error> {
         let columns = columns.min(R::LEN);
         for stage in (0..S).rev() {
             let at = Place { step, stage, iteration: 0 };
             let Self { forward: Variation { dk, dxi, jacobian, .. }, gradient, lambda } = self;
             stage_seed::<M, E, R, S>(scheme, (&grid.h, stage, columns), &*lambda, &*dk, dxi);
-            point.go(scheme, grid, record, at)?;
+            point.move_to_stage(scheme, grid, record, at)?;
             if columns == 1 {
                 let mut mu = ArrayK::<M, [E; 1]>::zeroed();
                 multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
                 // `∇(μᵀ f)` by reverse mode.
-                M::adjoint::<Own<E>>(&point.v, &mu, gradient);
+                M::adjoint::<UnitStride<E>>(&point.v, &mu, gradient);
                 // By `ẋ` it is a multiple of `μ_i`, and nobody's.
                 let nx = M::Shape::NX;
                 let used = gradient.as_ref().as_flattened().get(nx..).unwrap_or_default();
                 point.check(used, Quantity::Adjoint, at, |variable| nx + variable)?;
-                along.adjoint(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
+                integrand.add_gradient(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
                 if let Some(xibar) = dk.get_mut(stage) {
                     keep::<M, E, R>(&*gradient, xibar, lambda);
                 }
@@ -141,7 +141,7 @@ kernels! { by run_plain;
         kbar: &'k ArrayX<M, R>,
         mu: &'k mut ArrayK<M, [E; 1]>,
     ) {
-        for (mu, row) in mu.as_mut().iter_mut().zip(scheme.rows.as_ref()) {
+        for (mu, row) in mu.as_mut().iter_mut().zip(scheme.equations.as_ref()) {
             let kbar = kbar.as_ref().get(row.state).map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
             *mu = [row.factor * kbar];
         }
@@ -180,7 +180,7 @@ kernels! { by run_plain;
             let w = variable - nx;
             let sum = if w < nx { xibar.as_mut().get_mut(w) } else { lambda.as_mut().get_mut(w) };
             let (Some(sum), Some(&[value]), Some(row)) =
-                (sum, jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
+                (sum, jacobian.as_ref().get(entry), scheme.equations.as_ref().get(equation))
             else {
                 continue;
             };

@@ -1,13 +1,13 @@
 //! What computes: with single numbers one interval, with registers several of them side by side.
 
-use super::adjoint::{Multipliers, Sweep, Way};
-use super::along::{Beside, Nothing};
-use super::forward::{Variation, write};
-use super::hessian::Curvature;
+use super::adjoint::{AdjointProblem, AdjointSweep, Multipliers};
+use super::forward::{Variation, copy_to_columns};
+use super::forward_sweep::ForwardSweep;
+use super::hessian::HessianSum;
 use super::non_finite::NonFiniteLanes;
 use super::scheme::{Grid, Scheme};
-use super::step::{Base, Counts, Record};
-use super::sweeps::Sweeps;
+use super::stage_integrand::{NoIntegrand, StageIntegrand};
+use super::step::{EvaluationCounts, StepRecord, StepWorkspace};
 use crate::error::Error;
 use crate::linalg::{kernels, run_plain};
 use crate::memory::{Memory, WithForward, WithHessian};
@@ -23,15 +23,16 @@ use bytemuck::Zeroable;
 pub(crate) type Verdict<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
 
 /// The base of a call with derivatives, and where these are.
-type Differentiated<'a, M, E, const S: usize> = (&'a mut Base<M, E, S>, &'a mut ForwardMemory<M, E, S>);
+type Differentiated<'a, M, E, const S: usize> =
+    (&'a mut StepWorkspace<M, E, S>, &'a mut ForwardMemory<M, E, S>);
 
 /// The method, and the memory of its calls.
 pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
     pub(super) scheme: Scheme<M, E, S>,
-    pub(super) counts: Counts,
-    pub(super) base: W::Nominal<Base<M, E, S>>,
+    pub(super) counts: EvaluationCounts,
+    pub(super) workspace: W::Nominal<StepWorkspace<M, E, S>>,
     pub(super) adjoint: W::Nominal<AdjointMemory<M, E, S>>,
-    pub(super) trajectory: W::Tape<Record<M, E, S>>,
+    pub(super) trajectory: W::Tape<StepRecord<M, E, S>>,
     pub(super) forward: W::Forward<ForwardMemory<M, E, S>>,
     pub(super) hessian: W::Hessian<HessianMemory<M, E>>,
     pub(super) multipliers: W::HessianTape<Multipliers<M, E, S>>,
@@ -41,7 +42,7 @@ pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct AdjointMemory<M: Ode, E: Lanes, const S: usize> {
-    pub(super) sweep: Sweep<M, E, [E; 1], S>,
+    pub(super) sweep: AdjointSweep<M, E, [E; 1], S>,
     pub(super) result: Adjoint<M, E>,
 }
 
@@ -49,7 +50,7 @@ pub(super) struct AdjointMemory<M: Ode, E: Lanes, const S: usize> {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct ForwardMemory<M: Ode, E: Lanes, const S: usize> {
-    pub(super) sweep: Sweep<M, E, ArrayW<M, E>, S>,
+    pub(super) sweep: AdjointSweep<M, E, ArrayW<M, E>, S>,
     pub(super) result: ForwardAdjoint<M, E>,
 }
 
@@ -57,21 +58,21 @@ pub(super) struct ForwardMemory<M: Ode, E: Lanes, const S: usize> {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct HessianMemory<M: Ode, E: Lanes> {
-    pub(super) curvature: Curvature<M, E>,
+    pub(super) curvature: HessianSum<M, E>,
     pub(super) result: Hessian<M, E>,
 }
 
 impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     pub fn new(tableau: &Tableau<S>) -> Self {
-        Self::of(Scheme::new(tableau))
+        Self::with_scheme(Scheme::new(tableau))
     }
 
     /// With memory that is empty until the first call.
-    pub(super) fn of(scheme: Scheme<M, E, S>) -> Self {
+    pub(super) fn with_scheme(scheme: Scheme<M, E, S>) -> Self {
         Self {
             scheme,
-            counts: Counts::default(),
-            base: Default::default(),
+            counts: EvaluationCounts::default(),
+            workspace: Default::default(),
             adjoint: Default::default(),
             trajectory: Default::default(),
             forward: Default::default(),
@@ -85,27 +86,31 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn begin(&mut self) -> Result<[&mut [E]; 2], Error> {
-        let Base { point, x, .. } = W::nominal(&mut self.base)?;
-        self.counts = Counts::default();
-        point.counts = Counts::default();
+        let StepWorkspace { point, x, .. } = W::nominal(&mut self.workspace)?;
+        self.counts = EvaluationCounts::default();
+        point.counts = EvaluationCounts::default();
         point.non_finite.reset();
         Ok([x.as_mut(), point.variables_mut()])
     }
 
     /// What the last call did.
     pub fn statistics(&self) -> Statistics {
-        let Counts { steps, residuals, jacobians } = self.counts;
+        let EvaluationCounts { steps, residuals, jacobians } = self.counts;
         Statistics { steps, residuals, jacobians, ..Statistics::default() }
     }
 
-    pub fn solve(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Verdict<'_, E, Nominal<M, E>> {
-        along.begin();
-        let base = W::nominal(&mut self.base)?;
-        let run = base.run(&self.scheme, grid, along);
-        self.counts = base.point.counts;
-        run?;
-        along.finish()?;
-        let Base { point, x, result, .. } = base;
+    pub fn solve(
+        &mut self,
+        grid: &Grid<E>,
+        integrand: &mut impl StageIntegrand<M, E>,
+    ) -> Verdict<'_, E, Nominal<M, E>> {
+        integrand.reset();
+        let workspace = W::nominal(&mut self.workspace)?;
+        let outcome = workspace.integrate(&self.scheme, grid, integrand);
+        self.counts = workspace.point.counts;
+        outcome?;
+        integrand.finish()?;
+        let StepWorkspace { point, x, result, .. } = workspace;
         result.x.as_mut_slice().copy_from_slice(x.as_ref());
         Ok((point.non_finite.finite_lanes(), result))
     }
@@ -113,28 +118,29 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     pub fn forward(
         &mut self,
         grid: &Grid<E>,
-        sweeps: &mut impl Sweeps<M, E, S>,
-        along: &mut impl Beside<M, E>,
+        forward_sweep: &mut impl ForwardSweep<M, E, S>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Verdict<'_, E, Forward<M, E>>
     where
         W: WithForward,
     {
-        let (base, memory) = self.differentiate(grid, sweeps, along)?;
-        Ok((base.point.non_finite.finite_lanes(), &memory.result.forward))
+        let (workspace, memory) = self.differentiate(grid, forward_sweep, integrand)?;
+        Ok((workspace.point.non_finite.finite_lanes(), &memory.result.forward))
     }
 
     pub fn forward_adjoint(
         &mut self,
         grid: &Grid<E>,
         lambda: &[E],
-        sweeps: &mut impl Sweeps<M, E, S>,
+        forward_sweep: &mut impl ForwardSweep<M, E, S>,
     ) -> Verdict<'_, E, ForwardAdjoint<M, E>>
     where
         W: WithForward,
     {
-        let (base, ForwardMemory { sweep, result }) = self.differentiate(grid, sweeps, &mut Nothing)?;
+        let (base, ForwardMemory { sweep, result }) =
+            self.differentiate(grid, forward_sweep, &mut NoIntegrand)?;
         // With the Jacobian at hand the gradient is a product.
-        let Sweep { forward, lambda: gradient, .. } = sweep;
+        let AdjointSweep { forward, lambda: gradient, .. } = sweep;
         weigh::<M, E, _>(&forward.dx, lambda, &mut *gradient);
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &mut *result;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
@@ -146,63 +152,70 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     fn differentiate(
         &mut self,
         grid: &Grid<E>,
-        sweeps: &mut impl Sweeps<M, E, S>,
-        along: &mut impl Beside<M, E>,
+        forward_sweep: &mut impl ForwardSweep<M, E, S>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<Differentiated<'_, M, E, S>, Error>
     where
         W: WithForward,
     {
-        along.begin();
-        let base = W::nominal(&mut self.base)?;
+        integrand.reset();
+        let workspace = W::nominal(&mut self.workspace)?;
         let memory = W::forward(&mut self.forward)?;
         let (ForwardMemory { sweep, result }, scheme) = (&mut *memory, &self.scheme);
-        let run = sweeps.run(scheme, grid, base, &mut sweep.forward, along.is_any(), |point, dxi, at| {
-            along.forward(point.variables(), dxi, [grid.h, scheme.b[at.stage]], false, at)
-        });
-        self.counts = base.point.counts;
-        run?;
-        along.finish()?;
-        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
-        Ok((base, memory))
+        let outcome = forward_sweep.integrate(
+            scheme,
+            grid,
+            workspace,
+            &mut sweep.forward,
+            integrand.is_present(),
+            |point, dxi, at| {
+                integrand.add_forward(point.variables(), dxi, [grid.h, scheme.b[at.stage]], false, at)
+            },
+        );
+        self.counts = workspace.point.counts;
+        outcome?;
+        integrand.finish()?;
+        write_forward(grid, workspace, &sweep.forward, &mut result.forward)?;
+        Ok((workspace, memory))
     }
 
     pub fn adjoint(
         &mut self,
         grid: &Grid<E>,
         lambda: &[E],
-        along: &mut impl Beside<M, E>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Verdict<'_, E, Adjoint<M, E>> {
-        along.begin();
-        let base = W::nominal(&mut self.base)?;
+        integrand.reset();
+        let workspace = W::nominal(&mut self.workspace)?;
         let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
         let records = W::tape(&mut self.trajectory, grid.steps)?;
-        sweep.seed(1, |x, _| lambda[x]);
-        let way = Way { scheme: &self.scheme, grid, columns: 1 };
-        let run = base
-            .record(&self.scheme, grid, records, along)
-            .and_then(|()| sweep.run(way, &mut base.point, records, None, along));
-        self.counts = base.point.counts;
-        run?;
-        along.finish()?;
+        sweep.set_seeds(1, |x, _| lambda[x]);
+        let problem = AdjointProblem { scheme: &self.scheme, grid, columns: 1 };
+        let outcome = workspace.record_steps(&self.scheme, grid, records, integrand).and_then(|()| {
+            sweep.integrate_backwards(problem, &mut workspace.point, records, None, integrand)
+        });
+        self.counts = workspace.point.counts;
+        outcome?;
+        integrand.finish()?;
         let Adjoint { nominal, grad_x0, grad_u, grad_p } = &mut *result;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
-        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.non_finite)?;
-        write_state(base, nominal);
-        Ok((base.point.non_finite.finite_lanes(), result))
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut workspace.point.non_finite)?;
+        write_state(workspace, nominal);
+        Ok((workspace.point.non_finite.finite_lanes(), result))
     }
 
     pub fn hessian(
         &mut self,
         grid: &Grid<E>,
         lambda: &[E],
-        sweeps: &mut impl Sweeps<M, E, S>,
-        along: &mut impl Beside<M, E>,
+        forward_sweep: &mut impl ForwardSweep<M, E, S>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Verdict<'_, E, Hessian<M, E>>
     where
         W: WithHessian,
     {
-        along.begin();
-        let base = W::nominal(&mut self.base)?;
+        integrand.reset();
+        let workspace = W::nominal(&mut self.workspace)?;
         let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;
         let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
         let HessianMemory { curvature, result } = W::hessian(&mut self.hessian)?;
@@ -212,36 +225,42 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
 
         // The adjoint first: then the forward sweep meets each stage with its multipliers known,
         // and no derivative of a stage has to be kept.
-        let start = base.x;
-        sweep.seed(1, |x, _| lambda[x]);
-        curvature.start();
-        let mut run = || {
-            base.record(scheme, grid, records, &mut Nothing)?;
-            let way = Way { scheme, grid, columns: 1 };
-            sweep.run(way, &mut base.point, records, Some(multipliers), along)?;
-            base.x = start;
-            base.point.counts.steps = 0;
-            sweeps.run(scheme, grid, base, variation, true, |point, dxi, at| {
+        let start = workspace.x;
+        sweep.set_seeds(1, |x, _| lambda[x]);
+        curvature.reset();
+        let mut outcome = || {
+            workspace.record_steps(scheme, grid, records, &mut NoIntegrand)?;
+            let problem = AdjointProblem { scheme, grid, columns: 1 };
+            sweep.integrate_backwards(
+                problem,
+                &mut workspace.point,
+                records,
+                Some(multipliers),
+                integrand,
+            )?;
+            workspace.x = start;
+            workspace.point.counts.steps = 0;
+            forward_sweep.integrate(scheme, grid, workspace, variation, true, |point, dxi, at| {
                 let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
                 let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
-                along.forward(point.variables(), dxi, [grid.h, b], true, at)?;
-                curvature.add(scheme, point, mu, dxi, at)
+                integrand.add_forward(point.variables(), dxi, [grid.h, b], true, at)?;
+                curvature.add_stage(scheme, point, mu, dxi, at)
             })
         };
-        let run = run();
-        self.counts = base.point.counts;
-        run?;
-        along.finish()?;
+        let outcome = outcome();
+        self.counts = workspace.point.counts;
+        outcome?;
+        integrand.finish()?;
 
         let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut result.first;
-        write_forward(grid, base, variation, forward)?;
+        write_forward(grid, workspace, variation, forward)?;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
-        write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.non_finite)?;
-        if let Some(second) = along.second() {
+        write_gradient(sweep.lambda.as_ref(), to, 0, &mut workspace.point.non_finite)?;
+        if let Some(second) = integrand.hessian_sum() {
             curvature.add_lower(second);
         }
-        write_hessian(curvature, result, &mut base.point.non_finite)?;
-        Ok((base.point.non_finite.finite_lanes(), result))
+        write_hessian(curvature, result, &mut workspace.point.non_finite)?;
+        Ok((workspace.point.non_finite.finite_lanes(), result))
     }
 }
 
@@ -263,7 +282,7 @@ kernels! { by run_plain;
 }
 
 pub(super) fn write_state<M: Ode, E: Lanes, const S: usize>(
-    base: &Base<M, E, S>,
+    base: &StepWorkspace<M, E, S>,
     result: &mut Nominal<M, E>,
 ) {
     result.x.as_mut_slice().copy_from_slice(base.x.as_ref());
@@ -271,15 +290,15 @@ pub(super) fn write_state<M: Ode, E: Lanes, const S: usize>(
 
 fn write_forward<M: Ode, E: Lanes, const S: usize>(
     grid: &Grid<E>,
-    base: &mut Base<M, E, S>,
+    base: &mut StepWorkspace<M, E, S>,
     variation: &Variation<M, E, ArrayW<M, E>, S>,
     result: &mut Forward<M, E>,
 ) -> Result<(), Error> {
     let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
     let (dx, step, non_finite) = (variation.dx.as_ref(), grid.steps - 1, &mut base.point.non_finite);
-    write(dx, 0..nx, &mut result.dx_dx0, 0, step, non_finite)?;
-    write(dx, nx..nx + nu, &mut result.dx_du, 0, step, non_finite)?;
-    write(dx, nx + nu..nw, &mut result.dx_dp, 0, step, non_finite)?;
+    copy_to_columns(dx, 0..nx, &mut result.dx_dx0, 0, step, non_finite)?;
+    copy_to_columns(dx, nx..nx + nu, &mut result.dx_du, 0, step, non_finite)?;
+    copy_to_columns(dx, nx + nu..nw, &mut result.dx_dp, 0, step, non_finite)?;
     write_state(base, &mut result.nominal);
     Ok(())
 }
@@ -287,12 +306,12 @@ fn write_forward<M: Ode, E: Lanes, const S: usize>(
 /// The first column of rows to the parts of a gradient.
 fn write_gradient<E: Lanes, R: Array<E>>(
     rows: &[R],
-    parts: [&mut [E]; 3],
+    blocks: [&mut [E]; 3],
     step: usize,
     non_finite: &mut NonFiniteLanes<E>,
 ) -> Result<(), Error> {
     let mut begin = 0;
-    for part in parts {
+    for part in blocks {
         for (to, row) in part.iter_mut().zip(rows.iter().skip(begin)) {
             *to = row.as_ref()[0];
         }
@@ -303,7 +322,7 @@ fn write_gradient<E: Lanes, R: Array<E>>(
 }
 
 fn write_hessian<M: Ode, E: Lanes>(
-    curvature: &mut Curvature<M, E>,
+    curvature: &mut HessianSum<M, E>,
     result: &mut Hessian<M, E>,
     non_finite: &mut NonFiniteLanes<E>,
 ) -> Result<(), Error> {
@@ -311,10 +330,10 @@ fn write_hessian<M: Ode, E: Lanes>(
     let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
     let rows = curvature.sum.as_ref();
     let (x, u, p) = (0..nx, nx..nx + nu, nx + nu..nw);
-    write(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0, non_finite)?;
-    write(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0, non_finite)?;
-    write(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0, non_finite)?;
-    write(&rows[x], p.clone(), &mut result.h_xp, 0, 0, non_finite)?;
-    write(&rows[u], p.clone(), &mut result.h_up, 0, 0, non_finite)?;
-    write(&rows[p.clone()], p, &mut result.h_pp, 0, 0, non_finite)
+    copy_to_columns(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0, non_finite)?;
+    copy_to_columns(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0, non_finite)?;
+    copy_to_columns(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0, non_finite)?;
+    copy_to_columns(&rows[x], p.clone(), &mut result.h_xp, 0, 0, non_finite)?;
+    copy_to_columns(&rows[u], p.clone(), &mut result.h_up, 0, 0, non_finite)?;
+    copy_to_columns(&rows[p.clone()], p, &mut result.h_pp, 0, 0, non_finite)
 }

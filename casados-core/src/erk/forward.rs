@@ -2,8 +2,8 @@
 
 use super::non_finite::NonFiniteLanes;
 use super::scheme::{Grid, Scheme, is_zero};
-use super::step::{Base, Own, Point, Record, add};
-use super::tiles::{self, AtColumns, each_tile};
+use super::step::{StagePoint, StepRecord, StepWorkspace, UnitStride, add};
+use super::tiles::{self, ColumnKernel, for_each_tile};
 use crate::error::{Error, Place};
 use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayX, Ode};
@@ -33,20 +33,20 @@ pub(crate) trait Directions<M: Ode, E: Lanes>: Copy {
     /// How many.
     fn columns(self) -> usize;
     /// `row += coefficient · (direction of w_i)`
-    fn add(self, i: usize, coefficient: E, row: &mut [E]);
+    fn add_scaled(self, i: usize, coefficient: E, row: &mut [E]);
 }
 
 /// All unit vectors.
 #[derive(Clone, Copy)]
-pub(super) struct Unit;
+pub(super) struct UnitDirections;
 
-impl<M: Ode, E: Lanes> Directions<M, E> for Unit {
+impl<M: Ode, E: Lanes> Directions<M, E> for UnitDirections {
     #[inline(always)]
     fn columns(self) -> usize {
         M::Shape::NW
     }
     #[inline(always)]
-    fn add(self, i: usize, coefficient: E, row: &mut [E]) {
+    fn add_scaled(self, i: usize, coefficient: E, row: &mut [E]) {
         if let Some(element) = row.get_mut(i) {
             *element = *element + coefficient;
         }
@@ -54,21 +54,21 @@ impl<M: Ode, E: Lanes> Directions<M, E> for Unit {
 }
 
 /// Columns of a seed matrix, from `first`.
-pub(super) struct Seeded<'a, M: Ode, T: Real, const C: usize> {
+pub(super) struct SeedDirections<'a, M: Ode, T: Real, const C: usize> {
     pub seeds: &'a Seeds<M, T, C>,
     pub first: usize,
     pub columns: usize,
 }
 
-copy!(['a, M: Ode, T: Real, const C: usize] Seeded<'a, M, T, C>);
+copy!(['a, M: Ode, T: Real, const C: usize] SeedDirections<'a, M, T, C>);
 
-impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
+impl<M: Ode, T: Real, const C: usize> Directions<M, T> for SeedDirections<'_, M, T, C> {
     #[inline(always)]
     fn columns(self) -> usize {
         self.columns
     }
     #[inline(always)]
-    fn add(self, i: usize, coefficient: T, row: &mut [T]) {
+    fn add_scaled(self, i: usize, coefficient: T, row: &mut [T]) {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         for (column, value) in row.iter_mut().enumerate() {
             let column = self.first + column;
@@ -88,24 +88,24 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
 }
 
 impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
-    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and
+    /// All steps, from `x` to `x`, with the derivatives; `evaluate_stage` sees each stage when `k_i` and
     /// `dξ_i` are known.
-    pub fn run(
+    pub fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        base: &mut Base<M, E, S>,
+        workspace: &mut StepWorkspace<M, E, S>,
         directions: impl Directions<M, E>,
-        mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        mut on_stage: impl FnMut(&mut StagePoint<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        M::jacobian_constants::<Own<E>>(&mut self.jacobian);
+        M::jacobian_constants::<UnitStride<E>>(&mut self.jacobian);
         begin::<M, E, R, _>(E::from_f64(1.0), &mut self.dx, directions);
         for step in 0..grid.steps {
-            let Base { point, record, x, rest, .. } = &mut *base;
+            let StepWorkspace { point, record, x, compensation: rest, .. } = &mut *workspace;
             record.x = *x;
-            self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
-            self.end(scheme, &grid.h, directions);
+            self.stages(scheme, grid, (point, record), step, directions, &mut on_stage)?;
+            record.advance(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
+            self.advance(scheme, &grid.h, directions);
             point.counts.steps += 1;
         }
         Ok(())
@@ -116,17 +116,17 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        (point, record): (&mut Point<M, E>, &mut Record<M, E, S>),
+        (point, record): (&mut StagePoint<M, E>, &mut StepRecord<M, E, S>),
         step: usize,
         directions: impl Directions<M, E>,
-        at_stage: &mut impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        on_stage: &mut impl FnMut(&mut StagePoint<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
-            point.go(scheme, grid, record, at)?;
+            point.move_to_stage(scheme, grid, record, at)?;
             point.derivative_jacobian(scheme, &mut record.k[stage], &mut self.jacobian, at)?;
             self.stage_state(scheme, &grid.h, stage, directions);
-            at_stage(point, &self.dxi, at)?;
+            on_stage(point, &self.dxi, at)?;
             let Self { dk, dxi, jacobian, .. } = self;
             if let Some(dk) = dk.get_mut(stage) {
                 stage_derivative::<M, E, R, _, S>(scheme, jacobian, dxi, directions, dk);
@@ -162,7 +162,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     }
 
     /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
-    pub fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, directions: impl Directions<M, E>) {
+    pub fn advance(&mut self, scheme: &Scheme<M, E, S>, h: &E, directions: impl Directions<M, E>) {
         combine::<M, E, R, _>(&self.dx, h, &scheme.b, &self.dk, directions, &mut self.dxi);
         self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
     }
@@ -179,7 +179,7 @@ kernels! { by run_plain;
         for (i, row) in dx.as_mut().iter_mut().enumerate() {
             let row = &mut row.as_mut()[..columns];
             row.fill(E::zeroed());
-            directions.add(i, one, row);
+            directions.add_scaled(i, one, row);
         }
     }
 
@@ -200,14 +200,14 @@ kernels! { by run_plain;
         }
         // Entries by states lie row by row.
         let mut begin = M::STRUCTURE.blocks[1];
-        for (equation, row) in scheme.rows.as_ref().iter().enumerate() {
+        for (equation, row) in scheme.equations.as_ref().iter().enumerate() {
             let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
             let end = M::STRUCTURE.blocks[2];
             let entries = begin..(begin..end).find(is_other).unwrap_or(end);
             begin = entries.end;
             let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
             let (factor, dk) = (row.factor, dk.as_mut());
-            each_tile::<A, _, 4>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
+            for_each_tile::<A, _, 4>(0, columns, &mut JacobianRowProduct::<M, E, R> { entries, jacobian, factor, dxi, dk });
         }
         add_entries::<A, M, E, R, D, S>(begin, scheme, jacobian, dxi, directions, dk);
     }
@@ -227,7 +227,7 @@ kernels! { by run_plain;
         }
         for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
             let (sum, start) = (&mut sum.as_mut()[..columns], start.as_ref());
-            each_tile::<A, _, 4>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
+            for_each_tile::<A, _, 4>(0, columns, &mut RowCombination { start, h: *h, weights, rates, row, sum, row_type: PhantomData });
         }
     }
 
@@ -263,7 +263,8 @@ fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>
     let (nx, columns) = (M::Shape::NX, directions.columns());
     for entry in first..M::STRUCTURE.blocks[5] {
         let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-        let (Some(&[value]), Some(row)) = (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
+        let (Some(&[value]), Some(row)) =
+            (jacobian.as_ref().get(entry), scheme.equations.as_ref().get(equation))
         else {
             continue;
         };
@@ -272,7 +273,7 @@ fn add_entries<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>
         if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
             add::<A, E>(coefficient, dxi.as_ref(), sum);
         } else {
-            directions.add(w, coefficient, sum);
+            directions.add_scaled(w, coefficient, sum);
         }
     }
 }
@@ -302,7 +303,7 @@ fn combine_numbers<A: Arithmetic, M: Ode, E: Lanes, R: Array<E>>(
 }
 
 /// A row of the product of the Jacobian with `dξ`.
-struct Product<'a, M: Ode, E: Lanes, R: Array<E>> {
+struct JacobianRowProduct<'a, M: Ode, E: Lanes, R: Array<E>> {
     entries: Range<usize>,
     jacobian: &'a M::Jacobian<[E; 1]>,
     factor: E,
@@ -310,9 +311,9 @@ struct Product<'a, M: Ode, E: Lanes, R: Array<E>> {
     dk: &'a mut [E],
 }
 
-impl<M: Ode, E: Lanes, R: Array<E>> AtColumns for Product<'_, M, E, R> {
+impl<M: Ode, E: Lanes, R: Array<E>> ColumnKernel for JacobianRowProduct<'_, M, E, R> {
     #[inline(always)]
-    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+    fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize) {
         let mut sum = [E::zeroed(); W];
         for entry in self.entries.clone() {
             let w = M::STRUCTURE.jacobian.at(entry).1 - M::Shape::NX;
@@ -326,19 +327,19 @@ impl<M: Ode, E: Lanes, R: Array<E>> AtColumns for Product<'_, M, E, R> {
 }
 
 /// A row of a [combination](combine).
-struct Combination<'a, E, R, X> {
+struct RowCombination<'a, E, R, X> {
     start: &'a [E],
     h: E,
     weights: &'a [E],
     rates: &'a [X],
     row: usize,
     sum: &'a mut [E],
-    of: PhantomData<R>,
+    row_type: PhantomData<R>,
 }
 
-impl<E: Lanes, R: Array<E>, X: Array<R>> AtColumns for Combination<'_, E, R, X> {
+impl<E: Lanes, R: Array<E>, X: Array<R>> ColumnKernel for RowCombination<'_, E, R, X> {
     #[inline(always)]
-    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+    fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize) {
         let mut sum = [E::zeroed(); W];
         for (&weight, rate) in self.weights.iter().zip(self.rates) {
             if let (false, Some(rate)) = (is_zero(weight), rate.as_ref().get(self.row)) {
@@ -354,7 +355,7 @@ impl<E: Lanes, R: Array<E>, X: Array<R>> AtColumns for Combination<'_, E, R, X> 
 
 /// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an
 /// error, or doubted.
-pub(super) fn write<E: Lanes, R: Array<E>>(
+pub(super) fn copy_to_columns<E: Lanes, R: Array<E>>(
     rows: &[R],
     source: Range<usize>,
     target: &mut impl Matrix<E>,

@@ -1,9 +1,9 @@
 //! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from
 //! the forward sweep and `μ_i` from the adjoint.
 
-use super::scheme::{Scheme, directions, is_zero};
-use super::step::{Own, Point, add};
-use super::tiles::{self, AtColumns, each_tile};
+use super::scheme::{Scheme, entry_directions, is_zero};
+use super::step::{StagePoint, UnitStride, add};
+use super::tiles::{self, ColumnKernel, for_each_tile};
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, kernels, run_plain};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
@@ -15,7 +15,7 @@ use core::ops::Range;
 /// The Hessian that the stages are added to.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Curvature<M: Ode, E: Lanes> {
+pub(super) struct HessianSum<M: Ode, E: Lanes> {
     /// `∇²(μᵀ f)`, lower triangle.
     entries: M::Hessian<[E; 1]>,
     /// `∇²(μᵀ f) D`, of the rows that are not zero.
@@ -24,9 +24,9 @@ pub(super) struct Curvature<M: Ode, E: Lanes> {
     pub sum: ArrayW<M, ArrayW<M, E>>,
 }
 
-impl<M: Ode, E: Lanes> Curvature<M, E> {
+impl<M: Ode, E: Lanes> HessianSum<M, E> {
     /// No stages yet.
-    pub fn start(&mut self) {
+    pub fn reset(&mut self) {
         for row in self.sum.as_mut() {
             row.as_mut().fill(E::zeroed());
         }
@@ -54,21 +54,21 @@ impl<M: Ode, E: Lanes> Curvature<M, E> {
     }
 
     /// Adds `Dᵀ ∇²(μᵀ f) D` at one stage.
-    pub fn add<const S: usize>(
+    pub fn add_stage<const S: usize>(
         &mut self,
         scheme: &Scheme<M, E, S>,
-        point: &mut Point<M, E>,
+        point: &mut StagePoint<M, E>,
         mu: &ArrayK<M, [E; 1]>,
         dxi: &ArrayX<M, ArrayW<M, E>>,
         at: Place,
     ) -> Result<(), Error> {
         let Self { entries, product, sum } = self;
-        M::hessian::<Own<E>>(&point.v, mu, entries);
+        M::hessian::<UnitStride<E>>(&point.v, mu, entries);
         point.check(entries.as_ref().as_flattened(), Quantity::Hessian, at, |entry| {
             M::STRUCTURE.hessian.at(entry).0
         })?;
-        multiply::<M, E>(&*entries, &scheme.curved, dxi, product);
-        project::<M, E>(&*product, &scheme.curved, dxi, sum);
+        multiply::<M, E>(&*entries, &scheme.is_nonlinear, dxi, product);
+        project::<M, E>(&*product, &scheme.is_nonlinear, dxi, sum);
         Ok(())
     }
 }
@@ -92,12 +92,12 @@ kernels! { by run_plain;
                 let last = (begin..end).find(|&entry| M::STRUCTURE.hessian.at(entry).0 != row);
                 let of_row = begin..last.unwrap_or(end);
                 begin = of_row.end;
-                each_tile::<A, _, 8>(0, M::Shape::NW, &mut Product::<M, E> { of_row, entries, dxi, product });
+                for_each_tile::<A, _, 8>(0, M::Shape::NW, &mut SparseRowProduct::<M, E> { row_entries: of_row, entries, dxi, product });
             }
             return;
         }
         for (entry, &[value]) in entries.as_ref().iter().enumerate() {
-            if let Some((row, column)) = directions::<M>(entry) {
+            if let Some((row, column)) = entry_directions::<M>(entry) {
                 add_row::<A, M, E>(product, row, value, column, dxi);
                 if row != column {
                     add_row::<A, M, E>(product, column, value, row, dxi);
@@ -118,7 +118,7 @@ kernels! { by run_plain;
         if const { E::LANES > 1 } {
             for (row, sum) in sum.as_mut().iter_mut().enumerate() {
                 let sum = sum.as_mut();
-                each_tile::<A, _, 8>(row, nw, &mut Projection::<M, E> { row, product, curved, dxi, sum });
+                for_each_tile::<A, _, 8>(row, nw, &mut CongruenceRow::<M, E> { row, product, curved, dxi, sum });
             }
             begin = nx;
         }
@@ -142,43 +142,44 @@ kernels! { by run_plain;
 }
 
 /// What the entries of a row add to a [product](multiply), as those of columns too.
-struct Product<'a, M: Ode, E: Lanes> {
-    of_row: Range<usize>,
+struct SparseRowProduct<'a, M: Ode, E: Lanes> {
+    row_entries: Range<usize>,
     entries: &'a M::Hessian<[E; 1]>,
     dxi: &'a ArrayX<M, ArrayW<M, E>>,
     product: &'a mut ArrayW<M, ArrayW<M, E>>,
 }
 
-impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
+impl<M: Ode, E: Lanes> ColumnKernel for SparseRowProduct<'_, M, E> {
     #[inline(always)]
-    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
-        let Self { of_row, entries, dxi, product } = self;
+    fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let Self { row_entries: of_row, entries, dxi, product } = self;
         let rows = dxi.as_ref();
-        let of = |variable: usize| rows.get(variable).map(|row| row.as_ref());
+        let direction_row = |variable: usize| rows.get(variable).map(|row| row.as_ref());
         let (row, _) = M::STRUCTURE.hessian.at(of_row.start);
         let Some(row) = row.checked_sub(M::Shape::NX) else { return };
-        let Some(before) = product.as_ref().get(row) else { return };
-        let mut sum = tiles::load::<E, W>(before.as_ref(), first);
+        let Some(previous_row) = product.as_ref().get(row) else { return };
+        let mut sum = tiles::load::<E, W>(previous_row.as_ref(), first);
         for entry in of_row.clone() {
-            let (Some((_, column)), Some(&[value])) = (directions::<M>(entry), entries.as_ref().get(entry))
+            let (Some((_, column)), Some(&[value])) =
+                (entry_directions::<M>(entry), entries.as_ref().get(entry))
             else {
                 continue;
             };
             // Variables u and p move only in their own directions.
-            match of(column) {
+            match direction_row(column) {
                 Some(d) => tiles::add::<A, E, W>(&mut sum, value, d, first),
-                None => tiles::add_own(&mut sum, value, first, column),
+                None => tiles::add_to_column(&mut sum, value, first, column),
             }
             if row == column {
                 continue;
             }
-            let Some(other) = product.as_mut().get_mut(column) else { continue };
-            let mut more = tiles::load::<E, W>(other.as_ref(), first);
-            match of(row) {
-                Some(d) => tiles::add::<A, E, W>(&mut more, value, d, first),
-                None => tiles::add_own(&mut more, value, first, row),
+            let Some(mirrored_row) = product.as_mut().get_mut(column) else { continue };
+            let mut mirrored_sum = tiles::load::<E, W>(mirrored_row.as_ref(), first);
+            match direction_row(row) {
+                Some(d) => tiles::add::<A, E, W>(&mut mirrored_sum, value, d, first),
+                None => tiles::add_to_column(&mut mirrored_sum, value, first, row),
             }
-            tiles::store(&more, other.as_mut(), first);
+            tiles::store(&mirrored_sum, mirrored_row.as_mut(), first);
         }
         if let Some(product) = product.as_mut().get_mut(row) {
             tiles::store(&sum, product.as_mut(), first);
@@ -187,7 +188,7 @@ impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
 }
 
 /// What states add to a row of the [sum](project).
-struct Projection<'a, M: Ode, E: Lanes> {
+struct CongruenceRow<'a, M: Ode, E: Lanes> {
     row: usize,
     product: &'a ArrayW<M, ArrayW<M, E>>,
     curved: &'a ArrayW<M, bool>,
@@ -195,9 +196,9 @@ struct Projection<'a, M: Ode, E: Lanes> {
     sum: &'a mut [E],
 }
 
-impl<M: Ode, E: Lanes> AtColumns for Projection<'_, M, E> {
+impl<M: Ode, E: Lanes> ColumnKernel for CongruenceRow<'_, M, E> {
     #[inline(always)]
-    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+    fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize) {
         let mut sum = tiles::load::<E, W>(self.sum, first);
         let curved = self.product.as_ref().iter().zip(self.curved.as_ref());
         for ((product, &curved), dxi) in curved.zip(self.dxi.as_ref()) {

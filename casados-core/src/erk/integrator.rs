@@ -40,7 +40,7 @@ use core::marker::PhantomData;
 pub struct Integrator<M: Ode, B, const S: usize, T: Real, W: Memory> {
     pub(super) engine: Engine<M, T, S, W>,
     pub(super) options: Options,
-    pub(super) start: T,
+    pub(super) start_time: T,
     pub(super) parameters_set: bool,
     method: PhantomData<fn() -> B>,
 }
@@ -103,14 +103,20 @@ where
 #[cfg(feature = "alloc")]
 impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
     fn clone(&self) -> Self {
-        let mut engine: Engine<M, T, S, Heap> = Engine::of(self.engine.scheme.clone());
-        let set = self.engine.base.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
+        let mut engine: Engine<M, T, S, Heap> = Engine::with_scheme(self.engine.scheme.clone());
+        let source = self.engine.workspace.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
         let mut parameters_set = M::Shape::NP == 0;
-        if let (Some(from), Ok(to)) = (set, <Heap>::nominal(&mut engine.base)) {
+        if let (Some(from), Ok(to)) = (source, <Heap>::nominal(&mut engine.workspace)) {
             to.point.v = from.point.v;
             parameters_set = true;
         }
-        Self { engine, options: self.options, start: self.start, parameters_set, method: PhantomData }
+        Self {
+            engine,
+            options: self.options,
+            start_time: self.start_time,
+            parameters_set,
+            method: PhantomData,
+        }
     }
 }
 
@@ -140,7 +146,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(Self {
             engine: Engine::new(tableau),
             options,
-            start: T::ZERO,
+            start_time: T::ZERO,
             parameters_set: M::Shape::NP == 0,
             method: PhantomData,
         })
@@ -163,8 +169,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// [`Error::NonFiniteInput`]; the parameters are as before.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        finite::<M, T>(p.as_slice(), Argument::P)?;
-        let base = W::nominal(&mut self.engine.base)?;
+        check_finite_input::<M, T>(p.as_slice(), Argument::P)?;
+        let base = W::nominal(&mut self.engine.workspace)?;
         let first = 2 * M::Shape::NX + M::Shape::NU;
         base.point.variables_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
         self.parameters_set = true;
@@ -176,8 +182,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// [`Error::NonFiniteInput`]; the time is as before.
     pub fn set_time(&mut self, t0: T) -> Result<(), Error> {
-        finite::<M, T>(&[t0], Argument::T)?;
-        self.start = t0;
+        check_finite_input::<M, T>(&[t0], Argument::T)?;
+        self.start_time = t0;
         Ok(())
     }
 
@@ -191,32 +197,37 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// Checks the input, and goes to the start of the interval.
-    pub(super) fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Grid<T>, Error> {
+    pub(super) fn begin_call(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+    ) -> Result<Grid<T>, Error> {
         let [state, variables] = self.engine.begin()?;
         if !self.parameters_set {
             return Err(Error::ParametersNotSet);
         }
-        finite::<M, T>(x0.as_slice(), Argument::X0)?;
-        finite::<M, T>(u.as_slice(), Argument::U)?;
-        finite::<M, T>(&[h], Argument::H)?;
+        check_finite_input::<M, T>(x0.as_slice(), Argument::X0)?;
+        check_finite_input::<M, T>(u.as_slice(), Argument::U)?;
+        check_finite_input::<M, T>(&[h], Argument::H)?;
         state.copy_from_slice(x0.as_slice());
         let first = 2 * M::Shape::NX;
         variables[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
         let Options { steps, compensated, .. } = self.options;
-        Ok(Grid { start: self.start, h: h / T::from_whole(steps), steps, compensated })
+        Ok(Grid { start_time: self.start_time, h: h / T::from_whole(steps), steps, compensated })
     }
 }
 
-/// [`check_named`](crate::finite::check_named), one number after the other: that is shorter where
+/// [`check_model_input`](crate::finite::check_named), one number after the other: that is shorter where
 /// there are no registers, as on firmware.
 ///
 /// # Errors
 /// [`Error::NonFiniteInput`]
-pub(super) fn finite<M: Ode, T: Real>(values: &[T], argument: Argument) -> Result<(), Error> {
+pub(super) fn check_finite_input<M: Ode, T: Real>(values: &[T], argument: Argument) -> Result<(), Error> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
         Some(index) => {
-            let (name, value) = (crate::finite::name::<M>(argument, index), values[index].to_f64());
+            let (name, value) = (crate::finite::element_name::<M>(argument, index), values[index].to_f64());
             Err(Error::NonFiniteInput { argument, index, name, value })
         }
     }

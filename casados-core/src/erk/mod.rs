@@ -9,19 +9,19 @@
 //! output: an explicit method has no polynomial through its stages that keeps its order.
 
 mod adjoint;
-mod along;
-mod calls;
 mod engine;
 mod forward;
+mod forward_sweep;
 mod hessian;
 mod integrator;
+mod integrator_trait;
 mod non_finite;
 #[cfg(feature = "alloc")]
 mod panels;
 mod scheme;
 mod sensitivities;
+mod stage_integrand;
 mod step;
-mod sweeps;
 mod tiles;
 
 pub use integrator::Integrator;
@@ -29,13 +29,13 @@ pub use integrator::Integrator;
 #[cfg(feature = "alloc")]
 pub(crate) use scheme::{Grid, Scheme};
 #[cfg(feature = "alloc")]
-pub(crate) use step::{Own, Point, Record};
+pub(crate) use step::{StagePoint, StepRecord, UnitStride};
 // What computes a batch.
 #[cfg(feature = "alloc")]
 pub(crate) use {
-    along::Nothing,
     engine::{Engine, Verdict},
-    panels::Panels,
+    panels::ColumnPanels,
+    stage_integrand::NoIntegrand,
 };
 
 use crate::memory::Memory;

@@ -4,10 +4,10 @@
 //! nearest cache. So stages are linearised first, all those of a step; then a few columns go
 //! through all of them.
 
-use super::forward::{Directions, Unit, Variation, begin};
+use super::forward::{Directions, UnitDirections, Variation, begin};
+use super::forward_sweep::ForwardSweep;
 use super::scheme::{Grid, Scheme};
-use super::step::{Base, Own, Point};
-use super::sweeps::Sweeps;
+use super::step::{StagePoint, StepWorkspace, UnitStride};
 use crate::error::{Error, Place};
 use crate::linalg::{kernels, run_plain};
 use crate::model::{ArrayW, ArrayX, Ode};
@@ -16,80 +16,80 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// So many columns have as many products under way as a processor can have.
-const COLUMNS: usize = 4;
+const PANEL_WIDTH: usize = 4;
 
 /// A few columns at a time.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Panels<M: Ode, E: Lanes, const S: usize> {
+pub(crate) struct ColumnPanels<M: Ode, E: Lanes, const S: usize> {
     /// Of each stage of a step.
     jacobians: [M::Jacobian<[E; 1]>; S],
-    panel: Variation<M, E, [E; COLUMNS], S>,
+    panel: Variation<M, E, [E; PANEL_WIDTH], S>,
 }
 
 /// Some of the unit vectors.
 #[derive(Clone, Copy)]
-struct Part {
+struct PanelColumns {
     first: usize,
     columns: usize,
 }
 
-impl<M: Ode, E: Lanes> Directions<M, E> for Part {
+impl<M: Ode, E: Lanes> Directions<M, E> for PanelColumns {
     #[inline(always)]
     fn columns(self) -> usize {
         self.columns
     }
     #[inline(always)]
-    fn add(self, i: usize, coefficient: E, row: &mut [E]) {
+    fn add_scaled(self, i: usize, coefficient: E, row: &mut [E]) {
         if let Some(element) = i.checked_sub(self.first).and_then(|i| row.get_mut(i)) {
             *element = *element + coefficient;
         }
     }
 }
 
-impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Panels<M, E, S> {
-    fn run(
+impl<M: Ode, E: Lanes, const S: usize> ForwardSweep<M, E, S> for ColumnPanels<M, E, S> {
+    fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        base: &mut Base<M, E, S>,
+        workspace: &mut StepWorkspace<M, E, S>,
         variation: &mut Variation<M, E, ArrayW<M, E>, S>,
-        is_seen: bool,
-        mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, ArrayW<M, E>>, Place) -> Result<(), Error>,
+        has_stage_visitor: bool,
+        mut on_stage: impl FnMut(&mut StagePoint<M, E>, &ArrayX<M, ArrayW<M, E>>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let Self { jacobians, panel } = self;
         for jacobian in &mut *jacobians {
-            M::jacobian_constants::<Own<E>>(jacobian);
+            M::jacobian_constants::<UnitStride<E>>(jacobian);
         }
-        begin::<M, E, _, _>(E::from_f64(1.0), &mut variation.dx, Unit);
+        begin::<M, E, _, _>(E::from_f64(1.0), &mut variation.dx, UnitDirections);
         // The `dξ_i` that are seen are in the places of `dk_i`.
         let Variation { dx, dk: seen, .. } = variation;
         for step in 0..grid.steps {
-            let Base { point, record, x, rest, .. } = &mut *base;
+            let StepWorkspace { point, record, x, compensation: rest, .. } = &mut *workspace;
             let at = |stage| Place { step, stage, iteration: 0 };
             record.x = *x;
             for (stage, jacobian) in jacobians.iter_mut().enumerate() {
-                point.go(scheme, grid, record, at(stage))?;
+                point.move_to_stage(scheme, grid, record, at(stage))?;
                 point.derivative_jacobian(scheme, &mut record.k[stage], jacobian, at(stage))?;
             }
-            for first in (0..M::Shape::NW).step_by(COLUMNS) {
-                let part = Part { first, columns: COLUMNS.min(M::Shape::NW - first) };
-                take::<M, E>(dx, part, &mut panel.dx);
+            for first in (0..M::Shape::NW).step_by(PANEL_WIDTH) {
+                let panel_columns = PanelColumns { first, columns: PANEL_WIDTH.min(M::Shape::NW - first) };
+                take::<M, E>(dx, panel_columns, &mut panel.dx);
                 for (stage, jacobian) in jacobians.iter().enumerate() {
-                    panel.stage_state(scheme, &grid.h, stage, part);
-                    if is_seen {
-                        put::<M, E>(&panel.dxi, part, &mut seen[stage]);
+                    panel.stage_state(scheme, &grid.h, stage, panel_columns);
+                    if has_stage_visitor {
+                        put::<M, E>(&panel.dxi, panel_columns, &mut seen[stage]);
                     }
-                    panel.stage_derivative(scheme, jacobian, stage, part);
+                    panel.stage_derivative(scheme, jacobian, stage, panel_columns);
                 }
-                panel.end(scheme, &grid.h, part);
-                put::<M, E>(&panel.dx, part, dx);
+                panel.advance(scheme, &grid.h, panel_columns);
+                put::<M, E>(&panel.dx, panel_columns, dx);
             }
-            for (stage, dxi) in seen.iter().enumerate().filter(|_| is_seen) {
-                point.go(scheme, grid, record, at(stage))?;
-                at_stage(point, dxi, at(stage))?;
+            for (stage, dxi) in seen.iter().enumerate().filter(|_| has_stage_visitor) {
+                point.move_to_stage(scheme, grid, record, at(stage))?;
+                on_stage(point, dxi, at(stage))?;
             }
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
+            record.advance(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())
@@ -100,8 +100,8 @@ kernels! { by run_plain;
     /// Some columns.
     fn take [M: Ode, E: Lanes] [M, E] <A>(
         rows: &'k ArrayX<M, ArrayW<M, E>>,
-        part: Part,
-        panel: &'k mut ArrayX<M, [E; COLUMNS]>,
+        part: PanelColumns,
+        panel: &'k mut ArrayX<M, [E; PANEL_WIDTH]>,
     ) {
         for (to, from) in panel.as_mut().iter_mut().zip(rows.as_ref()) {
             for (i, to) in to.iter_mut().enumerate().take(part.columns) {
@@ -114,8 +114,8 @@ kernels! { by run_plain;
 
     /// Some columns, back to where they belong.
     fn put [M: Ode, E: Lanes] [M, E] <A>(
-        panel: &'k ArrayX<M, [E; COLUMNS]>,
-        part: Part,
+        panel: &'k ArrayX<M, [E; PANEL_WIDTH]>,
+        part: PanelColumns,
         rows: &'k mut ArrayX<M, ArrayW<M, E>>,
     ) {
         for (from, to) in panel.as_ref().iter().zip(rows.as_mut()) {

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 
 /// Which state an equation determines: `ẋ_state = factor · f` where `f` is its residual at `ẋ = 0`.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-pub(crate) struct Row<T> {
+pub(crate) struct StateEquation<T> {
     pub state: usize,
     pub factor: T,
 }
@@ -19,32 +19,33 @@ pub(crate) struct Scheme<M: Ode, E: Lanes, const S: usize> {
     pub b: [E; S],
     pub c: [E; S],
     /// Of each equation.
-    pub rows: ArrayK<M, Row<E>>,
+    pub equations: ArrayK<M, StateEquation<E>>,
     /// Of each direction `w`: whether the model has a second derivative with respect to its
     /// variable.
-    pub curved: ArrayW<M, bool>,
+    pub is_nonlinear: ArrayW<M, bool>,
 }
 
 impl<M: Ode, E: Lanes, const S: usize> Clone for Scheme<M, E, S> {
     fn clone(&self) -> Self {
-        let Self { a, b, c, rows, curved } = *self;
-        Self { a, b, c, rows, curved }
+        let Self { a, b, c, equations: rows, is_nonlinear: curved } = *self;
+        Self { a, b, c, equations: rows, is_nonlinear: curved }
     }
 }
 
 impl<M: Ode, E: Lanes, const S: usize> Scheme<M, E, S> {
     pub fn new(tableau: &Tableau<S>) -> Self {
-        let mut rows = ArrayK::<M, Row<E>>::from_fn(|_| Row { state: 0, factor: E::zeroed() });
+        let mut rows =
+            ArrayK::<M, StateEquation<E>>::from_fn(|_| StateEquation { state: 0, factor: E::zeroed() });
         for (state, &(row, coefficient)) in M::ROWS.iter().enumerate() {
             if let Some(row) = rows.as_mut().get_mut(row as usize) {
-                *row = Row { state, factor: E::from_f64(-1.0 / coefficient) };
+                *row = StateEquation { state, factor: E::from_f64(-1.0 / coefficient) };
             }
         }
-        let mut curved = ArrayW::<M, bool>::from_fn(|_| false);
+        let mut is_nonlinear = ArrayW::<M, bool>::from_fn(|_| false);
         for entry in 0..M::STRUCTURE.hessian.len() {
-            let directions = directions::<M>(entry).map(|(row, column)| [row, column]);
+            let directions = entry_directions::<M>(entry).map(|(row, column)| [row, column]);
             for direction in directions.into_iter().flatten() {
-                if let Some(curved) = curved.as_mut().get_mut(direction) {
+                if let Some(curved) = is_nonlinear.as_mut().get_mut(direction) {
                     *curved = true;
                 }
             }
@@ -53,15 +54,15 @@ impl<M: Ode, E: Lanes, const S: usize> Scheme<M, E, S> {
             a: tableau.a().map(|row| row.map(E::from_f64)),
             b: tableau.b().map(E::from_f64),
             c: tableau.c().map(E::from_f64),
-            rows,
-            curved,
+            equations: rows,
+            is_nonlinear,
         }
     }
 }
 
 /// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the
 /// variables and the directions. `None` for an entry of `ẋ`, which occurs linearly.
-pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
+pub(super) fn entry_directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
     let (row, column) = M::STRUCTURE.hessian.at(entry);
     Some((row.checked_sub(M::Shape::NX)?, column.checked_sub(M::Shape::NX)?))
 }
@@ -69,7 +70,7 @@ pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
 /// Equal steps from `start`.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<E> {
-    pub start: E,
+    pub start_time: E,
     /// Of one step.
     pub h: E,
     pub steps: usize,

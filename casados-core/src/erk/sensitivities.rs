@@ -1,12 +1,12 @@
 //! Derivatives of a call, as users see them: each answers one question, with nothing else computed.
 
-use super::adjoint::{Sweep, Way};
-use super::along::Nothing;
+use super::adjoint::{AdjointProblem, AdjointSweep};
 use super::engine::write_state;
-use super::forward::{Seeded, write};
-use super::integrator::{Integrator, finite};
+use super::forward::{SeedDirections, copy_to_columns};
+use super::forward_sweep::AllColumns;
+use super::integrator::{Integrator, check_finite_input};
 use super::non_finite::NonFiniteLanes;
-use super::sweeps::Whole;
+use super::stage_integrand::NoIntegrand;
 use crate::error::{Argument, Error};
 use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
@@ -72,27 +72,35 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite::<M, T>(seeds.x0.as_slice(), Argument::SeedX)?;
-        finite::<M, T>(seeds.u.as_slice(), Argument::SeedU)?;
-        finite::<M, T>(seeds.p.as_slice(), Argument::SeedP)?;
-        let grid = self.begin(x0, u, h)?;
-        let base = W::nominal(&mut self.engine.base)?;
+        check_finite_input::<M, T>(seeds.x0.as_slice(), Argument::SeedX)?;
+        check_finite_input::<M, T>(seeds.u.as_slice(), Argument::SeedU)?;
+        check_finite_input::<M, T>(seeds.p.as_slice(), Argument::SeedP)?;
+        let grid = self.begin_call(x0, u, h)?;
+        let workspace = W::nominal(&mut self.engine.workspace)?;
         let variation = &mut W::forward(&mut self.engine.forward)?.sweep.forward;
         let mut result = Directional::zeroed();
         // As many columns at once as the memory of `forward` holds.
-        let most = M::Shape::NW.max(1);
-        let start = base.x;
-        for first in (0..C.max(1)).step_by(most) {
-            let columns = most.min(C - first);
-            base.x = start;
-            let directions = Seeded { seeds, first, columns };
-            let run = variation.run(&self.engine.scheme, &grid, base, directions, |_, _, _| Ok(()));
-            self.engine.counts = base.point.counts;
-            run?;
-            let non_finite = &mut base.point.non_finite;
-            write(variation.dx.as_ref(), 0..columns, &mut result.dx, first, grid.steps - 1, non_finite)?;
+        let max_columns = M::Shape::NW.max(1);
+        let start = workspace.x;
+        for first in (0..C.max(1)).step_by(max_columns) {
+            let columns = max_columns.min(C - first);
+            workspace.x = start;
+            let directions = SeedDirections { seeds, first, columns };
+            let outcome =
+                variation.integrate(&self.engine.scheme, &grid, workspace, directions, |_, _, _| Ok(()));
+            self.engine.counts = workspace.point.counts;
+            outcome?;
+            let non_finite = &mut workspace.point.non_finite;
+            copy_to_columns(
+                variation.dx.as_ref(),
+                0..columns,
+                &mut result.dx,
+                first,
+                grid.steps - 1,
+                non_finite,
+            )?;
         }
-        write_state(base, &mut result.nominal);
+        write_state(workspace, &mut result.nominal);
         Ok(result)
     }
 
@@ -107,21 +115,21 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.backward(x0, u, h, lambda, None)
+        self.solve_adjoint(x0, u, h, lambda, None)
     }
 
     /// The same, with an integrand or without.
-    pub(super) fn backward(
+    pub(super) fn solve_adjoint(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
-        let grid = self.begin(x0, u, h)?;
-        Ok(self.engine.adjoint(&grid, lambda.as_slice(), &mut along)?.1)
+        check_finite_input::<M, T>(lambda.as_slice(), Argument::Lambda)?;
+        let grid = self.begin_call(x0, u, h)?;
+        Ok(self.engine.adjoint(&grid, lambda.as_slice(), &mut integrand)?.1)
     }
 
     /// The state at the end and the gradients of `λᵀx` for `C` seeds `λ`, the columns of `lambdas`.
@@ -138,27 +146,28 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite::<M, T>(lambdas.as_slice(), Argument::Lambda)?;
-        let grid = self.begin(x0, u, h)?;
-        let base = W::nominal(&mut self.engine.base)?;
+        check_finite_input::<M, T>(lambdas.as_slice(), Argument::Lambda)?;
+        let grid = self.begin_call(x0, u, h)?;
+        let workspace = W::nominal(&mut self.engine.workspace)?;
         let sweep = &mut W::forward(&mut self.engine.forward)?.sweep;
         let records = W::tape(&mut self.engine.trajectory, grid.steps)?;
         let mut result = Adjoint::zeroed();
-        let run = base.record(&self.engine.scheme, &grid, records, &mut Nothing);
-        self.engine.counts = base.point.counts;
-        run?;
+        let outcome = workspace.record_steps(&self.engine.scheme, &grid, records, &mut NoIntegrand);
+        self.engine.counts = workspace.point.counts;
+        outcome?;
         // As many seeds at once as the memory holds: one row of directions.
-        let most = M::Shape::NW.max(1);
-        for first in (0..C).step_by(most) {
-            let columns = most.min(C - first);
-            sweep.seed(columns, |x, column| lambdas[(x, first + column)]);
-            let way = Way { scheme: &self.engine.scheme, grid: &grid, columns };
-            let run = sweep.run(way, &mut base.point, records, None, &mut Nothing);
-            self.engine.counts = base.point.counts;
-            run?;
-            write_gradient(sweep, 0..columns, &mut result, first, &mut base.point.non_finite)?;
+        let max_columns = M::Shape::NW.max(1);
+        for first in (0..C).step_by(max_columns) {
+            let columns = max_columns.min(C - first);
+            sweep.set_seeds(columns, |x, column| lambdas[(x, first + column)]);
+            let problem = AdjointProblem { scheme: &self.engine.scheme, grid: &grid, columns };
+            let outcome =
+                sweep.integrate_backwards(problem, &mut workspace.point, records, None, &mut NoIntegrand);
+            self.engine.counts = workspace.point.counts;
+            outcome?;
+            write_gradient(sweep, 0..columns, &mut result, first, &mut workspace.point.non_finite)?;
         }
-        write_state(base, &mut result.nominal);
+        write_state(workspace, &mut result.nominal);
         Ok(result)
     }
 
@@ -176,9 +185,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
-        let grid = self.begin(x0, u, h)?;
-        Ok(self.engine.forward_adjoint(&grid, lambda.as_slice(), &mut Whole)?.1)
+        check_finite_input::<M, T>(lambda.as_slice(), Argument::Lambda)?;
+        let grid = self.begin_call(x0, u, h)?;
+        Ok(self.engine.forward_adjoint(&grid, lambda.as_slice(), &mut AllColumns)?.1)
     }
 
     /// The state at the end, its derivatives, and the gradient and Hessian of `λᵀx`.
@@ -200,7 +209,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
 }
 
 fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
-    sweep: &Sweep<M, T, R, S>,
+    sweep: &AdjointSweep<M, T, R, S>,
     source: Range<usize>,
     result: &mut Adjoint<M, T, C>,
     first: usize,
@@ -208,7 +217,7 @@ fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
 ) -> Result<(), Error> {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let lambda = sweep.lambda.as_ref();
-    write(&lambda[..nx], source.clone(), &mut result.grad_x0, first, 0, non_finite)?;
-    write(&lambda[nx..nx + nu], source.clone(), &mut result.grad_u, first, 0, non_finite)?;
-    write(&lambda[nx + nu..], source, &mut result.grad_p, first, 0, non_finite)
+    copy_to_columns(&lambda[..nx], source.clone(), &mut result.grad_x0, first, 0, non_finite)?;
+    copy_to_columns(&lambda[nx..nx + nu], source.clone(), &mut result.grad_u, first, 0, non_finite)?;
+    copy_to_columns(&lambda[nx + nu..], source, &mut result.grad_p, first, 0, non_finite)
 }

@@ -1,10 +1,10 @@
 //! One step of an explicit method: the stages one after the other, and the end.
 
-use super::along::Beside;
 use super::non_finite::{CHECK_EACH_VALUE, NonFiniteLanes};
 use super::scheme::{Grid, Scheme, is_zero};
+use super::stage_integrand::StageIntegrand;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, dispatch, displaced, dot_compensated, kernels, run_plain};
+use crate::linalg::{Arithmetic, axpy_compensated, dispatch, dot_compensated, kernels, run_plain};
 use crate::model::{ArrayK, ArrayV, ArrayX, Ode};
 use crate::result::Nominal;
 use crate::scalar::{Lanes, Strided};
@@ -12,12 +12,12 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// A number, or a register of several, as it lies in the arrays of the model.
-pub(crate) type Own<E> = Strided<E, 1>;
+pub(crate) type UnitStride<E> = Strided<E, 1>;
 
 /// One step: its start and the derivatives at its stages.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Record<M: Ode, E: Lanes, const S: usize> {
+pub(crate) struct StepRecord<M: Ode, E: Lanes, const S: usize> {
     pub x: ArrayX<M, E>,
     pub k: [ArrayX<M, E>; S],
 }
@@ -25,22 +25,22 @@ pub(crate) struct Record<M: Ode, E: Lanes, const S: usize> {
 /// Variables and residual of the model at one stage. `ẋ` is zero, always.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Point<M: Ode, E: Lanes> {
+pub(crate) struct StagePoint<M: Ode, E: Lanes> {
     pub v: ArrayV<M, [E; 1]>,
     pub f: ArrayK<M, [E; 1]>,
     pub non_finite: NonFiniteLanes<E>,
-    pub counts: Counts,
+    pub counts: EvaluationCounts,
 }
 
 /// What the last call did.
 #[derive(Clone, Copy, Default, Zeroable)]
-pub(crate) struct Counts {
+pub(crate) struct EvaluationCounts {
     pub steps: usize,
     pub residuals: usize,
     pub jacobians: usize,
 }
 
-impl<M: Ode, E: Lanes> Point<M, E> {
+impl<M: Ode, E: Lanes> StagePoint<M, E> {
     /// The variables.
     pub fn variables(&self) -> &[E] {
         self.v.as_ref().as_flattened()
@@ -52,11 +52,11 @@ impl<M: Ode, E: Lanes> Point<M, E> {
     }
 
     /// Goes to stage `i`: `ξ_i = x_n + h Σ_{j<i} a_ij k_j` at `t_n + c_i h`.
-    pub fn go<const S: usize>(
+    pub fn move_to_stage<const S: usize>(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        record: &Record<M, E, S>,
+        record: &StepRecord<M, E, S>,
         at: Place,
     ) -> Result<(), Error> {
         let error = |index| Error::Overflow { step: at.step, index };
@@ -78,7 +78,7 @@ impl<M: Ode, E: Lanes> Point<M, E> {
         at: Place,
     ) -> Result<(), Error> {
         self.counts.residuals += 1;
-        M::residual::<Own<E>>(&self.v, &mut self.f);
+        M::residual::<UnitStride<E>>(&self.v, &mut self.f);
         self.check_residual(at)?;
         assign(scheme, &self.f, k);
         Ok(())
@@ -100,7 +100,7 @@ impl<M: Ode, E: Lanes> Point<M, E> {
     /// The residual and its Jacobian at this point.
     pub fn jacobian(&mut self, jacobian: &mut M::Jacobian<[E; 1]>, at: Place) -> Result<(), Error> {
         self.counts.jacobians += 1;
-        M::residual_jacobian::<Own<E>>(&self.v, &mut self.f, jacobian);
+        M::residual_jacobian::<UnitStride<E>>(&self.v, &mut self.f, jacobian);
         self.check_residual(at)?;
         // Those by `ẋ`, which come first, are constants of an explicit model.
         let first = M::STRUCTURE.blocks[1];
@@ -146,7 +146,7 @@ kernels! { by run_plain;
     fn place [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         grid: &'k Grid<E>,
-        record: &'k Record<M, E, S>,
+        record: &'k StepRecord<M, E, S>,
         at: Place,
         v: &'k mut ArrayV<M, [E; 1]>,
     ) -> Option<usize> {
@@ -167,7 +167,7 @@ kernels! { by run_plain;
             }
         }
         let time = E::from_whole(at.step) + *c;
-        v[M::Shape::NV - 1] = A::add(grid.start, grid.h, time);
+        v[M::Shape::NV - 1] = A::add(grid.start_time, grid.h, time);
         None
     }
 
@@ -177,7 +177,7 @@ kernels! { by run_plain;
         f: &'k ArrayK<M, [E; 1]>,
         k: &'k mut ArrayX<M, E>,
     ) {
-        for (row, &[f]) in scheme.rows.as_ref().iter().zip(f.as_ref()) {
+        for (row, &[f]) in scheme.equations.as_ref().iter().zip(f.as_ref()) {
             if let Some(k) = k.as_mut().get_mut(row.state) {
                 *k = row.factor * f;
             }
@@ -188,7 +188,7 @@ kernels! { by run_plain;
     fn advance [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         h: &'k E,
-        record: &'k Record<M, E, S>,
+        record: &'k StepRecord<M, E, S>,
         end: &'k mut ArrayX<M, E>,
     ) {
         end.as_mut().fill(E::zeroed());
@@ -206,7 +206,7 @@ kernels! { by dispatch;
     fn advance_compensated [M: Ode, E: Lanes, const S: usize] [M, E, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         h: &'k E,
-        record: &'k Record<M, E, S>,
+        record: &'k StepRecord<M, E, S>,
         end: &'k mut [E],
         rest: &'k mut [E],
     ) {
@@ -214,42 +214,42 @@ kernels! { by dispatch;
         for (index, ((end, rest), &x)) in end.iter_mut().zip(rest).zip(x).enumerate() {
             let slopes = record.k.iter().filter_map(|k| k.as_ref().get(index));
             let slope = dot_compensated::<A, E>(scheme.b.iter().zip(slopes));
-            [*end, *rest] = displaced::<A, E>([x, *rest], *h, slope);
+            [*end, *rest] = axpy_compensated::<A, E>([x, *rest], *h, slope);
         }
     }
 }
 
-impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
+impl<M: Ode, E: Lanes, const S: usize> StepRecord<M, E, S> {
     /// All stages of the step.
     pub fn stages(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        point: &mut Point<M, E>,
+        point: &mut StagePoint<M, E>,
         step: usize,
-        along: &mut impl Beside<M, E>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
-            point.go(scheme, grid, self, at)?;
+            point.move_to_stage(scheme, grid, self, at)?;
             point.derivative(scheme, &mut self.k[stage], at)?;
-            along.value(point.variables(), [grid.h, scheme.b[stage]], at)?;
+            integrand.add_value(point.variables(), [grid.h, scheme.b[stage]], at)?;
         }
         Ok(())
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`; `rest` is what was rounded off from `x_n`, if sums are
     /// compensated.
-    pub fn end(
+    pub fn advance(
         &self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
         step: usize,
         end: &mut ArrayX<M, E>,
-        rest: Option<&mut ArrayX<M, E>>,
+        compensation: Option<&mut ArrayX<M, E>>,
         non_finite: &mut NonFiniteLanes<E>,
     ) -> Result<(), Error> {
-        match rest {
+        match compensation {
             None => advance(scheme, &grid.h, self, end),
             Some(rest) => {
                 if step == 0 {
@@ -265,49 +265,49 @@ impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
 /// What every call needs.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Base<M: Ode, E: Lanes, const S: usize> {
-    pub point: Point<M, E>,
-    pub record: Record<M, E, S>,
+pub(crate) struct StepWorkspace<M: Ode, E: Lanes, const S: usize> {
+    pub point: StagePoint<M, E>,
+    pub record: StepRecord<M, E, S>,
     /// The state at the end of the step.
     pub x: ArrayX<M, E>,
     /// What was rounded off from it, if sums are compensated.
-    pub rest: ArrayX<M, E>,
+    pub compensation: ArrayX<M, E>,
     pub result: Nominal<M, E>,
 }
 
-impl<M: Ode, E: Lanes, const S: usize> Base<M, E, S> {
+impl<M: Ode, E: Lanes, const S: usize> StepWorkspace<M, E, S> {
     /// All steps, from `x` to `x`, with an integrand or without.
-    pub fn run(
+    pub fn integrate(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        along: &mut impl Beside<M, E>,
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<(), Error> {
-        let Self { point, record, x, rest, .. } = self;
+        let Self { point, record, x, compensation: rest, .. } = self;
         for step in 0..grid.steps {
             record.x = *x;
-            record.stages(scheme, grid, point, step, along)?;
+            record.stages(scheme, grid, point, step, integrand)?;
             let rest = grid.compensated.then_some(&mut *rest);
-            record.end(scheme, grid, step, x, rest, &mut point.non_finite)?;
+            record.advance(scheme, grid, step, x, rest, &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())
     }
 
     /// All steps, from `x` to `x`, each of them kept; with an integrand or without.
-    pub fn record(
+    pub fn record_steps(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
-        records: &mut [Record<M, E, S>],
-        along: &mut impl Beside<M, E>,
+        records: &mut [StepRecord<M, E, S>],
+        integrand: &mut impl StageIntegrand<M, E>,
     ) -> Result<(), Error> {
-        let Self { point, x, rest, .. } = self;
+        let Self { point, x, compensation: rest, .. } = self;
         for (step, record) in records.iter_mut().enumerate() {
             record.x = *x;
-            record.stages(scheme, grid, point, step, along)?;
+            record.stages(scheme, grid, point, step, integrand)?;
             let rest = grid.compensated.then_some(&mut *rest);
-            record.end(scheme, grid, step, x, rest, &mut point.non_finite)?;
+            record.advance(scheme, grid, step, x, rest, &mut point.non_finite)?;
             point.counts.steps += 1;
         }
         Ok(())

@@ -8,32 +8,32 @@ use crate::linalg::Arithmetic;
 use crate::scalar::Lanes;
 
 /// What is done with `W` columns at a time. To be `#[inline(always)]`.
-pub(super) trait AtColumns {
-    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize);
+pub(super) trait ColumnKernel {
+    fn process_columns<A: Arithmetic, const W: usize>(&mut self, first: usize);
 }
 
 /// All columns from `first` on, eight or four at most at a time: as many have a register each for
 /// their sums, and as many products under way as the processor can have.
 #[inline(always)]
-pub(super) fn each_tile<A: Arithmetic, V: AtColumns, const MAX_WIDTH: usize>(
+pub(super) fn for_each_tile<A: Arithmetic, V: ColumnKernel, const MAX_WIDTH: usize>(
     mut first: usize,
     end: usize,
     visit: &mut V,
 ) {
     while const { MAX_WIDTH >= 8 } && first + 8 <= end {
-        visit.at::<A, 8>(first);
+        visit.process_columns::<A, 8>(first);
         first += 8;
     }
     while first + 4 <= end {
-        visit.at::<A, 4>(first);
+        visit.process_columns::<A, 4>(first);
         first += 4;
     }
     if first + 2 <= end {
-        visit.at::<A, 2>(first);
+        visit.process_columns::<A, 2>(first);
         first += 2;
     }
     if first < end {
-        visit.at::<A, 1>(first);
+        visit.process_columns::<A, 1>(first);
     }
 }
 
@@ -68,7 +68,7 @@ pub(super) fn add<A: Arithmetic, E: Lanes, const W: usize>(sum: &mut [E; W], a: 
 /// `a` more in one column, if it is among these. Each is looked at: a place that is found out when
 /// it runs would keep sums out of registers.
 #[inline(always)]
-pub(super) fn add_own<E: Lanes, const W: usize>(sum: &mut [E; W], a: E, first: usize, column: usize) {
+pub(super) fn add_to_column<E: Lanes, const W: usize>(sum: &mut [E; W], a: E, first: usize, column: usize) {
     for (i, sum) in sum.iter_mut().enumerate() {
         if first + i == column {
             *sum = *sum + a;

@@ -4,7 +4,7 @@ use super::{Argument, Error, Place, Quantity, Refusal, Started, Unsettled};
 use core::fmt;
 
 /// How other start values are given.
-const OTHER_START: &str = "set a start value near the solution by `nominal(z = ..)` in the attribute of the model, or by `set_start`";
+const START_VALUE_HINT: &str = "set a start value near the solution by `nominal(z = ..)` in the attribute of the model, or by `set_start`";
 
 impl fmt::Display for Argument {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -88,7 +88,7 @@ impl fmt::Display for Error {
                 at,
             } => {
                 quantity.fmt_value(f, equation, value)?;
-                write!(f, " at {at}; `{unknown}` started at {start}: {OTHER_START}")
+                write!(f, " at {at}; `{unknown}` started at {start}: {START_VALUE_HINT}")
             }
             Error::Singular { unknown, at } => write!(
                 f,
@@ -108,7 +108,7 @@ impl fmt::Display for Error {
                 )?;
                 match started {
                     Some(Started { unknown, value }) => {
-                        write!(f, ". `{unknown}` started at {value}: {OTHER_START}")
+                        write!(f, ". `{unknown}` started at {value}: {START_VALUE_HINT}")
                     }
                     None => Ok(()),
                 }

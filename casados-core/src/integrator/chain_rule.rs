@@ -20,14 +20,14 @@ pub(crate) type StateSensitivities<M, T> = ArrayX<M, ArrayW<M, T>>;
 pub(crate) type FullHessian<M, T> = ArrayW<M, ArrayW<M, T>>;
 
 /// `dx/dw` where `x` is `x₀`.
-pub(crate) fn identity<M: Dae, T: Real>(v: &mut StateSensitivities<M, T>) {
+pub(crate) fn set_identity<M: Dae, T: Real>(v: &mut StateSensitivities<M, T>) {
     for (x, row) in v.as_mut().iter_mut().enumerate() {
         *row = ArrayW::<M, T>::from_fn(|w| if w == x { T::ONE } else { T::ZERO });
     }
 }
 
 /// A row of `(A, B_u, B_p)` times `D`.
-fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
+fn chain_row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
     index: usize,
     v: &StateSensitivities<M, T>,
     (by_x, by_u, by_p): (&A, &B, &C),
@@ -47,11 +47,11 @@ fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
 /// `V⁺`
 pub(crate) fn chain_states<M: Dae, T: Real>(
     part: &Forward<M, T>,
-    now: &StateSensitivities<M, T>,
+    current: &StateSensitivities<M, T>,
     next: &mut StateSensitivities<M, T>,
 ) {
     for (index, next) in next.as_mut().iter_mut().enumerate() {
-        *next = row::<M, T, _, _, _>(index, now, (&part.dx_dx0, &part.dx_du, &part.dx_dp));
+        *next = chain_row::<M, T, _, _, _>(index, current, (&part.dx_dx0, &part.dx_du, &part.dx_dp));
     }
 }
 
@@ -69,13 +69,13 @@ pub(crate) fn write_algebraic<M: Dae, T: Real>(
     result: &mut Forward<M, T>,
 ) {
     for index in 0..M::Shape::NZ {
-        let row = row::<M, T, _, _, _>(index, v, (&part.dz_dx0, &part.dz_du, &part.dz_dp));
+        let row = chain_row::<M, T, _, _, _>(index, v, (&part.dz_dx0, &part.dz_du, &part.dz_dp));
         result::write_row(row.as_ref(), index, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
     }
 }
 
 /// `S += Dᵀ H D` with the Hessian of a part and the rows of `V`, one after the other.
-pub(crate) fn add<M: Dae, T: Real>(
+pub(crate) fn add_congruence<M: Dae, T: Real>(
     h: impl Fn(usize, usize) -> T,
     v: &[T],
     [product, sum]: [&mut FullHessian<M, T>; 2],
@@ -101,7 +101,7 @@ pub(crate) fn add<M: Dae, T: Real>(
 }
 
 /// An element of the whole Hessian.
-pub(crate) fn element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize) -> T {
+pub(crate) fn hessian_element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize) -> T {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let (i, j) = (r.min(c), r.max(c));
     if j < nx {
@@ -122,15 +122,15 @@ pub(crate) fn element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize)
 pub(crate) fn write_blocks<M: Dae, T: Real>(sum: &FullHessian<M, T>, result: &mut Hessian<M, T>) {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let at = |r: usize, c: usize| if r >= c { sum[r][c] } else { sum[c][r] };
-    fill(&mut result.h_xx, at);
-    fill(&mut result.h_xu, |r, c| at(r, nx + c));
-    fill(&mut result.h_uu, |r, c| at(nx + r, nx + c));
-    fill(&mut result.h_xp, |r, c| at(r, nx + nu + c));
-    fill(&mut result.h_up, |r, c| at(nx + r, nx + nu + c));
-    fill(&mut result.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
+    fill_matrix(&mut result.h_xx, at);
+    fill_matrix(&mut result.h_xu, |r, c| at(r, nx + c));
+    fill_matrix(&mut result.h_uu, |r, c| at(nx + r, nx + c));
+    fill_matrix(&mut result.h_xp, |r, c| at(r, nx + nu + c));
+    fill_matrix(&mut result.h_up, |r, c| at(nx + r, nx + nu + c));
+    fill_matrix(&mut result.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
 }
 
-pub(crate) fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
+pub(crate) fn fill_matrix<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
     for c in 0..A::COLUMNS {
         for r in 0..A::ROWS {
             matrix[(r, c)] = element(r, c);

@@ -16,9 +16,9 @@ use crate::scalar::Real;
 use crate::statistics::Statistics;
 
 /// `x` of the model of an integrator.
-type X<I> = VectorX<<I as Integrator>::Model, <I as Integrator>::Number>;
+type StateOf<I> = VectorX<<I as Integrator>::Model, <I as Integrator>::Number>;
 /// `u` of the model of an integrator.
-type U<I> = VectorU<<I as Integrator>::Model, <I as Integrator>::Number>;
+type ControlOf<I> = VectorU<<I as Integrator>::Model, <I as Integrator>::Number>;
 
 /// An integrator of one interval, whichever it is: [`Irk`](crate::Irk), [`Erk`](crate::Erk) or
 /// `Adaptive`.
@@ -71,10 +71,10 @@ pub trait Integrator {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     fn solve_with_quadrature(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
+        integrand: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error>;
     /// As [`forward`](Self::forward), with an integrand or without.
     ///
@@ -82,10 +82,10 @@ pub trait Integrator {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     fn forward_with_quadrature(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
+        integrand: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Forward<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithForward;
@@ -95,11 +95,11 @@ pub trait Integrator {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     fn adjoint_with_quadrature(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        lambda: &X<Self>,
-        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
+        lambda: &StateOf<Self>,
+        integrand: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Adjoint<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithAdjoint<1>;
@@ -109,11 +109,11 @@ pub trait Integrator {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     fn hessian_with_quadrature(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        lambda: &X<Self>,
-        along: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
+        lambda: &StateOf<Self>,
+        integrand: OptionalIntegrand<'_, '_, Self::Model, Self::Number>,
     ) -> Result<&Hessian<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithHessian;
@@ -124,8 +124,8 @@ pub trait Integrator {
     /// Those of the integrator.
     fn solve(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
     ) -> Result<&Nominal<Self::Model, Self::Number>, Error> {
         self.solve_with_quadrature(x0, u, h, None)
@@ -136,8 +136,8 @@ pub trait Integrator {
     /// Those of the integrator.
     fn forward(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
     ) -> Result<&Forward<Self::Model, Self::Number>, Error>
     where
@@ -151,10 +151,10 @@ pub trait Integrator {
     /// Those of the integrator.
     fn adjoint(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        lambda: &X<Self>,
+        lambda: &StateOf<Self>,
     ) -> Result<&Adjoint<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithAdjoint<1>,
@@ -167,10 +167,10 @@ pub trait Integrator {
     /// Those of the integrator.
     fn hessian(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: Self::Number,
-        lambda: &X<Self>,
+        lambda: &StateOf<Self>,
     ) -> Result<&Hessian<Self::Model, Self::Number>, Error>
     where
         Self::Memory: WithHessian,

@@ -1,6 +1,6 @@
 //! An integrator with an integrand.
 
-use super::{Integrator, U, X};
+use super::{ControlOf, Integrator, StateOf};
 use crate::error::Error;
 use crate::memory::{WithAdjoint, WithForward, WithHessian};
 use crate::quadrature::Integrand;
@@ -35,7 +35,12 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    pub fn solve(self, x0: &X<I>, u: &U<I>, h: I::Number) -> Result<&'a Nominal<I::Model, I::Number>, Error> {
+    pub fn solve(
+        self,
+        x0: &StateOf<I>,
+        u: &ControlOf<I>,
+        h: I::Number,
+    ) -> Result<&'a Nominal<I::Model, I::Number>, Error> {
         self.integrator.solve_with_quadrature(x0, u, h, Some(self.integrand))
     }
 
@@ -43,7 +48,12 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     ///
     /// # Errors
     /// Those of the integrator; [`Error::NonFiniteFunction`].
-    pub fn forward(self, x0: &X<I>, u: &U<I>, h: I::Number) -> Result<&'a Forward<I::Model, I::Number>, Error>
+    pub fn forward(
+        self,
+        x0: &StateOf<I>,
+        u: &ControlOf<I>,
+        h: I::Number,
+    ) -> Result<&'a Forward<I::Model, I::Number>, Error>
     where
         I::Memory: WithForward,
     {
@@ -56,10 +66,10 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     pub fn adjoint(
         self,
-        x0: &X<I>,
-        u: &U<I>,
+        x0: &StateOf<I>,
+        u: &ControlOf<I>,
         h: I::Number,
-        lambda: &X<I>,
+        lambda: &StateOf<I>,
     ) -> Result<&'a Adjoint<I::Model, I::Number>, Error>
     where
         I::Memory: WithAdjoint<1>,
@@ -73,10 +83,10 @@ impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
     /// Those of the integrator; [`Error::NonFiniteFunction`].
     pub fn hessian(
         self,
-        x0: &X<I>,
-        u: &U<I>,
+        x0: &StateOf<I>,
+        u: &ControlOf<I>,
         h: I::Number,
-        lambda: &X<I>,
+        lambda: &StateOf<I>,
     ) -> Result<&'a Hessian<I::Model, I::Number>, Error>
     where
         I::Memory: WithHessian,

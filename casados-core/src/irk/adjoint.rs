@@ -7,15 +7,15 @@
 //! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
 //! there is `ℓ_i(0) ν`.
 
-use super::driver::Parts;
-use super::workspace::{Linearization, Step, Work};
+use super::driver::CallContext;
+use super::workspace::{Linearization, StageWorkspace, Step};
 use crate::error::Error;
 use crate::finite::check_gradient;
 use crate::irk::coefficients::Coefficients;
-use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, kernels};
+use crate::linalg::{Arithmetic, Kernel, RowVisitor, dispatch, for_each_row, kernels};
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::quadrature::OptionalIntegrand;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
@@ -26,7 +26,7 @@ use core::marker::PhantomData;
 /// The adjoint of `C` seeds while it goes backwards.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
+pub struct AdjointSweep<M: Dae, T: Plain, const S: usize, const C: usize> {
     /// `λ_n`
     pub(crate) lambda: ArrayX<M, [T; C]>,
     /// `λ_w`; the first `NX` rows stay zero.
@@ -35,27 +35,27 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) mu: Aligned<ArrayK<M, [[T; C]; S]>>,
     /// What an integrand, or weights of `z₀`, add to the right-hand side of the unknowns at the
     /// stages,
-    pub(crate) source: ArrayK<M, [T; S]>,
+    pub(crate) stage_source: ArrayK<M, [T; S]>,
     /// and to `(λ_n, λ_w)`.
-    pub(crate) shift: ArrayW<M, T>,
+    pub(crate) end_source: ArrayW<M, T>,
     /// Whether there is any of it.
-    pub(crate) sourced: bool,
+    pub(crate) has_source: bool,
     /// The weights `ν` of `z₀`, and whether there are any.
     nu: VectorZ<M, T>,
-    weighted: bool,
+    has_nu: bool,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> {
     /// `λ_N`: seeds in column-major order; and the weights of `z₀`, or none.
-    pub(crate) fn start(&mut self, seeds: &[E], nu: &[E]) {
+    pub(crate) fn set_seeds(&mut self, seeds: &[E], nu: &[E]) {
         let nx = M::Shape::NX;
         for (state, row) in self.lambda.as_mut().iter_mut().enumerate() {
             let seed = |column| seeds.get(column * nx + state).copied();
             *row = core::array::from_fn(|column| seed(column).unwrap_or(E::from_f64(0.0)));
         }
         self.gradient.as_mut().fill([E::from_f64(0.0); C]);
-        self.sourced = false;
-        self.weighted = !nu.is_empty();
+        self.has_source = false;
+        self.has_nu = !nu.is_empty();
         for (to, &from) in self.nu.as_mut_slice().iter_mut().zip(nu) {
             *to = from;
         }
@@ -63,39 +63,39 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
 
     /// What weights of `z₀` add to the right-hand side, in the first step, after what an integrand
     /// does.
-    pub(crate) fn weigh(&mut self, coefficients: &Coefficients<E, S>) {
-        if const { M::Shape::NZ == 0 } || !self.weighted {
+    pub(crate) fn add_z0_weights(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { M::Shape::NZ == 0 } || !self.has_nu {
             return;
         }
-        if !self.sourced {
-            self.source.as_mut().fill([E::from_f64(0.0); S]);
-            self.shift.as_mut().fill(E::from_f64(0.0));
-            self.sourced = true;
+        if !self.has_source {
+            self.stage_source.as_mut().fill([E::from_f64(0.0); S]);
+            self.end_source.as_mut().fill(E::from_f64(0.0));
+            self.has_source = true;
         }
-        let source = self.source.as_mut().get_mut(M::Shape::NX..).unwrap_or_default();
-        weigh(self.nu.as_slice(), &coefficients.start, source);
+        let source = self.stage_source.as_mut().get_mut(M::Shape::NX..).unwrap_or_default();
+        weigh(self.nu.as_slice(), &coefficients.lagrange_start, source);
     }
 
     /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it
     /// satisfies its equations.
-    pub(crate) fn stages<F: Fallback>(
+    pub(crate) fn solve_and_verify<F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
+        work: &mut StageWorkspace<M, E, S, F>,
+        stored_linearization: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
     ) -> E::Mask {
-        self.solve(work.linear(kept), coefficients, work.inputs.time.step);
-        work.verify_adjoint(kept, self, coefficients)
+        self.solve_multipliers(work.linearization(stored_linearization), coefficients, work.inputs.time.step);
+        work.verify_adjoint(stored_linearization, self, coefficients)
     }
 
     /// `μ`
-    pub(crate) fn solve<F: Fallback>(
+    pub(crate) fn solve_multipliers<F: Fallback>(
         &mut self,
         linear: &Linearization<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         h: E,
     ) {
-        let Self { lambda, mu, source, sourced, .. } = self;
+        let Self { lambda, mu, stage_source: source, has_source: sourced, .. } = self;
         right_hand_side(lambda.as_ref(), &coefficients.b, h, mu.as_mut());
         if *sourced {
             add_to_all(mu.as_mut().as_flattened_mut(), source.as_ref().as_flattened());
@@ -105,7 +105,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
 
     /// `λ_n` from `λ_{n+1}` and `μ`.
     pub(crate) fn advance<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>) {
-        let Self { lambda, gradient, mu, shift, sourced, .. } = self;
+        let Self { lambda, gradient, mu, end_source: shift, has_source: sourced, .. } = self;
         let (plan, mu) = (F::plan::<M>(), mu.as_ref());
         let jacobian = F::Plan::<M>::jacobian(&linear.jacobian);
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
@@ -118,35 +118,37 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
+impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointSweep<M, T, S, C> {
     /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without. What was
     /// `kept` of it is brought back where it does not do, and is `None` then.
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
-    pub(crate) fn step<F: Fallback>(
+    pub(crate) fn step_backwards<F: Fallback>(
         &mut self,
-        parts: &mut Parts<'_, M, T, S, F>,
-        kept: &mut Option<&Linearization<M, T, S, F>>,
+        context: &mut CallContext<'_, M, T, S, F>,
+        stored_linearization: &mut Option<&Linearization<M, T, S, F>>,
         n: usize,
         step: &Step<M, T, S>,
-        along: &mut OptionalIntegrand<'_, '_, M, T>,
+        integrand: &mut OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        let Parts { work, coefficients, statistics, .. } = parts;
-        if let Some(integrand) = along {
-            work.along_adjoint(coefficients, n, step, self, &mut **integrand)?;
+        let CallContext { workspace: work, coefficients, statistics, .. } = context;
+        if let Some(integrand) = integrand {
+            work.add_integrand_adjoint(coefficients, n, step, self, &mut **integrand)?;
         }
         if n == 0 {
-            self.weigh(coefficients);
+            self.add_z0_weights(coefficients);
         }
-        if !self.stages(work, *kept, coefficients) && work.linear(*kept).factors.is_planned() {
-            if let Some(kept) = kept.take() {
-                work.linear.copy_from(kept);
+        if !self.solve_and_verify(work, *stored_linearization, coefficients)
+            && work.linearization(*stored_linearization).factors.is_from_plan()
+        {
+            if let Some(kept) = stored_linearization.take() {
+                work.linearization.copy_from(kept);
             }
             work.factor_dense(coefficients, n, 0, statistics)?;
-            self.stages(work, None, coefficients);
+            self.solve_and_verify(work, None, coefficients);
         }
-        self.advance(work.linear(*kept));
+        self.advance(work.linearization(*stored_linearization));
         Ok(())
     }
 }
@@ -209,17 +211,17 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M
         // Lengths that the optimiser knows need no looking at.
         let (nx, nk, nw) = (self.plan.nx(), self.plan.nk(), self.plan.nw());
         if self.mu.len() == nk && self.lambda.len() == nx && self.gradient.len() == nw {
-            each_row::<A, _>(&mut self);
+            for_each_row::<A, _>(&mut self);
         }
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> RowVisitor for Advance<'_, M, E, S, C> {
     /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: Option<usize> = Table::Entries(1, 5).known::<M>();
+    const ROWS: Option<usize> = StructureTable::Entries(1, 5).known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Entries(1, 5).of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Entries(1, 5).row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 2 + 2 * C * S;
     #[inline(always)]
@@ -235,14 +237,14 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M,
             self.gradient.get_mut(c - nx - nz)
         };
         if let (Some(to), Some(mu)) = (to, self.mu.get(plan.slot(r))) {
-            subtract::<A, E, S, C>(to, values, mu);
+            subtract_stage_products::<A, E, S, C>(to, values, mu);
         }
     }
 }
 
 /// `to −= Σ_i value_i μ_i`
 #[inline(always)]
-fn subtract<A: Arithmetic, E: Lanes, const S: usize, const C: usize>(
+fn subtract_stage_products<A: Arithmetic, E: Lanes, const S: usize, const C: usize>(
     to: &mut [E; C],
     values: &[E; S],
     mu: &[[E; C]; S],
@@ -261,7 +263,7 @@ fn subtract<A: Arithmetic, E: Lanes, const S: usize, const C: usize>(
 #[zeroable(bound = "")]
 pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) result: Adjoint<M, T, C>,
-    pub(crate) backward: Backward<M, T, S, C>,
+    pub(crate) backward: AdjointSweep<M, T, S, C>,
 }
 
 /// The memory of adjoints, of any number of seeds.
@@ -272,7 +274,7 @@ impl<M: Dae, T: Real, const S: usize> Family for Adjoints<M, T, S> {
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
     /// The result, after the first step.
-    pub(crate) fn collect<F: Fallback>(&mut self, work: &Work<M, E, S, F>) {
+    pub(crate) fn write_result<F: Fallback>(&mut self, work: &StageWorkspace<M, E, S, F>) {
         let Self { result, backward } = self;
         result.nominal = work.result;
         let nx = M::Shape::NX;
@@ -295,8 +297,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C>
 impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> {
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>) -> Result<(), Error> {
-        self.collect(work);
+    pub(crate) fn finish<F: Fallback>(&mut self, work: &StageWorkspace<M, T, S, F>) -> Result<(), Error> {
+        self.write_result(work);
         let result = &self.result;
         check_gradient(result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice())
     }

@@ -9,56 +9,62 @@
 //! approximate solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where
 //! they cancel, no elimination is to blame.
 
-use super::adjoint::Backward;
-use super::directions::{Directions, weight};
-use super::forward::checksum::{ACCUMULATORS, total};
-use super::forward::sweep::Sweep;
-use super::workspace::{Linearization, Work};
+use super::adjoint::AdjointSweep;
+use super::directions::{Directions, checksum_weight};
+use super::forward::checksum::{ACCUMULATORS, sum_accumulators};
+use super::forward::sweep::ForwardSweep;
+use super::workspace::{Linearization, StageWorkspace};
 use crate::irk::coefficients::Coefficients;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, minus_ha};
+use crate::linalg::{Arithmetic, Block, Kernel, RowVisitor, dispatch, for_each_row, minus_ha};
 use crate::memory::Fallback;
 use crate::model::Dae;
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
 
 /// Derivatives are good if they satisfy their equations to this many ε of the terms.
-const ROUNDING: f64 = 4096.0;
+const BACKWARD_ERROR_TOLERANCE: f64 = 4096.0;
 
 /// A residual is zero below this many ε of its terms.
-const RESIDUAL: f64 = 16.0;
+const RESIDUAL_TOLERANCE: f64 = 16.0;
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
     ///
     /// Where the directions happen to cancel in the sum, its rounding errors look large beside it.
     /// They hardly do in a second sum too.
     pub(crate) fn verify_forward<R: Array<E>, D: Directions<E>>(
         &mut self,
-        sweep: &Sweep<M, E, R, S>,
+        sweep: &ForwardSweep<M, E, R, S>,
         coefficients: &Coefficients<E, S>,
         directions: D,
-        second: bool,
+        with_second_weights: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
         // The residual has done its work.
-        let Self { probe: [probe, sizes], f, terms, linear, .. } = self;
+        let Self {
+            variable_scratch: [probe, sizes],
+            f,
+            equation_magnitudes: terms,
+            linearization: linear,
+            ..
+        } = self;
         let (probe, sizes) = (probe.as_mut(), sizes.as_mut());
         let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
         for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
-            *input = [directions.total(nx + w, second); S];
+            *input = [directions.weighted_sum(nx + w, with_second_weights); S];
         }
         dispatch(VerifyForward {
             plan: F::plan::<M>(),
             start_sums: sweep.start_sums.as_ref(),
-            stage_sums: sweep.sums.as_ref(),
+            stage_sums: sweep.stage_sums.as_ref(),
             a: &coefficients.a,
             h: self.inputs.time.step,
             jacobian: F::Plan::<M>::jacobian(&linear.jacobian),
-            probe,
-            sizes,
-            sums: F::Plan::<M>::k_mut(f),
-            terms: F::Plan::<M>::k_mut(terms),
+            variable_sums: probe,
+            variable_magnitudes: sizes,
+            equation_sums: F::Plan::<M>::k_mut(f),
+            equation_magnitudes: F::Plan::<M>::k_mut(terms),
         })
     }
 
@@ -66,85 +72,85 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// lane, with `λ` at the end of the step.
     pub(crate) fn verify_adjoint<const C: usize>(
         &mut self,
-        kept: Option<&Linearization<M, E, S, F>>,
-        backward: &Backward<M, E, S, C>,
+        stored_linearization: Option<&Linearization<M, E, S, F>>,
+        backward: &AdjointSweep<M, E, S, C>,
         coefficients: &Coefficients<E, S>,
     ) -> E::Mask {
-        let [sums, sizes] = &mut self.probe;
+        let [sums, sizes] = &mut self.variable_scratch;
         dispatch(VerifyAdjoint {
             plan: F::plan::<M>(),
             lambda: backward.lambda.as_ref(),
             mu: backward.mu.as_ref(),
-            source: if backward.sourced { backward.source.as_ref() } else { &[] },
+            source: if backward.has_source { backward.stage_source.as_ref() } else { &[] },
             a: &coefficients.a,
             b: &coefficients.b,
             h: self.inputs.time.step,
-            jacobian: F::Plan::<M>::jacobian(&kept.unwrap_or(&self.linear).jacobian),
+            jacobian: F::Plan::<M>::jacobian(&stored_linearization.unwrap_or(&self.linearization).jacobian),
             sums: F::Plan::<M>::v_mut(sums),
-            sizes: F::Plan::<M>::v_mut(sizes),
+            magnitudes: F::Plan::<M>::v_mut(sizes),
         })
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Whether the residual is at the level of the rounding errors of its terms,
     /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`, lane by lane.
-    pub(crate) fn is_satisfied(&mut self) -> E::Mask {
-        self.complete();
-        dispatch(Satisfied {
+    pub(crate) fn residual_is_rounding(&mut self) -> E::Mask {
+        self.replicate_jacobian();
+        dispatch(ResidualTest {
             plan: F::plan::<M>(),
             f: self.f.as_ref(),
             points: F::Plan::<M>::v(&self.points),
-            jacobian: F::Plan::<M>::jacobian(&self.linear.jacobian),
-            sizes: F::Plan::<M>::k_mut(&mut self.terms),
+            jacobian: F::Plan::<M>::jacobian(&self.linearization.jacobian),
+            magnitudes: F::Plan::<M>::k_mut(&mut self.equation_magnitudes),
         })
     }
 }
 
 /// Whether loops over so many entries become straight lines: in registers, of which each entry has
 /// several, they are a small part of a step, unless there are few.
-const fn is_worth_lines<E>(entries: Option<usize>) -> bool {
+const fn is_worth_unrolling<E>(entries: Option<usize>) -> bool {
     size_of::<E>() <= 8 || matches!(entries, Some(..65))
 }
 
-struct Satisfied<'a, M: Plan, E: Plain, const S: usize> {
+struct ResidualTest<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
     f: &'a [[E; S]],
     points: &'a M::V<[E; S]>,
     jacobian: &'a M::Jacobian<[E; S]>,
-    sizes: &'a mut M::K<[E; S]>,
+    magnitudes: &'a mut M::K<[E; S]>,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for ResidualTest<'_, M, E, S> {
     type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) -> E::Mask {
-        let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL * E::EPSILON));
-        self.sizes.as_mut().fill([E::from_f64(E::SMALLEST); S]);
-        each_row::<A, _>(&mut self);
-        let mut good = E::le(zero, zero);
-        for (f, sizes) in self.f.iter().zip(self.sizes.as_ref()) {
+        let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL_TOLERANCE * E::EPSILON));
+        self.magnitudes.as_mut().fill([E::from_f64(E::SMALLEST); S]);
+        for_each_row::<A, _>(&mut self);
+        let mut valid = E::le(zero, zero);
+        for (f, sizes) in self.f.iter().zip(self.magnitudes.as_ref()) {
             for (&f, &size) in f.iter().zip(sizes) {
-                good = E::and(good, E::le(f.abs(), bound * size));
+                valid = E::and(valid, E::le(f.abs(), bound * size));
             }
         }
-        good
+        valid
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::JACOBIAN.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize> RowVisitor for ResidualTest<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::JACOBIAN.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::JACOBIAN.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::JACOBIAN.row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 4 * if size_of::<E>() > 8 { S } else { 1 };
-    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
+    const UNROLLED: bool = is_worth_unrolling::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = self.plan.entry(self.jacobian.as_ref(), row) else { return };
-        let (Some(sizes), Some(points)) = (self.sizes.as_mut().get_mut(r), self.points.as_ref().get(c))
+        let (Some(sizes), Some(points)) = (self.magnitudes.as_mut().get_mut(r), self.points.as_ref().get(c))
         else {
             return;
         };
@@ -159,13 +165,13 @@ impl<M: Plan, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
 
 /// The weighted sum over all seeds.
 #[inline(always)]
-fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
+fn weighted_seed_sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
     if const { C == 1 } {
         return seeds[0];
     }
     let mut sum = E::from_f64(0.0);
     for (seed, &value) in seeds.iter().enumerate() {
-        sum = sum + weight::<E>(seed, false) * value;
+        sum = sum + checksum_weight::<E>(seed, false) * value;
     }
     sum
 }
@@ -173,12 +179,12 @@ fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
 /// `|sum| ≤ ROUNDING ε size`
 #[inline(always)]
 fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
-    E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
+    E::le(sum.abs(), E::from_f64(BACKWARD_ERROR_TOLERANCE * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
 }
 
 /// `|value|` at each stage.
 #[inline(always)]
-fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
+fn magnitudes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
     let mut sizes = *values;
     for size in &mut sizes {
         *size = size.abs();
@@ -188,7 +194,7 @@ fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
 
 /// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
 #[inline(always)]
-fn displaced<A: Arithmetic, E: Lanes, const S: usize>(
+fn stage_sums_with_magnitudes<A: Arithmetic, E: Lanes, const S: usize>(
     start: E,
     minus_ha: &Block<E, S>,
     (dk, dk_sizes): (&[E; S], &[E; S]),
@@ -211,11 +217,11 @@ struct VerifyForward<'a, M: Plan, E: Plain, const S: usize> {
     h: E,
     jacobian: &'a M::Jacobian<[E; S]>,
     /// The sum over the directions of every variable, and what it is rounded relative to.
-    probe: &'a mut [[E; S]],
-    sizes: &'a mut [[E; S]],
+    variable_sums: &'a mut [[E; S]],
+    variable_magnitudes: &'a mut [[E; S]],
     /// The same of every equation.
-    sums: &'a mut M::K<[E; S]>,
-    terms: &'a mut M::K<[E; S]>,
+    equation_sums: &'a mut M::K<[E; S]>,
+    equation_magnitudes: &'a mut M::K<[E; S]>,
 }
 
 impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
@@ -223,7 +229,18 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { plan, start_sums, stage_sums, a, h, jacobian, probe, sizes, sums, terms } = self;
+        let Self {
+            plan,
+            start_sums,
+            stage_sums,
+            a,
+            h,
+            jacobian,
+            variable_sums: probe,
+            variable_magnitudes: sizes,
+            equation_sums: sums,
+            equation_magnitudes: terms,
+        } = self;
         let (nx, zero) = (plan.nx(), E::from_f64(0.0));
         // Lengths that the optimiser knows need no looking at.
         let (nk, nv) = (plan.nk(), plan.nv());
@@ -233,16 +250,20 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         }
         let minus_ha = minus_ha(a, h);
         for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
-            *sizes = sizes_of(values);
+            *sizes = magnitudes_of(values);
         }
         for (unknown, stages) in stage_sums.iter().enumerate() {
             let mut sum = [zero; S];
             for (sum, accumulators) in sum.iter_mut().zip(stages) {
-                *sum = total(accumulators);
+                *sum = sum_accumulators(accumulators);
             }
-            let size = sizes_of(&sum);
+            let size = magnitudes_of(&sum);
             if unknown < nx {
-                let xi = displaced::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
+                let xi = stage_sums_with_magnitudes::<A, E, S>(
+                    sum_accumulators(&start_sums[unknown]),
+                    &minus_ha,
+                    (&sum, &size),
+                );
                 (probe[unknown], sizes[unknown]) = (sum, size);
                 (probe[nx + unknown], sizes[nx + unknown]) = xi;
             } else {
@@ -251,40 +272,53 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         }
         sums.fill([zero; S]);
         terms.fill([zero; S]);
-        let mut total = Total { plan, jacobian, probe, sizes, sums, terms };
-        each_row::<A, _>(&mut total);
-        let mut good = E::le(zero, zero);
-        for (sums, terms) in total.sums.iter().zip(&*total.terms) {
+        let mut total = EquationSums {
+            plan,
+            jacobian,
+            variable_sums: probe,
+            variable_magnitudes: sizes,
+            equation_sums: sums,
+            equation_magnitudes: terms,
+        };
+        for_each_row::<A, _>(&mut total);
+        let mut valid = E::le(zero, zero);
+        for (sums, terms) in total.equation_sums.iter().zip(&*total.equation_magnitudes) {
             for (&sum, &size) in sums.iter().zip(terms) {
-                good = E::and(good, is_small(sum, size));
+                valid = E::and(valid, is_small(sum, size));
             }
         }
-        good
+        valid
     }
 }
 
 /// For each equation the sum over all variables, and that of the sizes of its terms.
-struct Total<'a, M, E, const S: usize> {
+struct EquationSums<'a, M, E, const S: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
-    probe: &'a [[E; S]],
-    sizes: &'a [[E; S]],
-    sums: &'a mut [[E; S]],
-    terms: &'a mut [[E; S]],
+    variable_sums: &'a [[E; S]],
+    variable_magnitudes: &'a [[E; S]],
+    equation_sums: &'a mut [[E; S]],
+    equation_magnitudes: &'a mut [[E; S]],
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::JACOBIAN.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize> RowVisitor for EquationSums<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::JACOBIAN.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::JACOBIAN.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::JACOBIAN.row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 6 * if size_of::<E>() > 8 { S } else { 1 };
-    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
+    const UNROLLED: bool = is_worth_unrolling::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = self.plan.entry(self.jacobian, row) else { return };
-        let Self { probe, sizes, sums, terms, .. } = self;
+        let Self {
+            variable_sums: probe,
+            variable_magnitudes: sizes,
+            equation_sums: sums,
+            equation_magnitudes: terms,
+            ..
+        } = self;
         let (Some(sums), Some(terms), Some(probe), Some(sizes)) =
             (sums.get_mut(r), terms.get_mut(r), probe.get(c), sizes.get(c))
         else {
@@ -312,31 +346,31 @@ struct VerifyAdjoint<'a, M: Plan, E: Plain, const S: usize, const C: usize> {
     h: E,
     jacobian: &'a M::Jacobian<[E; S]>,
     sums: &'a mut M::V<[E; S]>,
-    sizes: &'a mut M::V<[E; S]>,
+    magnitudes: &'a mut M::V<[E; S]>,
 }
 
 /// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sizes of the terms.
-struct TotalAdjoint<'a, M, E, const S: usize, const C: usize> {
+struct VariableSums<'a, M, E, const S: usize, const C: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
     mu: &'a [[[E; C]; S]],
     sums: &'a mut [[E; S]],
-    sizes: &'a mut [[E; S]],
+    magnitudes: &'a mut [[E; S]],
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_, M, E, S, C> {
+impl<M: Plan, E: Lanes, const S: usize, const C: usize> RowVisitor for VariableSums<'_, M, E, S, C> {
     /// The entries of `f_ẋ`, `f_x` and `f_z`.
-    const ROWS: Option<usize> = Table::Entries(0, 3).known::<M>();
+    const ROWS: Option<usize> = StructureTable::Entries(0, 3).known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Entries(0, 3).of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Entries(0, 3).row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = (6 + C) * if size_of::<E>() > 8 { S } else { 1 };
-    const UNROLLED: bool = is_worth_lines::<E>(Self::ROWS);
+    const UNROLLED: bool = is_worth_unrolling::<E>(Self::ROWS);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = self.plan.entry(self.jacobian, row) else { return };
-        let Self { plan, mu, sums, sizes, .. } = self;
+        let Self { plan, mu, sums, magnitudes: sizes, .. } = self;
         let (Some(sums), Some(sizes), Some(mu)) = (sums.get_mut(c), sizes.get_mut(c), mu.get(plan.slot(r)))
         else {
             return;
@@ -344,7 +378,7 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'
         // In registers: the optimiser cannot know that nothing here overlaps.
         let (mut total, mut size) = (*sums, *sizes);
         for i in 0..S {
-            let term = values[i] * sum(&mu[i]);
+            let term = values[i] * weighted_seed_sum(&mu[i]);
             total[i] = total[i] + term;
             size[i] = size[i] + term.abs();
         }
@@ -357,7 +391,7 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { plan, lambda, mu, source, a, b, h, jacobian, sums, sizes } = self;
+        let Self { plan, lambda, mu, source, a, b, h, jacobian, sums, magnitudes: sizes } = self;
         let (nx, nk, zero) = (plan.nx(), plan.nk(), E::from_f64(0.0));
         let (jacobian, sums, sizes) = (jacobian.as_ref(), sums.as_mut(), sizes.as_mut());
         if mu.len() != nk {
@@ -365,19 +399,19 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint
         }
         sums.fill([zero; S]);
         sizes.fill([zero; S]);
-        let mut total = TotalAdjoint { plan, jacobian, mu, sums, sizes };
-        each_row::<A, _>(&mut total);
-        let (sums, sizes) = (&*total.sums, &*total.sizes);
-        let mut good = E::le(zero, zero);
+        let mut total = VariableSums { plan, jacobian, mu, sums, magnitudes: sizes };
+        for_each_row::<A, _>(&mut total);
+        let (sums, sizes) = (&*total.sums, &*total.magnitudes);
+        let mut valid = E::le(zero, zero);
         for unknown in 0..nk {
             // Of `k` what multiplies it at its own stage, and through `ξ` at all.
-            let own = if unknown < nx { unknown } else { unknown + nx };
-            let (Some(total), Some(size)) = (sums.get(own), sizes.get(own)) else { continue };
+            let variable = if unknown < nx { unknown } else { unknown + nx };
+            let (Some(total), Some(size)) = (sums.get(variable), sizes.get(variable)) else { continue };
             let (mut total, mut size) = (*total, *size);
             if let (true, Some(xi), Some(xi_size)) =
                 (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown))
             {
-                let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda));
+                let right = lambda.get(unknown).map_or(zero, |lambda| weighted_seed_sum(lambda));
                 for i in 0..S {
                     let right = h * b[i] * right;
                     total[i] = total[i] - right;
@@ -391,15 +425,15 @@ impl<M: Plan, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint
             }
             if let Some(source) = source.get(unknown) {
                 for ((total, size), &source) in total.iter_mut().zip(&mut size).zip(source) {
-                    let right = sum(&[source; C]);
+                    let right = weighted_seed_sum(&[source; C]);
                     *total = *total - right;
                     *size = *size + right.abs();
                 }
             }
             for (&total, &size) in total.iter().zip(&size) {
-                good = E::and(good, is_small(total, size));
+                valid = E::and(valid, is_small(total, size));
             }
         }
-        good
+        valid
     }
 }

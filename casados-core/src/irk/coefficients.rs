@@ -11,14 +11,14 @@ pub(crate) struct Coefficients<E, const S: usize> {
     pub b: [E; S],
     pub c: [E; S],
     /// Lagrange polynomials at the start of the step.
-    pub start: [E; S],
+    pub lagrange_start: [E; S],
     /// Lagrange polynomials at its end.
-    pub end: [E; S],
+    pub lagrange_end: [E; S],
     /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them;
     /// if there are any.
-    pub next: Option<[[E; S]; S]>,
+    pub lagrange_next: Option<[[E; S]; S]>,
     /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
-    pub basis: Option<Eigenbasis<E, S, S>>,
+    pub eigenbasis: Option<Eigenbasis<E, S, S>>,
     pub tableau: Tableau<S>,
 }
 
@@ -38,14 +38,14 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
         let next = tableau.c().map(|c| tableau.lagrange(1.0 + c));
         let finite = next.as_flattened().iter().all(|l| l.is_finite());
         Self {
-            a: square(tableau.a()),
-            b: row(tableau.b()),
-            c: row(tableau.c()),
-            start: row(&tableau.lagrange(0.0)),
-            end: row(&end),
+            a: cast_matrix(tableau.a()),
+            b: cast_row(tableau.b()),
+            c: cast_row(tableau.c()),
+            lagrange_start: cast_row(&tableau.lagrange(0.0)),
+            lagrange_end: cast_row(&end),
             // Polynomials of higher degree are not worth much outside of their interval.
-            next: (finite && S <= 4).then(|| square(&next)),
-            basis: if const { S < 3 } || !shared { None } else { Eigenbasis::new(&tableau) },
+            lagrange_next: (finite && S <= 4).then(|| cast_matrix(&next)),
+            eigenbasis: if const { S < 3 } || !shared { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }
@@ -53,7 +53,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
 
 /// As numbers of the integrator. Loops are quicker to compile than what maps arrays.
 #[inline(always)]
-fn row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
+fn cast_row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
     let mut to = [E::from_f64(0.0); S];
     for (to, from) in to.iter_mut().zip(from) {
         *to = E::from_f64(*from);
@@ -62,10 +62,10 @@ fn row<E: Lanes, const S: usize>(from: &[f64; S]) -> [E; S] {
 }
 
 #[inline(always)]
-fn square<E: Lanes, const S: usize>(from: &[[f64; S]; S]) -> [[E; S]; S] {
+fn cast_matrix<E: Lanes, const S: usize>(from: &[[f64; S]; S]) -> [[E; S]; S] {
     let mut to = [[E::from_f64(0.0); S]; S];
     for (to, from) in to.iter_mut().zip(from) {
-        *to = row(from);
+        *to = cast_row(from);
     }
     to
 }

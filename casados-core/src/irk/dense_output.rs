@@ -5,7 +5,7 @@
 //! ```
 
 use super::forward::memory::ForwardMemory;
-use super::step::algebraic;
+use super::step::interpolate_algebraic;
 use super::workspace::{Inputs, Step};
 use crate::error::{Argument, Error};
 use crate::finite::check_output;
@@ -18,7 +18,7 @@ use crate::shape::Matrix;
 use crate::tableau::Tableau;
 
 /// A time as a point of a step.
-pub(crate) struct Point<T, const S: usize> {
+pub(crate) struct StepPoint<T, const S: usize> {
     pub step: usize,
     /// `b_i(θ)`
     weights: [T; S],
@@ -26,7 +26,7 @@ pub(crate) struct Point<T, const S: usize> {
     lagrange: [T; S],
 }
 
-impl<T: Real, const S: usize> Point<T, S> {
+impl<T: Real, const S: usize> StepPoint<T, S> {
     /// # Errors
     /// [`Error::NonFiniteInput`], [`Error::OutsideInterval`], [`Error::NoInterpolation`]
     pub(crate) fn new<M: Dae>(
@@ -79,7 +79,7 @@ impl<T: Real, const S: usize> Point<T, S> {
         for ((to, x), k) in result.x.as_mut_slice().iter_mut().zip(step.x.as_ref()).zip(step.y.as_ref()) {
             *to = *x + h * dot(&self.weights, k);
         }
-        algebraic::<M, T, S>(result.z.as_mut_slice(), &step.y, &self.lagrange);
+        interpolate_algebraic::<M, T, S>(result.z.as_mut_slice(), &step.y, &self.lagrange);
         check_output(result.x.as_slice(), self.step)?;
         check_output(result.z.as_slice(), self.step)
     }

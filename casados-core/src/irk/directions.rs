@@ -18,21 +18,21 @@ pub(super) const L1_CACHE_BYTES: usize = 1 << 15;
 /// or the panel row of all stages would not fit beside what it is multiplied by. Of two stages
 /// eight do where there are thirty-two registers: if columns are many, factors, which then come
 /// from the second cache, are read half as often.
-pub(super) const fn width<E>(stages: usize, count: usize) -> usize {
-    let many = size_of::<E>() == 64 && stages <= 2 && count >= 16;
-    if size_of::<E>() <= 8 || many { 8 } else { 4 }
+pub(super) const fn panel_width<E>(stages: usize, count: usize) -> usize {
+    let allows_wide_panels = size_of::<E>() == 64 && stages <= 2 && count >= 16;
+    if size_of::<E>() <= 8 || allows_wide_panels { 8 } else { 4 }
 }
 
 /// How many columns the panels of so many directions have together, where there is memory for
 /// `most`. Where two narrow panels would follow the wide ones, columns of zeros make them one:
 /// registers compute these beside the others, and each width has code of its own.
-const fn padded<E>(directions: usize, most: usize) -> usize {
+const fn padded_columns<E>(directions: usize, max_columns: usize) -> usize {
     let columns = match directions % 8 {
         5.. if size_of::<E>() <= 8 => directions.next_multiple_of(8),
         3 | 7 => directions + 1,
         _ => directions,
     };
-    if REGISTERS && columns <= most { columns } else { directions }
+    if REGISTERS && columns <= max_columns { columns } else { directions }
 }
 
 /// A number for each column of panels of all directions: there is memory for whole panels where
@@ -45,20 +45,20 @@ pub type ArrayC<M, T> = crate::model::ArrayW<M, T>;
 
 /// How many columns panels of all directions have together: whole panels, where kernels are not
 /// compiled for one model and there is memory for them.
-pub(super) const fn all_columns<M: Dae, E, F: Fallback>() -> usize {
+pub(super) const fn total_columns<M: Dae, E, F: Fallback>() -> usize {
     let (directions, most) = (M::STRUCTURE.directions.len(), M::Shape::NC);
-    let whole = directions.next_multiple_of(8);
-    match <F::Plan<M> as Plan>::KNOWN {
-        Some(_) => padded::<E>(directions, most),
-        None if whole <= most => whole,
+    let full_panel_columns = directions.next_multiple_of(8);
+    match <F::Plan<M> as Plan>::KNOWN_STRUCTURE {
+        Some(_) => padded_columns::<E>(directions, most),
+        None if full_panel_columns <= most => full_panel_columns,
         None => directions,
     }
 }
 
 /// The same, if it is known when kernels are compiled.
-pub(super) const fn known_columns<P: Plan, E>() -> Option<usize> {
-    match P::KNOWN {
-        Some(structure) => Some(padded::<E>(structure.directions.len(), P::NC)),
+pub(super) const fn static_columns<P: Plan, E>() -> Option<usize> {
+    match P::KNOWN_STRUCTURE {
+        Some(structure) => Some(padded_columns::<E>(structure.directions.len(), P::NC)),
         None => None,
     }
 }
@@ -70,8 +70,8 @@ pub(super) const fn have_panels<E>(count: Option<usize>, stages: usize, columns:
         (None, 8) => size_of::<E>() <= 8,
         (None, 4) => size_of::<E>() > 8,
         (None, columns) => columns == 1,
-        (Some(count), 8) => count >= 8 && width::<E>(stages, count) == 8,
-        (Some(count), 4) => count >= 4 && (count % 8 >= 4 || width::<E>(stages, count) == 4),
+        (Some(count), 8) => count >= 8 && panel_width::<E>(stages, count) == 8,
+        (Some(count), 4) => count >= 4 && (count % 8 >= 4 || panel_width::<E>(stages, count) == 4),
         (Some(count), columns) => count % (2 * columns) >= columns,
     }
 }
@@ -119,16 +119,16 @@ pub(super) use panels;
 /// Where the panel of a column begins, and how many columns it has.
 #[inline(always)]
 pub(super) const fn panel_of<E>(known: bool, column: usize, count: usize, stages: usize) -> (usize, usize) {
-    let (mut begin, mut width) = (0, width::<E>(stages, count));
+    let (mut begin, mut width) = (0, panel_width::<E>(stages, count));
     if !known && size_of::<E>() > 8 {
         width = 4;
     }
     loop {
-        let whole = begin + (count - begin) / width * width;
-        if column < whole || width == 1 {
+        let full_panel_columns = begin + (count - begin) / width * width;
+        if column < full_panel_columns || width == 1 {
             return (begin + (column - begin) / width * width, width);
         }
-        (begin, width) = (whole, if known { width / 2 } else { 1 });
+        (begin, width) = (full_panel_columns, if known { width / 2 } else { 1 });
     }
 }
 
@@ -149,7 +149,7 @@ pub(crate) trait Directions<E>: Copy {
     /// How many columns their panels have, if that is known when kernels are compiled.
     const COLUMNS: Option<usize>;
     /// Whether each is an element of `w`.
-    const SPARSE: bool = false;
+    const ARE_UNIT_VECTORS: bool = false;
     /// How many columns their panels have.
     fn columns(self) -> usize;
     /// The column of an element of `w`, if that is a direction.
@@ -157,26 +157,26 @@ pub(crate) trait Directions<E>: Copy {
         None
     }
     /// `row += factor · dw_index`, in the columns from `column` on.
-    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]);
+    fn add_scaled<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]);
     /// `Σ_c weight_c dw_index,c` over all columns, with the weights of the first sum or the second.
-    fn total(self, index: usize, second: bool) -> E;
+    fn weighted_sum(self, index: usize, with_second_weights: bool) -> E;
 }
 
 /// One direction for each element of `w` that has any influence.
 #[derive(Clone, Copy)]
-pub(crate) struct Identity<P> {
+pub(crate) struct IdentityDirections<P> {
     plan: P,
     columns: usize,
 }
 
 /// That of the plan which an integrator has for its model.
-pub(crate) type IdentityOf<M, F> = Identity<<F as Fallback>::Plan<M>>;
+pub(crate) type IdentityDirectionsOf<M, F> = IdentityDirections<<F as Fallback>::Plan<M>>;
 
-impl<P: Plan> Identity<P> {
+impl<P: Plan> IdentityDirections<P> {
     /// Of numbers `E`.
     #[inline(always)]
-    pub(crate) fn of<M: Dae, E, F: Fallback<Plan<M> = P>>() -> Self {
-        Self { plan: F::plan::<M>(), columns: const { all_columns::<M, E, F>() } }
+    pub(crate) fn for_model<M: Dae, E, F: Fallback<Plan<M> = P>>() -> Self {
+        Self { plan: F::plan::<M>(), columns: const { total_columns::<M, E, F>() } }
     }
 }
 
@@ -189,13 +189,13 @@ pub(crate) fn column_of<P: Plan>(plan: P, index: usize) -> Option<usize> {
     }
 }
 
-impl<P: Plan, E: Lanes> Directions<E> for Identity<P> {
-    const COLUMNS: Option<usize> = known_columns::<P, E>();
-    const SPARSE: bool = true;
+impl<P: Plan, E: Lanes> Directions<E> for IdentityDirections<P> {
+    const COLUMNS: Option<usize> = static_columns::<P, E>();
+    const ARE_UNIT_VECTORS: bool = true;
 
     #[inline(always)]
     fn columns(self) -> usize {
-        match const { known_columns::<P, E>() } {
+        match const { static_columns::<P, E>() } {
             Some(columns) => columns,
             None => self.columns,
         }
@@ -207,7 +207,7 @@ impl<P: Plan, E: Lanes> Directions<E> for Identity<P> {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+    fn add_scaled<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
         let Some(of_index) = column_of(self.plan, index) else { return };
         if let Some(element) = row.get_mut(of_index.wrapping_sub(column)) {
             *element = *element + factor;
@@ -215,16 +215,17 @@ impl<P: Plan, E: Lanes> Directions<E> for Identity<P> {
     }
 
     #[inline(always)]
-    fn total(self, index: usize, second: bool) -> E {
-        column_of(self.plan, index).map_or(E::from_f64(0.0), |column| weight(column, second))
+    fn weighted_sum(self, index: usize, with_second_weights: bool) -> E {
+        column_of(self.plan, index)
+            .map_or(E::from_f64(0.0), |column| checksum_weight(column, with_second_weights))
     }
 }
 
 /// The rows of a matrix: each direction is a column.
 #[derive(Clone, Copy)]
-pub(crate) struct Seeded<'a, E, const C: usize>(pub &'a [[E; C]]);
+pub(crate) struct SeedDirections<'a, E, const C: usize>(pub &'a [[E; C]]);
 
-impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
+impl<E: Lanes, const C: usize> Directions<E> for SeedDirections<'_, E, C> {
     const COLUMNS: Option<usize> = Some(C);
 
     #[inline(always)]
@@ -233,7 +234,7 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn add<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+    fn add_scaled<const W: usize>(self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
         let seeds = self.0.get(index).and_then(|row| row.get(column..)).unwrap_or_default();
         for (element, &seed) in row.iter_mut().zip(seeds) {
             *element = *element + factor * seed;
@@ -241,10 +242,10 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
     }
 
     #[inline(always)]
-    fn total(self, index: usize, second: bool) -> E {
+    fn weighted_sum(self, index: usize, with_second_weights: bool) -> E {
         let mut total = E::from_f64(0.0);
         for (column, &seed) in self.0.get(index).into_iter().flatten().enumerate() {
-            total = total + weight::<E>(column, second) * seed;
+            total = total + checksum_weight::<E>(column, with_second_weights) * seed;
         }
         total
     }
@@ -253,14 +254,14 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
 /// The weight of a direction in the first sum over all of them, or in the second: neither equal nor
 /// alternating, so that no structure hides an error.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
-    let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
+pub(super) fn checksum_weight<E: Field>(direction: usize, with_second_weights: bool) -> E {
+    let rank = if with_second_weights { 2 * direction + 1 } else { 3 * direction } % 7;
     E::from_f64(1.0) + E::from_f64(0.25) * E::from_whole(rank)
 }
 
 #[cfg(all(test, feature = "alloc", target_arch = "x86_64"))]
 mod tests {
-    use super::{padded, panel_of};
+    use super::{padded_columns, panel_of};
     use crate::scalar::lanes::{F64x4, F64x8};
     use alloc::vec::Vec;
 
@@ -285,15 +286,15 @@ mod tests {
     #[test]
     fn panels_have_few_widths() {
         for directions in 1..50 {
-            let columns = padded::<f64>(directions, usize::MAX);
+            let columns = padded_columns::<f64>(directions, usize::MAX);
             assert!((directions..directions.next_multiple_of(8) + 1).contains(&columns));
             let mut narrow = widths::<f64>(columns, 3);
             narrow.retain(|&width| width < 8);
             assert!(narrow.len() <= 1, "{directions}: {narrow:?}");
             for (columns, stages) in [
-                (padded::<F64x4<4>>(directions, usize::MAX), 2),
-                (padded::<F64x8<8>>(directions, usize::MAX), 2),
-                (padded::<F64x8<8>>(directions, usize::MAX), 4),
+                (padded_columns::<F64x4<4>>(directions, usize::MAX), 2),
+                (padded_columns::<F64x8<8>>(directions, usize::MAX), 2),
+                (padded_columns::<F64x8<8>>(directions, usize::MAX), 4),
             ] {
                 assert!((directions..=directions + 1).contains(&columns));
                 let mut narrow = widths::<F64x8<8>>(columns, stages);
@@ -301,7 +302,7 @@ mod tests {
                 assert!(narrow.len() <= 1, "{directions}: {narrow:?}");
             }
             // Without memory for more, columns are directions.
-            assert_eq!(padded::<f64>(directions, directions), directions);
+            assert_eq!(padded_columns::<f64>(directions, directions), directions);
         }
     }
 }

@@ -1,10 +1,10 @@
 //! What all calls of an integrator share: arguments checked, steps taken, and these kept only if
 //! everything succeeded.
 
-use super::step::Scheme;
-use super::workspace::{Step, Work};
+use super::step::IntervalScheme;
+use super::workspace::{StageWorkspace, Step};
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, check_named, find_non_finite};
+use crate::finite::{check_input, check_model_input, find_non_finite};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::stages::initial_guess::InitialGuess;
 #[cfg(feature = "alloc")]
@@ -20,22 +20,22 @@ use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 
 /// The part of an integrator that every call needs.
-pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
+pub(crate) struct Driver<M: Dae, T: Real, const S: usize, W: Memory> {
     pub options: Options,
     pub coefficients: Coefficients<T, S>,
     pub statistics: Statistics,
-    work: W::Nominal<Work<M, T, S, W::Fallback>>,
+    workspace: W::Nominal<StageWorkspace<M, T, S, W::Fallback>>,
     /// The steps of the last successful call, and those of the call that runs.
     tapes: [W::Tape<Step<M, T, S>>; 2],
     last_tape: usize,
     /// Whether any call succeeded.
-    any: bool,
+    has_result: bool,
     /// Whether the last steps are a warm start.
-    warm: bool,
+    has_warm_start: bool,
     /// Whether their stages are the solution of the next call.
-    solved: bool,
-    given: bool,
-    parameters: bool,
+    initial_is_solution: bool,
+    start_given: bool,
+    parameters_set: bool,
     time: T,
 }
 
@@ -47,15 +47,15 @@ pub(crate) struct Arguments<'a, M: Dae, T: Real> {
 }
 
 /// What a call has to work with after a step, and after all of them.
-pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
-    pub work: &'a mut Work<M, T, S, F>,
+pub(crate) struct CallContext<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
+    pub workspace: &'a mut StageWorkspace<M, T, S, F>,
     pub coefficients: &'a Coefficients<T, S>,
     /// All steps; none as long as they are being taken.
     pub steps: &'a [Step<M, T, S>],
     pub statistics: &'a mut Statistics,
 }
 
-impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
+impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
     pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         options.check()?;
         if options.steps > W::STEPS {
@@ -69,27 +69,27 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             return Err(Error::NotPivoted { step: 0 });
         }
         let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::HAS_MEMORY);
-        let ends = [&coefficients.start, &coefficients.end];
+        let ends = [&coefficients.lagrange_start, &coefficients.lagrange_end];
         if M::Shape::NZ > 0 && ends.iter().any(|weights| find_non_finite(*weights).is_some()) {
             return Err(Error::NoInterpolation);
         }
-        Ok(Self::empty(options, coefficients, T::ZERO))
+        Ok(Self::without_memory(options, coefficients, T::ZERO))
     }
 
     /// Without memory, and with nothing set but these.
-    fn empty(options: Options, coefficients: Coefficients<T, S>, time: T) -> Self {
+    fn without_memory(options: Options, coefficients: Coefficients<T, S>, time: T) -> Self {
         Self {
             options,
             coefficients,
             statistics: Statistics::default(),
-            work: Default::default(),
+            workspace: Default::default(),
             tapes: Default::default(),
             last_tape: 0,
-            any: false,
-            warm: false,
-            solved: false,
-            given: false,
-            parameters: false,
+            has_result: false,
+            has_warm_start: false,
+            initial_is_solution: false,
+            start_given: false,
+            parameters_set: false,
             time,
         }
     }
@@ -108,7 +108,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn reserve(&mut self) -> Result<(), Error> {
-        W::nominal(&mut self.work)?.prepare();
+        W::nominal(&mut self.workspace)?.write_constants();
         for tape in &mut self.tapes {
             W::tape(tape, self.options.steps)?;
         }
@@ -116,13 +116,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn reset(&mut self) {
-        (self.warm, self.solved) = (false, false);
+        (self.has_warm_start, self.initial_is_solution) = (false, false);
     }
 
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        check_named::<M, T>(Argument::P, p.as_slice())?;
-        W::nominal(&mut self.work)?.parameters = *p;
-        self.parameters = true;
+        check_model_input::<M, T>(Argument::P, p.as_slice())?;
+        W::nominal(&mut self.workspace)?.parameters = *p;
+        self.parameters_set = true;
         Ok(())
     }
 
@@ -133,75 +133,80 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
-        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
-        let given = W::nominal(&mut self.work)?.given.as_mut();
+        check_model_input::<M, T>(Argument::StartXdot, xdot.as_slice())?;
+        check_model_input::<M, T>(Argument::StartZ, z.as_slice())?;
+        let given = W::nominal(&mut self.workspace)?.start_values.as_mut();
         for (to, from) in given.iter_mut().zip(xdot.as_slice().iter().chain(z.as_slice())) {
             *to = *from;
         }
-        self.given = true;
+        self.start_given = true;
         Ok(())
     }
 
     /// What a call needs before its steps. A call that is refused without it has used up a solution
     /// that it was given.
-    pub fn needs<R>(&mut self, result: Result<R, Error>) -> Result<R, Error> {
-        self.solved &= result.is_ok();
+    pub fn invalidate_solution_on_error<R>(&mut self, result: Result<R, Error>) -> Result<R, Error> {
+        self.initial_is_solution &= result.is_ok();
         result
     }
 
     /// The steps of a call, with `after` called after each.
-    pub fn steps(
+    pub fn run_steps(
         &mut self,
         arguments: &Arguments<'_, M, T>,
-        mut after: impl FnMut(
-            &mut Parts<'_, M, T, S, W::Fallback>,
+        mut after_step: impl FnMut(
+            &mut CallContext<'_, M, T, S, W::Fallback>,
             usize,
             &Step<M, T, S>,
             bool,
         ) -> Result<(), Error>,
-    ) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
-        let Self { options, coefficients, statistics, work, tapes, .. } = self;
+    ) -> Result<CallContext<'_, M, T, S, W::Fallback>, Error> {
+        let Self { options, coefficients, statistics, workspace: work, tapes, .. } = self;
         *statistics = Statistics::default();
         // Of this call alone, refused or not.
-        let solved = core::mem::take(&mut self.solved);
-        check_named::<M, T>(Argument::X0, arguments.x0.as_slice())?;
-        check_named::<M, T>(Argument::U, arguments.u.as_slice())?;
+        let initial_is_solution = core::mem::take(&mut self.initial_is_solution);
+        check_model_input::<M, T>(Argument::X0, arguments.x0.as_slice())?;
+        check_model_input::<M, T>(Argument::U, arguments.u.as_slice())?;
         check_input(Argument::H, &[arguments.h])?;
-        if M::Shape::NP > 0 && !self.parameters {
+        if M::Shape::NP > 0 && !self.parameters_set {
             return Err(Error::ParametersNotSet);
         }
         let work = W::nominal(work)?;
-        work.prepare();
+        work.write_constants();
         work.inputs.u = *arguments.u;
         work.inputs.p = work.parameters;
         work.inputs.time.start = self.time;
         work.inputs.time.interval = arguments.h;
         work.inputs.time.step = arguments.h / T::from_whole(options.steps);
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
-        let [last, running] = Self::tapes(tapes, self.last_tape);
+        let [last, current_tape] = Self::tapes(tapes, self.last_tape);
         // Both in the first call: later ones do not allocate.
-        let steps = W::tape(running, options.steps)?;
+        let steps = W::tape(current_tape, options.steps)?;
         let last = W::tape(last, options.steps)?;
         let guess = match options.start {
-            _ if solved => InitialGuess::Solution(last),
+            _ if initial_is_solution => InitialGuess::Solution(last),
             Start::Zero => InitialGuess::Zero,
-            Start::Given if !self.given => return Err(Error::StartNotGiven),
-            Start::Warm if self.warm => InitialGuess::Previous(last),
-            _ if self.given => InitialGuess::Given,
+            Start::Given if !self.start_given => return Err(Error::StartNotGiven),
+            Start::Warm if self.has_warm_start => InitialGuess::Previous(last),
+            _ if self.start_given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
         };
-        let scheme = Scheme { coefficients, options, guess };
+        let scheme = IntervalScheme { coefficients, options, guess };
         work.integrate(&scheme, steps, statistics, |work, n, step, exact, statistics| {
-            after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, exact)
+            after_step(
+                &mut CallContext { workspace: work, coefficients, steps: &[], statistics },
+                n,
+                step,
+                exact,
+            )
         })?;
-        Ok(Parts { work, coefficients, steps, statistics })
+        Ok(CallContext { workspace: work, coefficients, steps, statistics })
     }
 
     /// Whether start values are solutions but for their last digits.
     #[cfg(feature = "alloc")]
-    pub fn set_near(&mut self, near: bool) -> Result<(), Error> {
-        W::nominal(&mut self.work)?.near = near;
+    pub fn set_start_near_solution(&mut self, near_solution: bool) -> Result<(), Error> {
+        W::nominal(&mut self.workspace)?.start_near_solution = near_solution;
         Ok(())
     }
 
@@ -213,7 +218,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             for (to, from) in step.y.as_mut().as_flattened_mut().iter_mut().zip(y) {
                 *to = *from;
             }
-            self.warm = true;
+            self.has_warm_start = true;
         }
         Ok(())
     }
@@ -221,15 +226,15 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     /// The variables at the stages where the last call ended, successful or not.
     #[cfg(feature = "alloc")]
     pub fn points(&mut self) -> Result<&ArrayV<M, [T; S]>, Error> {
-        Ok(&W::nominal(&mut self.work)?.points)
+        Ok(&W::nominal(&mut self.workspace)?.points)
     }
 
     /// The error of the last call, whose first step started at `y`, with what that has to do with
     /// it.
     #[cfg(feature = "alloc")]
-    pub fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
+    pub fn explain_with_start(&mut self, error: Error, y: &[T]) -> Error {
         let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
-        W::nominal(&mut self.work).map_or(error, |work| work.explain_from(error, &start))
+        W::nominal(&mut self.workspace).map_or(error, |work| work.explain_with_start(error, &start))
     }
 
     /// The stages of every step, as a warm start.
@@ -238,7 +243,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         for (step, y) in self.last_steps()?.iter_mut().zip(stages) {
             crate::shape::copy_into(&mut *step.y, y);
         }
-        (self.warm, self.solved) = (true, false);
+        (self.has_warm_start, self.initial_is_solution) = (true, false);
         Ok(())
     }
 
@@ -246,50 +251,55 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn set_solution(&mut self, stages: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         self.set_stages_of_steps(stages)?;
-        self.solved = true;
+        self.initial_is_solution = true;
         Ok(())
     }
 
     /// Everything succeeded: the steps of this call are those to keep.
-    pub fn keep(&mut self) -> Result<&Work<M, T, S, W::Fallback>, Error> {
-        let work = W::nominal(&mut self.work)?;
+    pub fn commit(&mut self) -> Result<&StageWorkspace<M, T, S, W::Fallback>, Error> {
+        let work = W::nominal(&mut self.workspace)?;
         work.last_inputs = work.inputs;
         self.last_tape = 1 - self.last_tape;
-        self.any = true;
-        self.warm = true;
+        self.has_result = true;
+        self.has_warm_start = true;
         Ok(work)
     }
 
     /// The last successful call.
-    pub fn last(&mut self) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
-        if !self.any {
+    pub fn last_call(&mut self) -> Result<CallContext<'_, M, T, S, W::Fallback>, Error> {
+        if !self.has_result {
             return Err(Error::NoResult);
         }
-        let work = W::nominal(&mut self.work)?;
+        let work = W::nominal(&mut self.workspace)?;
         let [last, _] = Self::tapes(&mut self.tapes, self.last_tape);
         let steps = W::tape(last, self.options.steps)?;
-        Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
+        Ok(CallContext {
+            workspace: work,
+            coefficients: &self.coefficients,
+            steps,
+            statistics: &mut self.statistics,
+        })
     }
 }
 
 #[cfg(feature = "alloc")]
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Run<M, T, S, Heap<F>> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Driver<M, T, S, Heap<F>> {
     /// The same settings with memory of its own. Parameters and start values for which there is no
     /// memory are as if they had never been set.
-    pub fn fresh(&self) -> Self {
-        let mut run = Self::empty(self.options, self.coefficients.clone(), self.time);
-        let set = self.work.get().filter(|_| self.parameters || self.given);
-        if let (Some(from), Ok(to)) = (set, <Heap<F>>::nominal(&mut run.work)) {
-            (to.parameters, to.given) = (from.parameters, from.given);
-            (run.parameters, run.given) = (self.parameters, self.given);
+    pub fn clone_settings(&self) -> Self {
+        let mut run = Self::without_memory(self.options, self.coefficients.clone(), self.time);
+        let set = self.workspace.get().filter(|_| self.parameters_set || self.start_given);
+        if let (Some(from), Ok(to)) = (set, <Heap<F>>::nominal(&mut run.workspace)) {
+            (to.parameters, to.start_values) = (from.parameters, from.start_values);
+            (run.parameters_set, run.start_given) = (self.parameters_set, self.start_given);
         }
         run
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> CallContext<'_, M, T, S, F> {
     /// See [`Work::linearize`].
     pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
-        self.work.linearize(self.coefficients, n, step, exact, self.statistics)
+        self.workspace.linearize(self.coefficients, n, step, exact, self.statistics)
     }
 }

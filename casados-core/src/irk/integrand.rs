@@ -7,12 +7,12 @@
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0) + (h Σ_i a_ij g_x,i, g_z,j)        λ_n += Σ_i g_x,i        λ_w += Σ_i g_w,i
 //! ```
 
-use super::adjoint::Backward;
+use super::adjoint::AdjointSweep;
 use super::directions::ArrayC;
-use super::driver::Parts;
-use super::forward::sweep::Sweep;
+use super::driver::CallContext;
+use super::forward::sweep::ForwardSweep;
 use super::integrator::Integrator;
-use super::workspace::{Step, Work};
+use super::workspace::{StageWorkspace, Step};
 use crate::error::{Error, Place};
 use crate::integrator::With;
 use crate::irk::coefficients::Coefficients;
@@ -23,14 +23,14 @@ use crate::result::Hessian;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// The variables at a stage, which are in `points`, to where the integrand takes them from.
-    fn point_of<'a>(
+    fn load_stage<'a>(
         &self,
         stage: usize,
         integrand: &'a mut dyn Integrand<M, T>,
     ) -> &'a mut dyn Integrand<M, T> {
-        for (to, from) in integrand.point().0.iter_mut().zip(self.points.as_ref()) {
+        for (to, from) in integrand.stage_variables_mut().0.iter_mut().zip(self.points.as_ref()) {
             if let Some(from) = from.get(stage) {
                 *to = *from;
             }
@@ -42,17 +42,17 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
-    pub(crate) fn along_value(
+    pub(crate) fn add_integrand_value(
         &mut self,
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {
-        self.place(coefficients, n, &step.x, &step.y);
+        self.place_stages(coefficients, n, &step.x, &step.y);
         for (stage, b) in coefficients.b.iter().enumerate() {
             let at = Place { step: n, stage, iteration: 0 };
-            self.point_of(stage, integrand).value(self.inputs.time.step * *b, at)?;
+            self.load_stage(stage, integrand).add_value(self.inputs.time.step * *b, at)?;
         }
         Ok(())
     }
@@ -61,31 +61,31 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
-    pub(crate) fn along_adjoint<const C: usize>(
+    pub(crate) fn add_integrand_adjoint<const C: usize>(
         &mut self,
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
-        backward: &mut Backward<M, T, S, C>,
+        backward: &mut AdjointSweep<M, T, S, C>,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {
         let (nx, nz, h) = (M::Shape::NX, M::Shape::NZ, self.inputs.time.step);
-        let (source, shift) = (backward.source.as_mut(), backward.shift.as_mut());
-        source.fill([T::ZERO; S]);
+        let (stage_source, shift) = (backward.stage_source.as_mut(), backward.end_source.as_mut());
+        stage_source.fill([T::ZERO; S]);
         shift.fill(T::ZERO);
-        backward.sourced = true;
-        self.place(coefficients, n, &step.x, &step.y);
+        backward.has_source = true;
+        self.place_stages(coefficients, n, &step.x, &step.y);
         for (stage, (b, a)) in coefficients.b.iter().zip(&coefficients.a).enumerate() {
             let at = Place { step: n, stage, iteration: 0 };
-            let gradient = self.point_of(stage, integrand).adjoint(h * *b, at)?;
+            let gradient = self.load_stage(stage, integrand).weighted_gradient(h * *b, at)?;
             let states = gradient.get(nx..2 * nx).unwrap_or_default();
-            for (source, g) in source.iter_mut().zip(states) {
+            for (source, g) in stage_source.iter_mut().zip(states) {
                 for (source, a) in source.iter_mut().zip(a) {
                     *source = *source + h * *a * *g;
                 }
             }
             let (algebraic, inputs) = gradient.split_at_checked(2 * nx + nz).unwrap_or_default();
-            for (source, g) in source.iter_mut().skip(nx).zip(algebraic.iter().skip(2 * nx)) {
+            for (source, g) in stage_source.iter_mut().skip(nx).zip(algebraic.iter().skip(2 * nx)) {
                 source[stage] = *g;
             }
             for (shift, g) in shift.iter_mut().zip(states.iter().chain(inputs)) {
@@ -96,28 +96,28 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> CallContext<'_, M, T, S, F> {
     /// What the stages of a step add to the value and its derivatives, with those of the stages.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
-    pub(crate) fn along_forward(
+    pub(crate) fn add_integrand_forward(
         &mut self,
         n: usize,
         step: &Step<M, T, S>,
-        sweep: &Sweep<M, T, ArrayC<M, T>, S>,
-        second: bool,
+        sweep: &ForwardSweep<M, T, ArrayC<M, T>, S>,
+        with_hessian: bool,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {
-        let Self { work, coefficients, .. } = self;
+        let Self { workspace: work, coefficients, .. } = self;
         let h = work.inputs.time.step;
-        work.place(coefficients, n, &step.x, &step.y);
+        work.place_stages(coefficients, n, &step.x, &step.y);
         for (stage, b) in coefficients.b.iter().enumerate() {
-            let integrand = work.point_of(stage, integrand);
+            let integrand = work.load_stage(stage, integrand);
             let variables = integrand.variables();
-            let (_, d) = integrand.point();
-            sweep.write_rows::<F>(coefficients, h, stage, variables, d);
-            integrand.forward(h * *b, second, Place { step: n, stage, iteration: 0 })?;
+            let (_, d) = integrand.stage_variables_mut();
+            sweep.write_stage_rows::<F>(coefficients, h, stage, variables, d);
+            integrand.add_forward(h * *b, with_hessian, Place { step: n, stage, iteration: 0 })?;
         }
         Ok(())
     }

@@ -2,11 +2,11 @@
 //! in `sensitivities`.
 
 use super::adjoint::Adjoints;
-use super::dense_output::Point;
-use super::driver::Run;
+use super::dense_output::StepPoint;
+use super::driver::Driver;
 use super::forward::directional::Directionals;
 use super::forward::memory::ForwardMemory;
-use super::hessian::pass::{HessianMemory, HessianStep};
+use super::hessian::backward_pass::{HessianMemory, HessianStep};
 use crate::error::Error;
 use crate::integrator::Integrator as _;
 #[cfg(feature = "alloc")]
@@ -57,14 +57,14 @@ use core::marker::PhantomData;
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
-    pub(crate) run: Run<M, T, S, W>,
+    pub(crate) run: Driver<M, T, S, W>,
     pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,
     pub(super) directional: W::Directional<Directionals<M, T, S>>,
     pub(super) adjoint: W::Adjoint<Adjoints<M, T, S>>,
     pub(super) hessian: W::Hessian<HessianMemory<M, T, S>>,
     pub(super) hessian_tape: W::HessianTape<HessianStep<M, T, S, W::Fallback>>,
     /// The step of the last successful call whose derivatives are in the memory of `forward`.
-    pub(super) sweep: Option<usize>,
+    pub(super) differentiated_step: Option<usize>,
     method: PhantomData<fn() -> B>,
 }
 
@@ -101,7 +101,7 @@ where
     /// # Errors
     /// [`Error::InvalidOption`]
     pub fn inline(options: Options) -> Result<Self, Error> {
-        Self::ready(options, B::TABLEAU)
+        Self::with_reserved_memory(options, B::TABLEAU)
     }
 }
 
@@ -116,7 +116,7 @@ where
     /// # Errors
     /// As `with_tableau`.
     pub fn inline_with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
-        Self::ready(options, tableau)
+        Self::with_reserved_memory(options, tableau)
     }
 }
 
@@ -125,7 +125,7 @@ where
 #[cfg(feature = "alloc")]
 impl<M: Dae, B, const S: usize, T: Real, F: Fallback> Clone for Integrator<M, B, S, T, Heap<F>> {
     fn clone(&self) -> Self {
-        Self::empty(self.run.fresh())
+        Self::without_memory(self.run.clone_settings())
     }
 }
 
@@ -144,11 +144,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     pub const SIZE: usize = size_of::<Self>();
 
     pub(crate) fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
-        Ok(Self::empty(Run::new(options, tableau)?))
+        Ok(Self::without_memory(Driver::new(options, tableau)?))
     }
 
     /// Without memory for derivatives.
-    fn empty(run: Run<M, T, S, W>) -> Self {
+    fn without_memory(run: Driver<M, T, S, W>) -> Self {
         Self {
             run,
             forward: Default::default(),
@@ -156,13 +156,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             adjoint: Default::default(),
             hessian: Default::default(),
             hessian_tape: Default::default(),
-            sweep: None,
+            differentiated_step: None,
             method: PhantomData,
         }
     }
 
     /// As `build`, and what a first call would prepare: none takes longer than the others.
-    fn ready(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+    fn with_reserved_memory(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         let mut integrator = Self::build(options, tableau)?;
         integrator.reserve()?;
         Ok(integrator)
@@ -233,7 +233,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Copies the stages of every step of the last successful call.
     #[cfg(feature = "alloc")]
     pub(crate) fn copy_stages(&mut self, to: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
-        for (y, step) in to.iter_mut().zip(self.run.last()?.steps) {
+        for (y, step) in to.iter_mut().zip(self.run.last_call()?.steps) {
             crate::shape::copy_into(y, &step.y);
         }
         Ok(())
@@ -243,7 +243,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// innermost.
     #[cfg(feature = "alloc")]
     pub(crate) fn stages(&mut self) -> Result<&[T], Error> {
-        let steps = self.run.last()?.steps;
+        let steps = self.run.last_call()?.steps;
         Ok(steps.first().map_or(&[], |step| step.y.as_ref().as_flattened()))
     }
 
@@ -270,13 +270,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`],
     /// [`Error::Overflow`]; [`Error::NoInterpolation`] if the tableau is not one of collocation.
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        let last = self.run.last()?;
-        let work = last.work;
-        let point = Point::new(t, &work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
+        let last = self.run.last_call()?;
+        let work = last.workspace;
+        let point = StepPoint::new(t, &work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
         let h = work.last_inputs.time.step;
         if let Some(step) = last.steps.get(point.step) {
-            point.evaluate(step, h, &mut work.dense)?;
+            point.evaluate(step, h, &mut work.dense_output)?;
         }
-        Ok(&work.dense)
+        Ok(&work.dense_output)
     }
 }

@@ -22,7 +22,6 @@
 
 mod adjoint;
 mod backward_error;
-mod calls;
 mod coefficients;
 mod dense_output;
 mod directions;
@@ -31,6 +30,7 @@ mod forward;
 mod hessian;
 mod integrand;
 mod integrator;
+mod integrator_trait;
 mod jacobian_entries;
 mod kinematic;
 mod newton;
@@ -52,13 +52,13 @@ pub use integrator::Integrator;
 pub(crate) use self::{
     coefficients::{Coefficients, dot},
     driver::Arguments,
-    forward::{gradient::multiply, memory::StepOf},
-    hessian::pass::{HessianMemory, HessianStep},
+    forward::{gradient::gradient_product, memory::StepIndex},
+    hessian::backward_pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
-    newton::fold::eliminate,
+    newton::fold::analyse_pivots,
     newton::iteration::StageEquations,
     stages::initial_guess::InitialGuess,
-    workspace::{Linearization, Step, Work},
+    workspace::{Linearization, StageWorkspace, Step},
 };
 
 use crate::memory::Memory;

@@ -9,14 +9,14 @@ use core::ops::{Deref, DerefMut};
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 #[zeroable(bound = "A: Zeroable, T: Zeroable")]
 #[repr(C)]
-pub(crate) struct Stages<A, T, const S: usize> {
+pub(crate) struct StageArray<A, T, const S: usize> {
     cells: A,
     /// For the last cells of what begins with another stage: nothing that is looked for there is
     /// ever written.
-    beyond: [T; S],
+    padding: [T; S],
 }
 
-impl<A, T, const S: usize> Deref for Stages<A, T, S> {
+impl<A, T, const S: usize> Deref for StageArray<A, T, S> {
     type Target = A;
     #[inline(always)]
     fn deref(&self) -> &A {
@@ -24,17 +24,17 @@ impl<A, T, const S: usize> Deref for Stages<A, T, S> {
     }
 }
 
-impl<A, T, const S: usize> DerefMut for Stages<A, T, S> {
+impl<A, T, const S: usize> DerefMut for StageArray<A, T, S> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut A {
         &mut self.cells
     }
 }
 
-impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
+impl<A: Array<[T; S]>, T: Plain, const S: usize> StageArray<A, T, S> {
     /// Cells that begin with the number of a stage.
     #[inline(always)]
-    pub fn seen_from(&self, stage: usize) -> &A {
+    pub fn stage_view(&self, stage: usize) -> &A {
         let stage = stage.min(S);
         // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these; behind
         // it, in the same struct and without a gap, as both are aligned as `T` is, lie `S` more of
@@ -45,7 +45,7 @@ impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
 
     /// Cells that begin with the number of a stage.
     #[inline(always)]
-    pub fn seen_from_mut(&mut self, stage: usize) -> &mut A {
+    pub fn stage_view_mut(&mut self, stage: usize) -> &mut A {
         let stage = stage.min(S);
         // SAFETY: as above.
         unsafe { &mut *core::ptr::from_mut(self).cast::<T>().add(stage).cast::<A>() }
@@ -60,19 +60,19 @@ mod tests {
     /// written.
     #[test]
     fn first_numbers_are_those_of_the_stage() {
-        let mut stages: Stages<[[f64; 4]; 3], f64, 4> = Zeroable::zeroed();
+        let mut stages: StageArray<[[f64; 4]; 3], f64, 4> = Zeroable::zeroed();
         for stage in 0..4 {
-            for (cell, first) in stages.seen_from_mut(stage).iter_mut().enumerate() {
+            for (cell, first) in stages.stage_view_mut(stage).iter_mut().enumerate() {
                 first[0] = (10 * cell + stage) as f64;
             }
         }
         assert_eq!(*stages, [[0.0, 1.0, 2.0, 3.0], [10.0, 11.0, 12.0, 13.0], [20.0, 21.0, 22.0, 23.0]]);
-        assert_eq!(stages.beyond, [0.0; 4]);
+        assert_eq!(stages.padding, [0.0; 4]);
         for stage in 0..4 {
-            let seen = stages.seen_from(stage);
+            let seen = stages.stage_view(stage);
             assert_eq!(seen.map(|cell| cell[0]), [0.0, 10.0, 20.0].map(|first| first + stage as f64));
         }
         // Beyond the last stage there is one cell more, and no further.
-        assert_eq!(stages.seen_from(9)[2], [0.0; 4]);
+        assert_eq!(stages.stage_view(9)[2], [0.0; 4]);
     }
 }

@@ -3,8 +3,8 @@
 use super::newton::dense_fallback::unknown_name;
 use super::newton::iteration::StageEquations;
 use super::stages::compensated;
-use super::stages::initial_guess::{InitialGuess, stay};
-use super::workspace::{Linearization, Step, Validity, Work};
+use super::stages::initial_guess::{InitialGuess, copy_algebraic_states};
+use super::workspace::{FactorValidity, Linearization, StageWorkspace, Step};
 use crate::error::{Error, Place};
 use crate::finite::{check_output, find_non_finite};
 use crate::irk::coefficients::Coefficients;
@@ -18,15 +18,15 @@ use crate::shape::{Matrix, Shape, copy_into};
 use crate::statistics::Statistics;
 
 /// How an interval is integrated.
-pub(crate) struct Scheme<'a, M: Dae, E: Lanes, const S: usize> {
+pub(crate) struct IntervalScheme<'a, M: Dae, E: Lanes, const S: usize> {
     pub coefficients: &'a Coefficients<E, S>,
     pub options: &'a Options,
     pub guess: InitialGuess<'a, M, E, S>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// What comes before the first step of a call.
-    pub(crate) fn begin(&mut self) {
+    pub(crate) fn begin_call(&mut self) {
         self.place_inputs();
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
@@ -51,16 +51,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             advance::<M, E, S>(&mut self.x, &step.y, b, h);
         }
         if n == 0 {
-            algebraic::<M, E, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
+            interpolate_algebraic::<M, E, S>(
+                self.result.z0.as_mut_slice(),
+                &step.y,
+                &coefficients.lagrange_start,
+            );
         }
         if n + 1 == count {
-            algebraic::<M, E, S>(self.result.z.as_mut_slice(), &step.y, &coefficients.end);
+            interpolate_algebraic::<M, E, S>(
+                self.result.z.as_mut_slice(),
+                &step.y,
+                &coefficients.lagrange_end,
+            );
             self.result.x.as_mut_slice().copy_from_slice(self.x.as_ref());
         }
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after`
     /// is called with what is known about it, and whether the factors that are there are those of
     /// its solution.
@@ -69,23 +77,23 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Those of Newton's method; [`Error::Overflow`].
     pub(crate) fn integrate(
         &mut self,
-        scheme: &Scheme<'_, M, T, S>,
+        scheme: &IntervalScheme<'_, M, T, S>,
         steps: &mut [Step<M, T, S>],
         statistics: &mut Statistics,
-        mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
+        mut after_step: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        self.begin();
+        self.begin_call();
         let count = if const { F::INTERVALS } { steps.len() } else { 1 };
         for n in 0..count {
-            let (done, rest) = steps.split_at_mut(n);
-            let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
+            let (earlier_steps, rest) = steps.split_at_mut(n);
+            let (before, Some(step)) = (earlier_steps.last(), rest.first_mut()) else { break };
             step.x = self.x;
-            let exact = self.solve(scheme, n, before, step, statistics)?;
+            let factors_at_solution = self.solve(scheme, n, before, step, statistics)?;
             self.advance(scheme.coefficients, scheme.options.compensated, step, n, count);
             if let Some((index, _)) = find_non_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
-            after(self, n, step, exact, statistics)?;
+            after_step(self, n, step, factors_at_solution, statistics)?;
             statistics.steps += 1;
         }
         for z in [self.result.z0.as_slice(), self.result.z.as_slice()] {
@@ -98,54 +106,54 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// fallback; whether the factors that are there are those of the solution.
     fn solve(
         &mut self,
-        scheme: &Scheme<'_, M, T, S>,
+        scheme: &IntervalScheme<'_, M, T, S>,
         n: usize,
-        before: Option<&Step<M, T, S>>,
+        previous: Option<&Step<M, T, S>>,
         step: &mut Step<M, T, S>,
         statistics: &mut Statistics,
     ) -> Result<bool, Error> {
-        let Scheme { coefficients, options, guess } = scheme;
-        self.start(coefficients, guess, n, before, &mut step.y);
+        let IntervalScheme { coefficients, options, guess } = scheme;
+        self.set_initial_guess(coefficients, guess, n, previous, &mut step.y);
         if matches!(guess, InitialGuess::Solution(_)) {
             return Ok(false);
         }
         let Step { x, y } = step;
         let mut undetermined = None;
         if M::STRUCTURE.elimination.has_plan() {
-            let equations = StageEquations { coefficients, kept: None, n, x };
-            let mut solved = self.newton(equations, options, y, statistics);
-            if solved.stale {
-                self.start(coefficients, guess, n, before, y);
-                solved = self.newton(equations, options, y, statistics);
+            let equations = StageEquations { coefficients, stored_linearization: None, n, x };
+            let mut newton_result = self.newton(equations, options, y, statistics);
+            if newton_result.needs_restart {
+                self.set_initial_guess(coefficients, guess, n, previous, y);
+                newton_result = self.newton(equations, options, y, statistics);
             }
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
-            if solved.converged && finite {
-                return Ok(solved.exact);
+            if newton_result.converged && finite {
+                return Ok(newton_result.factors_at_solution);
             }
-            undetermined = solved.undetermined;
-            self.start(coefficients, guess, n, None, y);
+            undetermined = newton_result.undetermined;
+            self.set_initial_guess(coefficients, guess, n, None, y);
             if !matches!(guess, InitialGuess::Previous(_)) {
-                stay(before, y);
+                copy_algebraic_states(previous, y);
             }
         }
         if !F::HAS_MEMORY {
             return Err(
-                undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
+                undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular_error::<M>(unknown, n))
             );
         }
         #[cfg(feature = "alloc")]
-        let from = *y;
+        let initial_y = *y;
         match self.newton_dense(coefficients, &options.newton, n, x, y, statistics) {
             // Of the whole matrix, pivoted, it is asked again.
             Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
-                Some(unknown) => Err(singular::<M>(unknown, n)),
+                Some(unknown) => Err(singular_error::<M>(unknown, n)),
                 None => Ok(false),
             },
             Ok(()) => Ok(false),
             // Start values that are solutions but for their last digits are taken for solutions
             // where Newton's method leads away from them.
-            Err(_) if cfg!(feature = "alloc") && self.near => {
-                self.start(coefficients, guess, n, None, y);
+            Err(_) if cfg!(feature = "alloc") && self.start_near_solution => {
+                self.set_initial_guess(coefficients, guess, n, None, y);
                 Ok(false)
             }
             Err(error) => {
@@ -153,7 +161,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                     return Err(self.explain_start(error, guess));
                 }
                 #[cfg(feature = "alloc")]
-                let error = self.explain_fold(error, coefficients, (n, x), &from, y);
+                let error = self.explain_fold(error, coefficients, (n, x), &initial_y, y);
                 Err(error)
             }
         }
@@ -169,10 +177,10 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
-        exact: bool,
+        factors_at_solution: bool,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
-        self.linearize_planned(coefficients, None, n, step, exact, statistics);
+        self.linearize_planned(coefficients, None, n, step, factors_at_solution, statistics);
         self.check_model(n, 0)?;
         if !M::STRUCTURE.elimination.has_plan() {
             self.factor_dense(coefficients, n, 0, statistics)?;
@@ -181,7 +189,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// The linearisation at the solution of a step, by the plan if there is one; its factors in
     /// `to` another place, if it is given.
     pub(crate) fn linearize_planned(
@@ -190,17 +198,17 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         to: Option<&mut Linearization<M, E, S, F>>,
         n: usize,
         step: &Step<M, E, S>,
-        exact: bool,
+        factors_at_solution: bool,
         statistics: &mut Statistics,
     ) {
-        self.place(coefficients, n, &step.x, &step.y);
+        self.place_stages(coefficients, n, &step.x, &step.y);
         statistics.jacobians += 1;
         self.evaluate_jacobian();
-        let holds = exact || M::STRUCTURE.constant_matrix && self.validity.factors;
-        if !holds && M::STRUCTURE.elimination.has_plan() {
+        let factors_current = factors_at_solution || M::STRUCTURE.constant_matrix && self.validity.factors;
+        if !factors_current && M::STRUCTURE.elimination.has_plan() {
             statistics.factorizations += 1;
             let h = self.inputs.time.step;
-            let Linearization { jacobian, factors } = &mut self.linear;
+            let Linearization { jacobian, factors } = &mut self.linearization;
             let factors = match to {
                 Some(to) => {
                     copy_into(&mut to.jacobian, jacobian);
@@ -209,18 +217,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 None => factors,
             };
             factors.factor_by_plan(jacobian, &coefficients.a, h);
-            self.validity = Validity { factors: true, shared: false, rate: 0.0 };
+            self.validity = FactorValidity { factors: true, shared: false, rate: 0.0 };
         }
     }
 }
 
 /// The equations of a step do not determine an unknown.
-fn singular<M: Dae>(unknown: usize, step: usize) -> Error {
+fn singular_error<M: Dae>(unknown: usize, step: usize) -> Error {
     Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
 }
 
 /// Algebraic states at a point of the polynomial through the stages.
-pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
+pub(crate) fn interpolate_algebraic<M: Dae, E: Lanes, const S: usize>(
     z: &mut [E],
     y: &ArrayK<M, [E; S]>,
     lagrange: &[E; S],

@@ -1,6 +1,6 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
-use super::stage_array::Stages;
+use super::stage_array::StageArray;
 use crate::linalg::{Factors, SharedFactors};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
@@ -25,12 +25,12 @@ pub struct Step<M: Dae, T: Plain, const S: usize> {
 pub(crate) struct Inputs<M: Dae, T: Plain> {
     pub u: VectorU<M, T>,
     pub p: VectorP<M, T>,
-    pub time: Times<T>,
+    pub time: IntervalTimes<T>,
 }
 
 /// Where an interval is.
 #[derive(Clone, Copy, Zeroable)]
-pub(crate) struct Times<T> {
+pub(crate) struct IntervalTimes<T> {
     /// Its start.
     pub start: T,
     /// Its length.
@@ -44,7 +44,7 @@ pub(crate) struct Times<T> {
 #[zeroable(bound = "")]
 pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     /// Entries of the Jacobian of the model, each at all stages.
-    pub jacobian: Aligned<Stages<M::Jacobian<[T; S]>, T, S>>,
+    pub jacobian: Aligned<StageArray<M::Jacobian<[T; S]>, T, S>>,
     /// Factors of the Newton matrix.
     pub factors: Factors<M, T, S, F>,
 }
@@ -52,11 +52,11 @@ pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = 
 /// The memory that every call works in.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
+pub struct StageWorkspace<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// The solution of the last call.
     pub(crate) result: Nominal<M, T>,
     /// The solution at the last time that was asked for.
-    pub(crate) dense: Dense<M, T>,
+    pub(crate) dense_output: Dense<M, T>,
     /// What the last call was given.
     pub(crate) inputs: Inputs<M, T>,
     /// What the last successful call was given.
@@ -64,43 +64,43 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// Parameters as they were set.
     pub(crate) parameters: VectorP<M, T>,
     /// Start values as they were given.
-    pub(crate) given: ArrayK<M, T>,
+    pub(crate) start_values: ArrayK<M, T>,
     /// The state at the start of the step, then at its end.
     pub(crate) x: ArrayX<M, T>,
     /// What was rounded off from it, if sums are compensated.
     pub(crate) compensation: ArrayX<M, T>,
     /// Variables of the model, each at all stages.
-    pub(crate) points: Aligned<Stages<ArrayV<M, [T; S]>, T, S>>,
+    pub(crate) points: Aligned<StageArray<ArrayV<M, [T; S]>, T, S>>,
     /// The residual at all stages.
-    pub(crate) f: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
+    pub(crate) f: Aligned<StageArray<ArrayK<M, [T; S]>, T, S>>,
     /// The residual in the slots of the equations, then the increment.
     pub(crate) increment: Aligned<ArrayK<M, [[T; 1]; S]>>,
     /// Reciprocals of the sizes of the unknowns, which increments are measured by.
     pub(crate) weights: ArrayK<M, T>,
     /// The sizes of the last increments.
-    pub(crate) sizes: ArrayK<M, T>,
-    pub(crate) linear: Linearization<M, T, S, F>,
+    pub(crate) increment_sizes: ArrayK<M, T>,
+    pub(crate) linearization: Linearization<M, T, S, F>,
     /// Factors of the shared Jacobian of the stages, which iterations take where that is cheaper.
     pub(crate) shared: F::Place<SharedFactors<M, T, S>>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While
     /// stages are solved with compensated sums, what they are beyond their digits.
-    pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
-    pub(crate) terms: Aligned<ArrayK<M, [T; S]>>,
+    pub(crate) variable_scratch: [Aligned<ArrayV<M, [T; S]>>; 2],
+    pub(crate) equation_magnitudes: Aligned<ArrayK<M, [T; S]>>,
     /// What the factors that are there are good for.
-    pub(crate) validity: Validity,
+    pub(crate) validity: FactorValidity,
     /// Whether the constant entries of the Jacobian are there.
-    pub(crate) ready: bool,
+    pub(crate) constants_written: bool,
     /// Whether start values are solutions but for their last digits.
-    pub(crate) near: bool,
+    pub(crate) start_near_solution: bool,
     /// Whether the model has the same values at all stages when it is evaluated next.
-    pub(crate) alike: bool,
+    pub(crate) identical_stages: bool,
     /// Whether its Jacobian, the same at all stages, is there for the first one only.
-    pub(crate) first_only: bool,
+    pub(crate) first_stage_only: bool,
 }
 
 /// What factors that are there are good for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Zeroable)]
-pub(crate) struct Validity {
+pub(crate) struct FactorValidity {
     /// They belong to this call, and to its size of steps.
     pub factors: bool,
     /// Those of the shared Jacobian do.
@@ -119,22 +119,22 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// The linearisation of a step that was remembered, or else the one that is here.
-    pub(crate) fn linear<'a>(
+    pub(crate) fn linearization<'a>(
         &'a self,
-        kept: Option<&'a Linearization<M, E, S, F>>,
+        stored_linearization: Option<&'a Linearization<M, E, S, F>>,
     ) -> &'a Linearization<M, E, S, F> {
-        kept.unwrap_or(&self.linear)
+        stored_linearization.unwrap_or(&self.linearization)
     }
 
     /// To be called before anything else.
-    pub(crate) fn prepare(&mut self) {
-        if !self.ready {
+    pub(crate) fn write_constants(&mut self) {
+        if !self.constants_written {
             for stage in 0..S {
-                M::jacobian_constants::<Strided<E, S>>(self.linear.jacobian.seen_from_mut(stage));
+                M::jacobian_constants::<Strided<E, S>>(self.linearization.jacobian.stage_view_mut(stage));
             }
-            self.ready = true;
+            self.constants_written = true;
         }
     }
 }

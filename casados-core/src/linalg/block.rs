@@ -47,7 +47,7 @@ pub fn negate<E: Field, const S: usize, const W: usize>(panel_row: &mut PanelRow
 
 /// `panel_row − block · other`
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
+pub fn subtract_product<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     panel_row: &mut PanelRow<E, S, W>,
     block: &Block<E, S>,
     other: &PanelRow<E, S, W>,
@@ -107,7 +107,7 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
         }
         return inverse;
     }
-    if const { size_of::<E>() > 8 && S > 2 && S <= STEPS } {
+    if const { size_of::<E>() > 8 && S > 2 && S <= MAX_STEPS } {
         return inverse_in_registers::<A, E, S>(block);
     }
     // On the transposed matrix, so that what is done to rows is done to vectors of the memory.
@@ -149,7 +149,7 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
 }
 
 /// So many steps of an elimination can be written one after the other.
-const STEPS: usize = 4;
+const MAX_STEPS: usize = 4;
 
 /// The same in place: registers hold the block, but not the unit matrix beside it. The steps are
 /// written one after the other, or indices that the optimiser does not know would keep the block in
@@ -158,15 +158,15 @@ const STEPS: usize = 4;
 fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let zero = E::from_f64(0.0);
     let mut a = *block;
-    let (mut exchanges, mut exchanged) = ([[zero.is_smaller(zero); S]; S], false);
+    let (mut row_exchanges, mut exchanged) = ([[zero.is_smaller(zero); S]; S], false);
     macro_rules! steps {
         ($($k:literal)*) => {
             $(if const { $k < S } {
-                exchanged |= eliminate::<A, E, S>(&mut a, $k, &mut exchanges);
+                exchanged |= eliminate::<A, E, S>(&mut a, $k, &mut row_exchanges);
             })*
         };
     }
-    const { assert!(STEPS == 4) };
+    const { assert!(MAX_STEPS == 4) };
     steps!(0 1 2 3);
     // What was done to rows is undone to columns of the inverse.
     if exchanged {
@@ -174,8 +174,8 @@ fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E
             for i in (k + 1..S).rev() {
                 for row in &mut a {
                     let (p, q) = (row[k], row[i]);
-                    row[k] = E::select(exchanges[k][i], q, p);
-                    row[i] = E::select(exchanges[k][i], p, q);
+                    row[k] = E::select(row_exchanges[k][i], q, p);
+                    row[i] = E::select(row_exchanges[k][i], p, q);
                 }
             }
         }
@@ -223,7 +223,7 @@ fn eliminate<A: Arithmetic, E: Field, const S: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::kernel::arithmetic::Separate;
+    use crate::linalg::kernel::arithmetic::Unfused;
     use crate::linalg::transformed::complex::Complex;
 
     /// Two complex numbers and a real one, each a system of its own.
@@ -255,9 +255,9 @@ mod tests {
     fn inverts<const S: usize>() {
         for seed in 0..8 * S {
             let block = block::<S>(seed);
-            let inverse = inverse::<Separate, _, S>(&block);
+            let inverse = inverse::<Unfused, _, S>(&block);
             for (left, right) in [(&block, &inverse), (&inverse, &block)] {
-                for (j, column) in product::<Separate, _, S>(left, right).iter().enumerate() {
+                for (j, column) in product::<Unfused, _, S>(left, right).iter().enumerate() {
                     for (i, element) in column.iter().enumerate() {
                         let error = *element - Complex::real(if i == j { 1.0 } else { 0.0 });
                         let bound = 2.0 * 4.0 * (S * S) as f64 * f64::EPSILON;
@@ -283,12 +283,9 @@ mod tests {
     fn singular_blocks_are_not_finite() {
         let mut singular = block::<4>(1);
         singular[2] = singular[0];
-        assert!(!inverse::<Separate, _, 4>(&singular).as_flattened().iter().all(Complex::is_finite));
+        assert!(!inverse::<Unfused, _, 4>(&singular).as_flattened().iter().all(Complex::is_finite));
         assert!(
-            !inverse::<Separate, _, 4>(&[[Three::zero(); 4]; 4])
-                .as_flattened()
-                .iter()
-                .all(Complex::is_finite)
+            !inverse::<Unfused, _, 4>(&[[Three::zero(); 4]; 4]).as_flattened().iter().all(Complex::is_finite)
         );
     }
 }

@@ -12,7 +12,7 @@ use bytemuck::Zeroable;
 /// A matrix over the unknowns of all stages, and after [`Dense::factor`] its factors.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Dense<M: Dae, T: Plain, const S: usize> {
+pub struct DenseLu<M: Dae, T: Plain, const S: usize> {
     /// Rows of `A`, then of `L` (its diagonal is one and not stored) and `U`.
     rows: ArrayK<M, [ArrayK<M, [T; S]>; S]>,
     /// The row that was exchanged with row `k` in step `k`.
@@ -21,9 +21,9 @@ pub struct Dense<M: Dae, T: Plain, const S: usize> {
     scales: ArrayK<M, [T; S]>,
 }
 
-copy!([M: Dae, T: Plain, const S: usize] Dense<M, T, S>);
+copy!([M: Dae, T: Plain, const S: usize] DenseLu<M, T, S>);
 
-impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
+impl<M: Dae, T: Real, const S: usize> DenseLu<M, T, S> {
     /// `A = 0`
     pub fn clear(&mut self) {
         for row in self.rows.as_mut().as_flattened_mut() {
@@ -67,7 +67,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> DenseLu<M, E, S> {
     /// Solves `A X = B` in place, all columns of `B` at once.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         self.factors().solve(R::flat_mut(b.as_mut().as_flattened_mut()), R::LEN);
@@ -78,8 +78,8 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
         self.factors().solve_transposed(R::flat_mut(b.as_mut().as_flattened_mut()), R::LEN);
     }
 
-    fn factors(&self) -> Lu<'_, E> {
-        Lu {
+    fn factors(&self) -> LuFactors<'_, E> {
+        LuFactors {
             rows: Array::flat(self.rows.as_ref().as_flattened()).as_flattened(),
             pivots: self.pivots.as_ref().as_flattened(),
             scales: self.scales.as_ref().as_flattened(),
@@ -109,16 +109,16 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
         }
     }
     for (k, pivot_row) in pivots.iter_mut().enumerate() {
-        let (mut best, mut at) = (T::ZERO, k);
+        let (mut best, mut pivot_index) = (T::ZERO, k);
         for (i, row) in rows.chunks_exact(n).enumerate().skip(k) {
             let size = row.get(k).map_or(T::ZERO, |element| element.abs());
             if size > best {
-                (best, at) = (size, i);
+                (best, pivot_index) = (size, i);
             }
         }
-        exchange(rows, n, k, at);
-        exchange(scales, 1, k, at);
-        *pivot_row = at as u32;
+        swap_rows(rows, n, k, pivot_index);
+        swap_rows(scales, 1, k, pivot_index);
+        *pivot_row = pivot_index as u32;
         let Some((upper, lower)) = rows.split_at_mut_checked((k + 1) * n) else { return Err(k) };
         let Some((above, row)) = upper.split_at_checked(k * n) else { return Err(k) };
         let Some((&pivot, row_after)) = row.get(k..).and_then(|row| row.split_first()) else { return Err(k) };
@@ -146,7 +146,7 @@ fn factor<T: Real>(rows: &mut [T], pivots: &mut [u32], scales: &mut [T]) -> Resu
 
 /// Two rows of so many elements in each other's place. The compiler does not know that pivots are
 /// rows.
-fn exchange<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
+fn swap_rows<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
     let (first, second) = (i.min(j), i.max(j));
     if first == second {
         return;
@@ -159,13 +159,13 @@ fn exchange<T>(rows: &mut [T], width: usize, i: usize, j: usize) {
 }
 
 /// Factors, and the order and the scale of the rows that they are of.
-struct Lu<'a, E> {
+struct LuFactors<'a, E> {
     rows: &'a [E],
     pivots: &'a [u32],
     scales: &'a [E],
 }
 
-impl<E: Lanes> Lu<'_, E> {
+impl<E: Lanes> LuFactors<'_, E> {
     /// `A X = B` with `width` columns.
     #[inline(never)]
     fn solve(&self, b: &mut [E], width: usize) {
@@ -174,7 +174,7 @@ impl<E: Lanes> Lu<'_, E> {
             return;
         }
         for (k, pivot) in self.pivots.iter().enumerate() {
-            exchange(b, width, k, *pivot as usize);
+            swap_rows(b, width, k, *pivot as usize);
         }
         self.scale(b, width);
         for (i, row) in self.rows.chunks_exact(n).enumerate() {
@@ -188,17 +188,17 @@ impl<E: Lanes> Lu<'_, E> {
         }
         for (i, row) in self.rows.chunks_exact(n).enumerate().rev() {
             let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
-            let (Some(here), Some((pivot, row))) =
+            let (Some(current), Some((pivot, row))) =
                 (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
             else {
                 return;
             };
             for (u, x) in row.iter().zip(after.chunks_exact(width)) {
                 if *u != zero {
-                    axpy(-*u, x, here);
+                    axpy(-*u, x, current);
                 }
             }
-            divide(here, *pivot);
+            divide(current, *pivot);
         }
     }
 
@@ -221,15 +221,15 @@ impl<E: Lanes> Lu<'_, E> {
         }
         for (i, row) in self.rows.chunks_exact(n).enumerate() {
             let Some((here, after)) = b.split_at_mut_checked((i + 1) * width) else { return };
-            let (Some(here), Some((pivot, row))) =
+            let (Some(current), Some((pivot, row))) =
                 (here.get_mut(i * width..), row.get(i..).and_then(|row| row.split_first()))
             else {
                 return;
             };
-            divide(here, *pivot);
+            divide(current, *pivot);
             for (u, x) in row.iter().zip(after.chunks_exact_mut(width)) {
                 if *u != zero {
-                    axpy(-*u, here, x);
+                    axpy(-*u, current, x);
                 }
             }
         }
@@ -244,7 +244,7 @@ impl<E: Lanes> Lu<'_, E> {
         }
         self.scale(b, width);
         for (k, pivot) in self.pivots.iter().enumerate().rev() {
-            exchange(b, width, k, *pivot as usize);
+            swap_rows(b, width, k, *pivot as usize);
         }
     }
 }

@@ -23,23 +23,23 @@ mod newton_matrix;
 mod sparse_lu;
 mod transformed;
 
-pub(crate) use block::{PanelRow, minus_ha, subtract, subtract_diagonal, subtract_transposed};
+pub(crate) use block::{PanelRow, minus_ha, subtract_diagonal, subtract_product, subtract_transposed};
 pub(crate) use kernel::{
     arithmetic::{Arithmetic, Block},
     dispatch::{Kernel, dispatch, kernels, run_plain},
-    double_double::{displaced, dot_compensated, two_product},
-    prefetch::Ahead,
-    unroll::{AtRow, each_row, is_long, is_short},
+    double_double::{axpy_compensated, dot_compensated, two_product},
+    prefetch::Prefetch,
+    unroll::{RowVisitor, for_each_row, is_large_plan, is_unrolled},
     vector::{are_finite, axpy, dot},
 };
 pub use newton_matrix::{Factors, kinematic, slot};
 pub(crate) use sparse_lu::{
-    factor::Planned,
-    solve::{Down, TransposedDown, TransposedUp, Up, Visitor, sweeps},
+    factor::PlannedFactors,
+    solve::{Down, TransposedDown, TransposedUp, Up, Visitor, solve_triangular_pair},
 };
 pub(crate) use transformed::{basis::Eigenbasis, shared_factor::SharedFactors};
 #[cfg(feature = "alloc")]
 pub(crate) use transformed::{
-    checked_factor::{EigenFactors, PARTS, Rows},
+    checked_factor::{COMPLEX_PARTS, EigenFactors, EigenRows},
     complex::Complex,
 };

@@ -1,16 +1,16 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
 use super::block::minus_ha;
-use super::dense_lu::Dense;
+use super::dense_lu::DenseLu;
 use super::kernel::dispatch::{Kernel, dispatch};
-use super::kernel::unroll::{AtRow, each_row};
+use super::kernel::unroll::{RowVisitor, for_each_row};
 use super::kernel::vector::axpy;
-use super::sparse_lu::factor::{self, Planned};
+use super::sparse_lu::factor::{self, PlannedFactors};
 use super::sparse_lu::solve;
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::memory::{Fallback, OptionalPlace, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
-use crate::plan::{self, Known, Plan, PlanOf, Table};
+use crate::plan::{self, Known, Plan, PlanOf, StructureTable};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Aligned, Array, Plain, Shape, copy_into};
 use bytemuck::Zeroable;
@@ -33,7 +33,7 @@ pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
 pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     blocks: Aligned<M::Factors<Block<T, S>>>,
     /// Memory that is touched only where the plan is not good enough.
-    dense: F::Place<Dense<M, T, S>>,
+    dense: F::Place<DenseLu<M, T, S>>,
     /// Whether the dense factors are the ones that hold.
     is_dense: bool,
 }
@@ -73,18 +73,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 
     /// The factors by the plan.
-    pub fn planned(&self) -> Planned<'_, F::Plan<M>, E, S> {
-        Planned { plan: F::plan::<M>(), blocks: self.blocks.as_ref() }
+    pub fn planned(&self) -> PlannedFactors<'_, F::Plan<M>, E, S> {
+        PlannedFactors { plan: F::plan::<M>(), blocks: self.blocks.as_ref() }
     }
 
     /// Whether the factors that are there are those of the plan.
-    pub fn is_planned(&self) -> bool {
+    pub fn is_from_plan(&self) -> bool {
         !Self::MAY_BE_DENSE || self.dense().is_none()
     }
 
     /// The factors of the whole matrix, if they are the ones that hold.
     #[inline(always)]
-    fn dense(&self) -> Option<&Dense<M, E, S>> {
+    fn dense(&self) -> Option<&DenseLu<M, E, S>> {
         self.dense.get().filter(|_| self.is_dense)
     }
 
@@ -117,15 +117,15 @@ impl<M: Plan, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S>
         let (jacobian, blocks) = (jacobian.as_ref(), blocks.as_mut());
         let minus_ha = minus_ha(a, h);
         let mut square = [[E::from_f64(0.0); S]; S];
-        if const { Table::Dependents.may_have::<M>() } {
+        if const { StructureTable::Dependents.may_have_rows::<M>() } {
             A::subtract_blocks(&mut square, &minus_ha, &minus_ha);
         }
-        each_row::<A, _>(&mut Rows { plan, jacobian, minus_ha, square, blocks });
+        for_each_row::<A, _>(&mut AssemblyRows { plan, jacobian, minus_ha, square, blocks });
     }
 }
 
 /// See [`Assemble`].
-struct Rows<'a, M, E, const S: usize> {
+struct AssemblyRows<'a, M, E, const S: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
     /// `−hA`
@@ -135,40 +135,40 @@ struct Rows<'a, M, E, const S: usize> {
     blocks: &'a mut [Block<E, S>],
 }
 
-impl<M: Plan, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::Assembly.known::<M>();
-    const SIMPLE: Option<usize> = Table::Fill.known::<M>();
+impl<M: Plan, E: Field + Plain, const S: usize> RowVisitor for AssemblyRows<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::Assembly.known_row_count::<M>();
+    const SIMPLE_ROWS: Option<usize> = StructureTable::Fill.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Assembly.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Assembly.row_count(self.plan.structure())
     }
     #[inline(always)]
-    fn simple_rows(&self) -> usize {
-        self.plan.facts().fill
+    fn simple_row_count(&self) -> usize {
+        self.plan.facts().fill_terms
     }
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Self { plan, jacobian, blocks, .. } = self;
-        let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, E>() } && of.is_fill() {
+        let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, E>() } && entry.is_fill() {
             return;
         }
-        let Some(to) = blocks.get_mut(of.block as usize) else { return };
-        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
+        let Some(to) = blocks.get_mut(entry.block as usize) else { return };
+        let mut block = if entry.first { [[E::from_f64(0.0); S]; S] } else { *to };
         // An index that marks what is not there lies outside of the Jacobian.
-        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
-            if let Some(minus_c) = jacobian.get(of.by as usize) {
+        if let Some(&(mut values)) = jacobian.get(entry.entry as usize) {
+            if let Some(minus_c) = jacobian.get(entry.by as usize) {
                 for value in &mut values {
                     *value = -(*value * minus_c[0]);
                 }
             }
-            if of.order == 0 {
+            if entry.order == 0 {
                 for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
                     column[stage] = column[stage] + value;
                 }
             } else {
-                let power = if of.order == 1 { &self.minus_ha } else { &self.square };
+                let power = if entry.order == 1 { &self.minus_ha } else { &self.square };
                 for (column, power) in block.iter_mut().zip(power) {
                     A::subtract_products(column, &values, power);
                 }
@@ -178,7 +178,7 @@ impl<M: Plan, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
     }
     /// Fill.
     #[inline(always)]
-    fn simple(&mut self, row: usize) {
+    fn visit_simple(&mut self, row: usize) {
         factor::clear_fill::<M, E, _>(self.plan, self.blocks, row, [[E::from_f64(0.0); S]; S]);
     }
 }
@@ -206,7 +206,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
             }
             square
         };
-        each_entry::<M, _>(jacobian.as_ref(), |place, values, minus_c| {
+        for_each_dense_entry::<M, _>(jacobian.as_ref(), |place, values, minus_c| {
             let c = minus_c.and_then(|minus_c| minus_c.first()).map_or(T::ONE, |&minus_c| -minus_c);
             for (stage, &value) in values.iter().enumerate() {
                 let (r, column, value) = (place.slot, place.column, c * value);
@@ -227,7 +227,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
 
 /// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing
 /// in their columns.
-pub struct InDense {
+pub struct DenseEntry {
     /// The row.
     pub slot: usize,
     /// The unknown.
@@ -238,7 +238,10 @@ pub struct InDense {
 
 /// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with
 /// `−c` if it belongs to such a state.
-pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &V, Option<&V>)) {
+pub fn for_each_dense_entry<M: Dae, V: Copy>(
+    jacobian: &[V],
+    mut visit: impl FnMut(DenseEntry, &V, Option<&V>),
+) {
     let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
     for (e, values) in jacobian.iter().enumerate().take(blocks[3]) {
         let (r, c) = pattern.at(e);
@@ -249,10 +252,10 @@ pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &
         let (column, order) =
             (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
         match kinematic::<M>(column) {
-            None => at(InDense { slot, column, order }, values, None),
+            None => visit(DenseEntry { slot, column, order }, values, None),
             Some(of) if (of.velocity as usize) < 2 * nx => {
-                let place = InDense { slot, column: of.velocity as usize - nx, order: order + 1 };
-                at(place, values, jacobian.get(of.entry as usize));
+                let place = DenseEntry { slot, column: of.velocity as usize - nx, order: order + 1 };
+                visit(place, values, jacobian.get(of.entry as usize));
             }
             Some(_) => {}
         }

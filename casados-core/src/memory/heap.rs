@@ -103,7 +103,7 @@ pub(crate) fn extend<V: Copy>(list: &mut Vec<V>, values: &[V]) -> Result<(), Err
 }
 
 impl<V: Stored> Allocated<V> {
-    fn open(&mut self) -> Result<&mut V, Error> {
+    fn get_or_allocate(&mut self) -> Result<&mut V, Error> {
         if self.0.is_none() {
             self.0 = Some(allocate()?);
         }
@@ -119,7 +119,7 @@ impl<V> Allocated<V> {
 }
 
 impl<V: Stored> AllocatedTape<V> {
-    fn open(&mut self, steps: usize) -> Result<&mut [V], Error> {
+    fn get_or_allocate(&mut self, steps: usize) -> Result<&mut [V], Error> {
         let error = Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) };
         if self.0.is_none() {
             self.0 = Some(try_zeroed_slice_box(steps).map_err(|()| error)?);
@@ -129,7 +129,7 @@ impl<V: Stored> AllocatedTape<V> {
 }
 
 impl AllocatedByType {
-    fn open<V: Stored>(&mut self) -> Result<&mut V, Error> {
+    fn get_or_allocate<V: Stored>(&mut self) -> Result<&mut V, Error> {
         let error = Error::OutOfMemory { bytes: size_of::<V>() };
         let index = match self.0.iter().position(|value| (**value).is::<V>()) {
             Some(index) => index,
@@ -157,32 +157,32 @@ impl<F: Fallback> Memory for Heap<F> {
     type Fallback = F;
     const STEPS: usize = usize::MAX;
     fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-        place.open()
+        place.get_or_allocate()
     }
     fn tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
-        place.open(steps)
+        place.get_or_allocate(steps)
     }
 }
 impl<F: Fallback> WithForward for Heap<F> {
     fn forward<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-        place.open()
+        place.get_or_allocate()
     }
 }
 impl<F: Fallback, const C: usize> WithDirectional<C> for Heap<F> {
     fn directional<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
-        place.open()
+        place.get_or_allocate()
     }
 }
 impl<F: Fallback, const C: usize> WithAdjoint<C> for Heap<F> {
     fn adjoint<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
-        place.open()
+        place.get_or_allocate()
     }
 }
 impl<F: Fallback> WithHessian for Heap<F> {
     fn hessian<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-        place.open()
+        place.get_or_allocate()
     }
     fn hessian_tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
-        place.open(steps)
+        place.get_or_allocate(steps)
     }
 }

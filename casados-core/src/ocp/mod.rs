@@ -98,7 +98,7 @@ pub use dynamics::map::Map;
 pub use dynamics::return_map::ReturnMap;
 #[cfg(feature = "alloc")]
 pub use dynamics::shooting::Shooting;
-pub use dynamics::single::{IntegralCost, WithIntegral};
+pub use dynamics::single_interval::{IntegralCost, WithIntegral};
 #[cfg(feature = "alloc")]
 pub use feedback::closed_loop::{ClosedLoop, Controller, Sample, closed_loop, closed_loops, plant};
 pub use feedback::contraction::{Contraction, ContractionTest, Convergence};
@@ -107,6 +107,10 @@ pub use feedback::phases::{Fallback, Feedback, Prepared};
 pub use feedback::real_time::HeapRealTime;
 pub use feedback::real_time::RealTime;
 pub use formulation::error::{ConstraintName, OcpError, Part, Text};
+#[doc(hidden)]
+pub use formulation::functions::argument_checks::{
+    ConstraintsOf, CostOf, HasArgumentsOf, IsConstraint, IsCost,
+};
 pub use formulation::functions::boundary::Boundary;
 pub use formulation::functions::constraint::{Constraint, Constraints};
 pub use formulation::functions::convex::{Convex, ConvexCost, Huber, InvalidConstant, PseudoHuber};
@@ -116,11 +120,9 @@ pub use formulation::functions::dynamics::{Dynamics, SecondOrder};
 pub use formulation::functions::dynamics::{
     IntegralTerms, Interval, IntervalResult, Nodes, Sink, StageAction,
 };
-#[doc(hidden)]
-pub use formulation::functions::fits::{ConstraintsOf, CostOf, HasArgumentsOf, IsConstraint, IsCost};
 pub use formulation::functions::least_squares::LeastSquaresCost;
 #[cfg(feature = "casadi")]
-pub(crate) use formulation::functions::pattern::{Entry, Origin};
+pub(crate) use formulation::functions::sparsity::{DerivativeEntry, Origin};
 pub use formulation::horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use formulation::instance::HeapOcp;

@@ -13,7 +13,7 @@ pub(crate) struct ChainRuleIntegrand<'a, M: Dae, T: Real> {
     /// `V_n = dx_n/dw`; the identity if there is none.
     pub v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
     /// Whether second derivatives are wanted.
-    pub second: bool,
+    pub with_hessian: bool,
 }
 
 impl<M: Dae, T: Real> sealed::Sealed for ChainRuleIntegrand<'_, M, T> {}
@@ -23,21 +23,21 @@ impl<M: Dae, T: Real> Integrand<M, T> for ChainRuleIntegrand<'_, M, T> {
         self.inner.variables()
     }
 
-    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
-        self.inner.point()
+    fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
+        self.inner.stage_variables_mut()
     }
 
-    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
-        self.inner.value(weight, at)
+    fn add_value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.inner.add_value(weight, at)
     }
 
-    fn forward(&mut self, weight: T, _: bool, at: Place) -> Result<(), Error> {
+    fn add_forward(&mut self, weight: T, _: bool, at: Place) -> Result<(), Error> {
         let nx = M::Shape::NX;
         let Some(v) = self.v.map(|v| v.as_ref()) else {
-            return self.inner.forward(weight, self.second, at);
+            return self.inner.add_forward(weight, self.with_hessian, at);
         };
         let variables = self.inner.variables();
-        let (_, rows) = self.inner.point();
+        let (_, rows) = self.inner.stage_variables_mut();
         for variable in variables {
             let Some(row) = rows.get_mut(*variable as usize) else { continue };
             let mut sum = ArrayW::<M, T>::from_fn(|w| if w < nx { T::ZERO } else { row[w] });
@@ -46,11 +46,11 @@ impl<M: Dae, T: Real> Integrand<M, T> for ChainRuleIntegrand<'_, M, T> {
             }
             *row = sum;
         }
-        self.inner.forward(weight, self.second, at)
+        self.inner.add_forward(weight, self.with_hessian, at)
     }
 
-    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
-        self.inner.adjoint(weight, at)
+    fn weighted_gradient(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.inner.weighted_gradient(weight, at)
     }
 }
 
@@ -64,19 +64,19 @@ impl<M: Dae, T: Real> Integrand<M, T> for AdjointOnlyIntegrand<'_, M, T> {
         &[]
     }
 
-    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
-        self.0.point()
+    fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
+        self.0.stage_variables_mut()
     }
 
-    fn value(&mut self, _: T, _: Place) -> Result<(), Error> {
+    fn add_value(&mut self, _: T, _: Place) -> Result<(), Error> {
         Ok(())
     }
 
-    fn forward(&mut self, _: T, _: bool, _: Place) -> Result<(), Error> {
+    fn add_forward(&mut self, _: T, _: bool, _: Place) -> Result<(), Error> {
         Ok(())
     }
 
-    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
-        self.0.adjoint(weight, at)
+    fn weighted_gradient(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.0.weighted_gradient(weight, at)
     }
 }

@@ -1,6 +1,6 @@
 //! The integrals of all outputs of a function.
 
-use super::memory::{ArrayW, Memory};
+use super::memory::{ArrayW, StageMemory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
 use crate::finite::check_output;
@@ -58,7 +58,7 @@ pub struct Quadrature<F: Function, T: Plain = f64> {
     /// `ν`: what the outputs are multiplied by in gradients and Hessians; zero unless it is set.
     pub nu: VectorY<F, T>,
     dq: ArrayY<F, ArrayW<F, T>>,
-    memory: Memory<F, T>,
+    memory: StageMemory<F, T>,
 }
 
 plain!([F: Function, T: Plain] Quadrature<F, T> { q, dq_dx0, dq_du, dq_dp, nu, dq, memory });
@@ -90,45 +90,45 @@ impl<F: Function, T: Plain> sealed::Sealed for Quadrature<F, T> {}
 
 #[diagnostic::do_not_recommend]
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrature<F, T> {
-    fn begin(&mut self) {
+    fn reset(&mut self) {
         self.q.as_mut_slice().fill(T::ZERO);
-        Integrand::<M, T>::next(self);
+        Integrand::<M, T>::reset_derivatives(self);
     }
 
     fn variables(&self) -> &'static [u32] {
         F::STRUCTURE.variables
     }
 
-    fn point(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
+    fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
         (self.memory.v.as_mut(), self.memory.d.as_mut())
     }
 
-    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
-        self.memory.value(at)?;
+    fn add_value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.memory.evaluate(at)?;
         axpy(weight, self.memory.y.as_ref(), self.q.as_mut_slice());
         Ok(())
     }
 
-    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error> {
+    fn add_forward(&mut self, weight: T, with_hessian: bool, at: Place) -> Result<(), Error> {
         let Self { q, dq, memory, nu, .. } = self;
-        memory.forward(at)?;
+        memory.evaluate_forward(at)?;
         axpy(weight, memory.y.as_ref(), q.as_mut_slice());
         for (dq, dy) in dq.as_mut().iter_mut().zip(memory.dy.as_ref()) {
             axpy(weight, dy.as_ref(), dq.as_mut());
         }
-        if second {
+        if with_hessian {
             memory.mu.as_mut().copy_from_slice(nu.as_slice());
-            memory.curvature(weight);
+            memory.add_second_derivatives(weight);
         }
         Ok(())
     }
 
-    fn adjoint(&mut self, weight: T, _: Place) -> Result<&[T], Error> {
+    fn weighted_gradient(&mut self, weight: T, _: Place) -> Result<&[T], Error> {
         self.memory.mu.as_mut().copy_from_slice(self.nu.as_slice());
-        Ok(self.memory.adjoint(weight))
+        Ok(self.memory.weighted_gradient(weight))
     }
 
-    fn second(&self) -> Option<&[ArrayW<F, T>]> {
+    fn hessian_sum(&self) -> Option<&[ArrayW<F, T>]> {
         Some(self.memory.second.as_ref())
     }
 
@@ -136,21 +136,21 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
         self.dq.as_ref()
     }
 
-    fn next(&mut self) {
+    fn reset_derivatives(&mut self) {
         for row in self.dq.as_mut() {
             row.as_mut().fill(T::ZERO);
         }
-        self.memory.begin();
+        self.memory.reset();
     }
 
-    fn density(&mut self, at: Place) -> Result<T, Error> {
-        self.memory.value(at)?;
+    fn integrand_value(&mut self, at: Place) -> Result<T, Error> {
+        self.memory.evaluate(at)?;
         let products = self.memory.y.as_ref().iter().zip(self.nu.as_slice());
         Ok(products.fold(T::ZERO, |sum, (y, nu)| sum + *y * *nu))
     }
 
-    fn prolong(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
-        self.memory.value(at)?;
+    fn add_end_time_gradient(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
+        self.memory.evaluate(at)?;
         for (dq, y) in self.dq.as_mut().iter_mut().zip(self.memory.y.as_ref()) {
             axpy(weight * *y, time.as_ref(), dq.as_mut());
         }

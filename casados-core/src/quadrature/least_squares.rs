@@ -1,13 +1,13 @@
 //! Half of the integral of a weighted square, and the matrix of Gauss and Newton.
 
-use super::memory::{ArrayW, Memory};
+use super::memory::{ArrayW, StageMemory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
 use crate::finite::check_output;
 use crate::function::{Function, MatrixYY};
 use crate::linalg::axpy;
 use crate::model::Dae;
-use crate::result::symmetric;
+use crate::result::write_symmetric;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape, plain};
 use bytemuck::Zeroable;
@@ -82,7 +82,7 @@ pub struct LeastSquares<F: Function, T: Plain = f64> {
     /// `H`, its lower triangle.
     sum: ArrayW<F, ArrayW<F, T>>,
     row: ArrayW<F, T>,
-    memory: Memory<F, T>,
+    memory: StageMemory<F, T>,
 }
 
 plain!([F: Function, T: Plain] LeastSquares<F, T> { value, grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp, weights, gradient, sum, row, memory });
@@ -107,7 +107,7 @@ impl<F: Function, T: Real> LeastSquares<F, T> {
 
     /// `μ = W r`, and `½ rᵀ W r`.
     fn weigh_residuals(&mut self) -> T {
-        let Self { weights, memory: Memory { y, mu, .. }, .. } = self;
+        let Self { weights, memory: StageMemory { y, mu, .. }, .. } = self;
         let mut square = T::ZERO;
         for (k, mu) in mu.as_mut().iter_mut().enumerate() {
             let products = y.as_ref().iter().enumerate().map(|(l, y)| weights[(k, l)] * *y);
@@ -122,27 +122,27 @@ impl<F: Function, T: Plain> sealed::Sealed for LeastSquares<F, T> {}
 
 #[diagnostic::do_not_recommend]
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSquares<F, T> {
-    fn begin(&mut self) {
+    fn reset(&mut self) {
         self.value = T::ZERO;
-        Integrand::<M, T>::next(self);
+        Integrand::<M, T>::reset_derivatives(self);
     }
 
     fn variables(&self) -> &'static [u32] {
         F::STRUCTURE.variables
     }
 
-    fn point(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
+    fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
         (self.memory.v.as_mut(), self.memory.d.as_mut())
     }
 
-    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
-        self.memory.value(at)?;
+    fn add_value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.memory.evaluate(at)?;
         self.value = self.value + weight * self.weigh_residuals();
         Ok(())
     }
 
-    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error> {
-        self.memory.forward(at)?;
+    fn add_forward(&mut self, weight: T, with_hessian: bool, at: Place) -> Result<(), Error> {
+        self.memory.evaluate_forward(at)?;
         self.value = self.value + weight * self.weigh_residuals();
         let Self { weights, gradient, sum, row, memory, .. } = self;
         let dy = memory.dy.as_ref();
@@ -157,19 +157,19 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
                 axpy(weight * dr.as_ref()[i], &row.as_ref()[..=i], &mut sum.as_mut()[..=i]);
             }
         }
-        if second {
-            memory.curvature(weight);
+        if with_hessian {
+            memory.add_second_derivatives(weight);
         }
         Ok(())
     }
 
-    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
-        self.memory.value(at)?;
+    fn weighted_gradient(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.memory.evaluate(at)?;
         self.weigh_residuals();
-        Ok(self.memory.adjoint(weight))
+        Ok(self.memory.weighted_gradient(weight))
     }
 
-    fn second(&self) -> Option<&[ArrayW<F, T>]> {
+    fn hessian_sum(&self) -> Option<&[ArrayW<F, T>]> {
         Some(self.memory.second.as_ref())
     }
 
@@ -177,27 +177,27 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
         core::slice::from_ref(&self.gradient)
     }
 
-    fn matrix(&self) -> Option<&[ArrayW<F, T>]> {
+    fn gauss_newton_sum(&self) -> Option<&[ArrayW<F, T>]> {
         Some(self.sum.as_ref())
     }
 
-    fn next(&mut self) {
+    fn reset_derivatives(&mut self) {
         self.gradient.as_mut().fill(T::ZERO);
         for row in self.sum.as_mut() {
             row.as_mut().fill(T::ZERO);
         }
-        self.memory.begin();
+        self.memory.reset();
     }
 
-    fn density(&mut self, at: Place) -> Result<T, Error> {
-        self.memory.value(at)?;
+    fn integrand_value(&mut self, at: Place) -> Result<T, Error> {
+        self.memory.evaluate(at)?;
         Ok(self.weigh_residuals())
     }
 
-    fn prolong(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
-        self.memory.value(at)?;
-        let half = self.weigh_residuals();
-        axpy(weight * half, time.as_ref(), self.gradient.as_mut());
+    fn add_end_time_gradient(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
+        self.memory.evaluate(at)?;
+        let weighted_square = self.weigh_residuals();
+        axpy(weight * weighted_square, time.as_ref(), self.gradient.as_mut());
         Ok(())
     }
 
@@ -209,9 +209,9 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
         self.grad_u.as_mut_slice().copy_from_slice(controls);
         self.grad_p.as_mut_slice().copy_from_slice(parameters);
         let rows = self.sum.as_ref();
-        symmetric(&mut self.h_xx, rows, 0);
-        symmetric(&mut self.h_uu, rows, nx);
-        symmetric(&mut self.h_pp, rows, nx + nu);
+        write_symmetric(&mut self.h_xx, rows, 0);
+        write_symmetric(&mut self.h_uu, rows, nx);
+        write_symmetric(&mut self.h_pp, rows, nx + nu);
         mirror_block(&mut self.h_xu, rows, [0, nx]);
         mirror_block(&mut self.h_xp, rows, [0, nx + nu]);
         mirror_block(&mut self.h_up, rows, [nx, nx + nu]);

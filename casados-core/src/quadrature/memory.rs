@@ -15,7 +15,7 @@ pub(super) type ArrayW<F, T> = <<F as Function>::Shape as Shape>::ArrayW<T>;
 /// Memory of a stage.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Memory<F: Function, T: Plain> {
+pub(super) struct StageMemory<F: Function, T: Plain> {
     /// The variables.
     pub v: ArrayV<F, T>,
     /// Their derivatives `D`.
@@ -35,10 +35,10 @@ pub(super) struct Memory<F: Function, T: Plain> {
     pub second: ArrayW<F, ArrayW<F, T>>,
 }
 
-plain!([F: Function, T: Plain] Memory<F, T> { v, d, y, jacobian, dy, mu, gradient, hessian, entries, g, second });
+plain!([F: Function, T: Plain] StageMemory<F, T> { v, d, y, jacobian, dy, mu, gradient, hessian, entries, g, second });
 
-impl<F: Function, T: Real> Memory<F, T> {
-    pub fn begin(&mut self) {
+impl<F: Function, T: Real> StageMemory<F, T> {
+    pub fn reset(&mut self) {
         F::jacobian_constants::<T>(&mut self.jacobian);
         for row in self.second.as_mut() {
             row.as_mut().fill(T::ZERO);
@@ -47,16 +47,16 @@ impl<F: Function, T: Real> Memory<F, T> {
 
     /// # Errors
     /// [`Error::NonFiniteFunction`]
-    pub fn value(&mut self, at: Place) -> Result<(), Error> {
+    pub fn evaluate(&mut self, at: Place) -> Result<(), Error> {
         F::value::<T>(&self.v, &mut self.y);
-        self.check(at)
+        self.check_finite(at)
     }
 
     /// `y` and `dy`.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
-    pub fn forward(&mut self, at: Place) -> Result<(), Error> {
+    pub fn evaluate_forward(&mut self, at: Place) -> Result<(), Error> {
         let Self { v, y, jacobian, d, dy, .. } = self;
         F::value_jacobian::<T>(v, y, jacobian);
         for row in dy.as_mut() {
@@ -68,11 +68,11 @@ impl<F: Function, T: Real> Memory<F, T> {
                 axpy(*value, d.as_ref(), dy.as_mut());
             }
         }
-        self.check(at)
+        self.check_finite(at)
     }
 
     /// `weight ∇(μᵀy)`
-    pub fn adjoint(&mut self, weight: T) -> &[T] {
+    pub fn weighted_gradient(&mut self, weight: T) -> &[T] {
         for mu in self.mu.as_mut() {
             *mu = weight * *mu;
         }
@@ -81,7 +81,7 @@ impl<F: Function, T: Real> Memory<F, T> {
     }
 
     /// `second += weight Dᵀ ∇²(μᵀy) D`
-    pub fn curvature(&mut self, weight: T) {
+    pub fn add_second_derivatives(&mut self, weight: T) {
         let Self { v, mu, d, hessian, entries, g, second, .. } = self;
         F::hessian::<T>(v, mu, hessian);
         for (entry, value) in entries.as_mut().iter_mut().zip(hessian.as_ref()) {
@@ -90,7 +90,7 @@ impl<F: Function, T: Real> Memory<F, T> {
         }
         dispatch(CongruenceUpdate {
             pattern: F::STRUCTURE.hessian,
-            curved: F::STRUCTURE.variables,
+            nonlinear_variables: F::STRUCTURE.variables,
             entries: entries.as_ref(),
             stage: 0,
             d: d.as_ref(),
@@ -99,7 +99,7 @@ impl<F: Function, T: Real> Memory<F, T> {
         });
     }
 
-    fn check(&self, at: Place) -> Result<(), Error> {
+    fn check_finite(&self, at: Place) -> Result<(), Error> {
         match find_non_finite(self.y.as_ref()) {
             None => Ok(()),
             Some((output, value)) => {

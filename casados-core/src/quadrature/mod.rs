@@ -81,36 +81,36 @@ pub(crate) mod sealed {
 pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// Forgets the last interval.
     #[doc(hidden)]
-    fn begin(&mut self) {}
+    fn reset(&mut self) {}
     /// The variables that it depends on.
     #[doc(hidden)]
     fn variables(&self) -> &'static [u32];
     /// A place for the variables at a stage, and one for their derivatives `D`, of which the rows
     /// of [`Integrand::variables`] count.
     #[doc(hidden)]
-    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]);
+    fn stage_variables_mut(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]);
     /// Adds the value at the point.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn value(&mut self, weight: T, at: Place) -> Result<(), Error>;
+    fn add_value(&mut self, weight: T, at: Place) -> Result<(), Error>;
     /// Adds the value at the point and its derivatives; those of second order that `hessian` is
     /// made of, if they are wanted.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error>;
+    fn add_forward(&mut self, weight: T, with_hessian: bool, at: Place) -> Result<(), Error>;
     /// The gradient at the point over all variables, times the weight.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error>;
+    fn weighted_gradient(&mut self, weight: T, at: Place) -> Result<&[T], Error>;
     /// The lower triangle of the sum of `Dᵀ ∇² D`, if there is one.
     #[doc(hidden)]
-    fn second(&self) -> Option<&[ArrayW<M, T>]> {
+    fn hessian_sum(&self) -> Option<&[ArrayW<M, T>]> {
         None
     }
     /// The gradients that were added up, a row for each output.
@@ -120,18 +120,18 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     }
     /// The lower triangle of the matrix of Gauss and Newton that was added up, if there is one.
     #[doc(hidden)]
-    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
+    fn gauss_newton_sum(&self) -> Option<&[ArrayW<M, T>]> {
         None
     }
     /// Forgets derivatives, but no values.
     #[doc(hidden)]
-    fn next(&mut self) {}
+    fn reset_derivatives(&mut self) {}
     /// What is integrated at the point, times multipliers.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn density(&mut self, at: Place) -> Result<T, Error> {
+    fn integrand_value(&mut self, at: Place) -> Result<T, Error> {
         let _ = at;
         Ok(T::ZERO)
     }
@@ -141,7 +141,7 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// # Errors
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
-    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
+    fn add_end_time_gradient(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
         let _ = (weight, time, at);
         Ok(())
     }
@@ -158,23 +158,23 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
 /// An integrand, or none.
 pub(crate) type OptionalIntegrand<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
-pub(crate) fn reset_integrand<M: Dae, T: Real>(along: &mut OptionalIntegrand<'_, '_, M, T>) {
-    if let Some(integrand) = along {
-        integrand.begin();
+pub(crate) fn reset_integrand<M: Dae, T: Real>(integrand: &mut OptionalIntegrand<'_, '_, M, T>) {
+    if let Some(integrand) = integrand {
+        integrand.reset();
     }
 }
 
 pub(crate) fn finish_integrand<M: Dae, T: Real>(
-    along: &mut OptionalIntegrand<'_, '_, M, T>,
+    integrand: &mut OptionalIntegrand<'_, '_, M, T>,
 ) -> Result<(), Error> {
-    along.as_mut().map_or(Ok(()), |integrand| integrand.finish())
+    integrand.as_mut().map_or(Ok(()), |integrand| integrand.finish())
 }
 
 /// The same integrand for a while.
 pub(crate) fn reborrow<'a, M: Dae, T: Real>(
-    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+    integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
 ) -> OptionalIntegrand<'a, 'a, M, T> {
-    match along {
+    match integrand {
         Some(integrand) => Some(&mut **integrand),
         None => None,
     }

@@ -8,7 +8,7 @@ use crate::shape::Array;
 /// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
 pub(crate) struct CongruenceUpdate<'a, E, R, const S: usize> {
     pub pattern: Pattern,
-    pub curved: &'static [u32],
+    pub nonlinear_variables: &'static [u32],
     pub entries: &'a [[E; S]],
     pub stage: usize,
     pub d: &'a [R],
@@ -21,7 +21,7 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { pattern, curved, entries, stage, d, g, sum } = self;
+        let Self { pattern, nonlinear_variables: curved, entries, stage, d, g, sum } = self;
         for &row in curved {
             if let Some(row) = g.get_mut(row as usize) {
                 row.as_mut().fill(E::from_f64(0.0));
@@ -31,9 +31,9 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
         let places = pattern.rows.iter().zip(pattern.columns);
         for ((&row, &column), values) in places.zip(entries) {
             let Some(&value) = values.get(stage) else { continue };
-            add::<A, E, R>(value, d, column, g, row);
+            add_scaled_row::<A, E, R>(value, d, column, g, row);
             if row != column {
-                add::<A, E, R>(value, d, row, g, column);
+                add_scaled_row::<A, E, R>(value, d, row, g, column);
             }
         }
         // Tiles of the triangle, each over all curved variables while it is in registers. The last
@@ -48,22 +48,22 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
             while column < start + rows {
                 let skip = [row - start, 0];
                 if wide && column + 8 <= R::LEN && rows == 4 {
-                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, column], skip);
+                    subtract_tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, column], skip);
                     column += 8;
                 } else if wide && R::LEN >= 8 && column + 4 < R::LEN {
                     let at = R::LEN - 8;
-                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    subtract_tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, at], [skip[0], column - at]);
                     column = R::LEN;
                 } else if !wide && rows == 4 {
                     let at = column.min(R::LEN - 2);
-                    tile::<A, E, R, 4, 2>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    subtract_tile::<A, E, R, 4, 2>(curved, d, g, sum, [start, at], [skip[0], column - at]);
                     column = at + 2;
                 } else if rows == 4 {
                     let at = column.min(R::LEN - 4);
-                    tile::<A, E, R, 4, 4>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    subtract_tile::<A, E, R, 4, 4>(curved, d, g, sum, [start, at], [skip[0], column - at]);
                     column = at + 4;
                 } else {
-                    tile::<A, E, R, 1, 1>(curved, d, g, sum, [start, column], skip);
+                    subtract_tile::<A, E, R, 1, 1>(curved, d, g, sum, [start, column], skip);
                     column += 1;
                 }
             }
@@ -74,7 +74,7 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for CongruenceUpdate<'_, E, R
 
 /// `g_to += value · d_from`
 #[inline(always)]
-fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &mut [R], to: u32) {
+fn add_scaled_row<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &mut [R], to: u32) {
     let (Some(from), Some(to)) = (d.get(from as usize), g.get_mut(to as usize)) else { return };
     let value = -value;
     for (to, &from) in to.as_mut().iter_mut().zip(from.as_ref()) {
@@ -85,13 +85,13 @@ fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &m
 /// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be
 /// skipped; above the diagonal it may write what nobody reads.
 #[inline(always)]
-fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
+fn subtract_tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
     curved: &[u32],
     d: &[R],
     g: &[R],
     sum: &mut [R],
     [row, column]: [usize; 2],
-    skip: [usize; 2],
+    skipped: [usize; 2],
 ) {
     let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
     for &variable in curved {
@@ -102,8 +102,8 @@ fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: 
             A::subtract_row(tile, d, g);
         }
     }
-    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)).skip(skip[0]) {
-        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)).skip(skip[1]) {
+    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)).skip(skipped[0]) {
+        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)).skip(skipped[1]) {
             *sum = *sum + tile;
         }
     }

@@ -51,7 +51,7 @@ pub struct Known<const WIDE: bool>(());
 impl<const WIDE: bool> Known<WIDE> {
     /// Only for code that runs inside of `linalg::dispatch`, or after detection.
     #[inline(always)]
-    pub(crate) fn here() -> Self {
+    pub(crate) fn assume_detected() -> Self {
         Self(())
     }
 }
@@ -350,7 +350,7 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + De
 
     /// Runs a computation of this crate that is compiled for this number type.
     #[doc(hidden)]
-    fn compiled<'r, 'a: 'r, 's: 'r, C: Compiled>(computation: C::Of<'r, 'a, 's, Self>);
+    fn run_precompiled<'r, 'a: 'r, 's: 'r, C: Compiled>(computation: C::Of<'r, 'a, 's, Self>);
 
     /// Runs a computation on slices, compiled for the widest registers that this machine has.
     #[doc(hidden)]
@@ -364,7 +364,7 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + De
     /// # Errors
     /// The computation, if there is none.
     #[doc(hidden)]
-    fn widest<C: Widest<Self>>(_lanes: usize, computation: C) -> Result<C::Output, C> {
+    fn run_in_widest_register<C: Widest<Self>>(_lanes: usize, computation: C) -> Result<C::Output, C> {
         Err(computation)
     }
 }

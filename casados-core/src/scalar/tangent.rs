@@ -115,7 +115,7 @@ macro_rules! functions {
 
 /// A constant.
 #[inline(always)]
-fn c<S: Scalar>(value: f64) -> S {
+fn constant<S: Scalar>(value: f64) -> S {
     S::from_f64(value)
 }
 
@@ -128,25 +128,25 @@ impl<S: Scalar> Scalar for Tangent<S> {
     }
 
     functions! {
-        sqrt(_a, f) = c::<S>(0.5) / f;
-        cbrt(a, f) = f / (c::<S>(3.0) * a);
+        sqrt(_a, f) = constant::<S>(0.5) / f;
+        cbrt(a, f) = f / (constant::<S>(3.0) * a);
         exp(_a, f) = f;
-        exp2(_a, f) = f * c(LN_2);
+        exp2(_a, f) = f * constant(LN_2);
         exp_m1(a, _f) = a.exp();
-        ln(a, _f) = c::<S>(1.0) / a;
-        ln_1p(a, _f) = c::<S>(1.0) / (c::<S>(1.0) + a);
-        log2(a, _f) = c::<S>(1.0 / LN_2) / a;
-        log10(a, _f) = c::<S>(1.0 / LN_10) / a;
-        tan(_a, f) = c::<S>(1.0) + f * f;
-        asin(a, _f) = c::<S>(1.0) / ((c::<S>(1.0) - a) * (c::<S>(1.0) + a)).sqrt();
-        acos(a, _f) = c::<S>(-1.0) / ((c::<S>(1.0) - a) * (c::<S>(1.0) + a)).sqrt();
-        atan(a, _f) = c::<S>(1.0) / (c::<S>(1.0) + a * a);
+        ln(a, _f) = constant::<S>(1.0) / a;
+        ln_1p(a, _f) = constant::<S>(1.0) / (constant::<S>(1.0) + a);
+        log2(a, _f) = constant::<S>(1.0 / LN_2) / a;
+        log10(a, _f) = constant::<S>(1.0 / LN_10) / a;
+        tan(_a, f) = constant::<S>(1.0) + f * f;
+        asin(a, _f) = constant::<S>(1.0) / ((constant::<S>(1.0) - a) * (constant::<S>(1.0) + a)).sqrt();
+        acos(a, _f) = constant::<S>(-1.0) / ((constant::<S>(1.0) - a) * (constant::<S>(1.0) + a)).sqrt();
+        atan(a, _f) = constant::<S>(1.0) / (constant::<S>(1.0) + a * a);
         sinh(a, _f) = a.cosh();
         cosh(a, _f) = a.sinh();
-        tanh(_a, f) = (c::<S>(1.0) - f) * (c::<S>(1.0) + f);
-        asinh(a, _f) = c::<S>(1.0) / a.hypot(c(1.0));
-        acosh(a, _f) = c::<S>(1.0) / ((a - c(1.0)) * (a + c(1.0))).sqrt();
-        atanh(a, _f) = c::<S>(1.0) / ((c::<S>(1.0) - a) * (c::<S>(1.0) + a));
+        tanh(_a, f) = (constant::<S>(1.0) - f) * (constant::<S>(1.0) + f);
+        asinh(a, _f) = constant::<S>(1.0) / a.hypot(constant(1.0));
+        acosh(a, _f) = constant::<S>(1.0) / ((a - constant(1.0)) * (a + constant(1.0))).sqrt();
+        atanh(a, _f) = constant::<S>(1.0) / ((constant::<S>(1.0) - a) * (constant::<S>(1.0) + a));
         abs(a, _f) = a.signum();
     }
 
@@ -189,12 +189,12 @@ impl<S: Scalar> Scalar for Tangent<S> {
         match n {
             0 => Self::from_f64(1.0),
             i32::MIN => self.powf(Self::from_f64(f64::from(n))),
-            _ => self.chain(self.value.powi(n), c::<S>(f64::from(n)) * self.value.powi(n - 1)),
+            _ => self.chain(self.value.powi(n), constant::<S>(f64::from(n)) * self.value.powi(n - 1)),
         }
     }
     #[inline(always)]
     fn powf(self, other: Self) -> Self {
-        let (zero, one) = (c::<S>(0.0), c::<S>(1.0));
+        let (zero, one) = (constant::<S>(0.0), constant::<S>(1.0));
         let value = self.value.powf(other.value);
         // Neither a power of zero that is not asked for, nor a logarithm where the exponent is
         // constant.

@@ -46,7 +46,9 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     while entry < hessian.len() {
         let (row, column) = hessian.at(entry);
         entry += 1;
-        let (Some(row), Some(column)) = (position(curved, row), position(curved, column)) else { continue };
+        let (Some(row), Some(column)) = (position_in(curved, row), position_in(curved, column)) else {
+            continue;
+        };
         next[row] += 1;
         if row != column {
             next[column] += 1;
@@ -63,7 +65,9 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
         let (row, column) = hessian.at(entry);
         let term = Term { row: 0, column: 0, entry: entry as u32, rows: 1 };
         entry += 1;
-        let (Some(row), Some(column)) = (position(curved, row), position(curved, column)) else { continue };
+        let (Some(row), Some(column)) = (position_in(curved, row), position_in(curved, column)) else {
+            continue;
+        };
         terms[next[row]] = Term { row: row as u32, column: column as u32, ..term };
         next[row] += 1;
         if row != column {
@@ -83,17 +87,17 @@ const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], end
     while row < C {
         let (mut rows, mut count, mut other) = ([row; MOST_ROWS], 0, row);
         while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MOST_ROWS && !done[row] {
-            if !done[other] && have_same_columns(by_row, range(ends, row), range(ends, other)) {
+            if !done[other] && have_same_columns(by_row, row_range(ends, row), row_range(ends, other)) {
                 rows[count] = other;
                 count += 1;
             }
             other += 1;
         }
-        let (mut term, [begin, end]) = (0, range(ends, row));
+        let (mut term, [begin, end]) = (0, row_range(ends, row));
         while term < end - begin && count > 0 {
             let mut of = 0;
             while of < count {
-                terms[place] = by_row[range(ends, rows[of])[0] + term];
+                terms[place] = by_row[row_range(ends, rows[of])[0] + term];
                 terms[place].rows = count as u32;
                 (place, of) = (place + 1, of + 1);
             }
@@ -109,7 +113,7 @@ const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], end
 }
 
 /// Where a row begins and ends.
-const fn range<const C: usize>(ends: &[usize; C], row: usize) -> [usize; 2] {
+const fn row_range<const C: usize>(ends: &[usize; C], row: usize) -> [usize; 2] {
     [if row > 0 { ends[row - 1] } else { 0 }, ends[row]]
 }
 
@@ -148,7 +152,7 @@ const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
     let (mut entries, mut next) = ([0; N], [0; K]);
     let mut entry = begin;
     while entry < begin + N {
-        next[key::<COLUMNS>(jacobian, entry)] += 1;
+        next[sort_key::<COLUMNS>(jacobian, entry)] += 1;
         entry += 1;
     }
     let (mut key, mut sum) = (0, 0);
@@ -158,7 +162,7 @@ const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
     }
     let mut entry = begin;
     while entry < begin + N {
-        let key = self::key::<COLUMNS>(jacobian, entry);
+        let key = self::sort_key::<COLUMNS>(jacobian, entry);
         entries[next[key]] = entry as u32;
         next[key] += 1;
         entry += 1;
@@ -167,7 +171,7 @@ const fn sort_entries<const K: usize, const N: usize, const COLUMNS: bool>(
 }
 
 /// The column of an entry, or else its row.
-const fn key<const COLUMN: bool>(jacobian: &Pattern, entry: usize) -> usize {
+const fn sort_key<const COLUMN: bool>(jacobian: &Pattern, entry: usize) -> usize {
     let (row, column) = jacobian.at(entry);
     if COLUMN { column } else { row }
 }
@@ -200,7 +204,7 @@ pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {
 }
 
 /// Where a number is in an ascending list that has it.
-const fn position<const C: usize>(list: &[u32; C], number: usize) -> Option<usize> {
+const fn position_in<const C: usize>(list: &[u32; C], number: usize) -> Option<usize> {
     let (mut low, mut high) = (0, C);
     while low + 1 < high {
         let middle = low.midpoint(high);
@@ -218,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_entry_is_met_in_its_row_and_in_its_column() {
+    fn terms_of_the_symmetric_product() {
         // 3 7 9 with entries (3, 3), (7, 3), (9, 7), (9, 9).
         let hessian = Pattern { rows: &[3, 7, 9, 9], columns: &[3, 3, 7, 9] };
         let terms = symmetric::<3, 6>(&hessian, &[3, 7, 9]);
@@ -251,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_are_met_by_columns_and_by_rows() {
+    fn entries_sorted_by_columns_and_by_rows() {
         // Two blocks, each by row: (0, 4), (2, 3), (2, 4), and (0, 6), (2, 5), (2, 6).
         let jacobian = Pattern { rows: &[0, 2, 2, 0, 2, 2], columns: &[4, 3, 4, 6, 5, 6] };
         assert_eq!(by_column::<7, 6>(&jacobian, 0), [1, 0, 2, 4, 3, 5]);

@@ -10,7 +10,7 @@ const INDENT: usize = 15;
 /// More words than this of one list are not written.
 const MAX_WORDS: usize = 64;
 /// Numbers of stages for which the cost is listed.
-const STAGES: [usize; 4] = [1, 2, 3, 4];
+const LISTED_STAGES: [usize; 4] = [1, 2, 3, 4];
 
 /// Dimensions and names, equations by kind, counts of operations, sparsity, the elimination order,
 /// and the expected cost of a step: for a reader who wants to know what the library has found in a
@@ -49,16 +49,16 @@ impl Structure {
         let nx = self.x.len();
         let mut index = index as usize;
         if let Some(&name) = self.x.get(index) {
-            return Name { name, derivative: true };
+            return VariableName { name, derivative: true };
         }
         index = index.saturating_sub(nx);
         for block in [self.x, self.z, self.u, self.p] {
             if let Some(&name) = block.get(index) {
-                return Name { name, derivative: false };
+                return VariableName { name, derivative: false };
             }
             index -= block.len();
         }
-        Name { name: "t", derivative: false }
+        VariableName { name: "t", derivative: false }
     }
 
     /// The name of an unknown `(k, z)` by its index: a derivative or an algebraic state.
@@ -182,17 +182,17 @@ impl Structure {
     }
 
     fn fmt_costs(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        const TITLE: usize = 38;
-        write!(f, "{:TITLE$}", "operations of a step, s stages")?;
-        for s in STAGES {
+        const TITLE_WIDTH: usize = 38;
+        write!(f, "{:TITLE_WIDTH$}", "operations of a step, s stages")?;
+        for s in LISTED_STAGES {
             write!(f, "      s = {s:1}")?;
         }
         writeln!(f)?;
-        let costs = STAGES.map(|s| self.cost(s));
+        let costs = LISTED_STAGES.map(|s| self.cost(s));
         let row = |f: &mut Formatter<'_>, title: &dyn Display, value: fn(&Cost) -> u64| {
             let mut length = CharacterCount(0);
             write!(length, "{title}")?;
-            write!(f, "  {title}{:1$}", "", TITLE.saturating_sub(2 + length.0))?;
+            write!(f, "  {title}{:1$}", "", TITLE_WIDTH.saturating_sub(2 + length.0))?;
             for cost in &costs {
                 write!(f, "{:>11}", value(cost))?;
             }
@@ -212,12 +212,12 @@ impl Structure {
 }
 
 /// The name of a variable; `ẋ[2]` for the derivative of `x[2]`.
-struct Name {
+struct VariableName {
     name: &'static str,
     derivative: bool,
 }
 
-impl Display for Name {
+impl Display for VariableName {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match (self.derivative, self.name.strip_prefix('x')) {
             (false, _) => f.write_str(self.name),

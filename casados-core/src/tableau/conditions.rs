@@ -18,7 +18,7 @@ struct TreeSum {
 impl TreeSum {
     const UNIT_SUM: Self = Self { value: 1.0, absolute: 1.0 };
 
-    fn of(terms: impl Iterator<Item = f64>) -> Self {
+    fn of_terms(terms: impl Iterator<Item = f64>) -> Self {
         terms.fold(Self { value: 0.0, absolute: 0.0 }, |s, t| Self {
             value: s.value + t,
             absolute: s.absolute + t.abs(),
@@ -26,7 +26,7 @@ impl TreeSum {
     }
 
     /// Equal to `exact`, if every term carries at most `roundings` relative errors of `ε`.
-    fn equals(self, exact: f64, roundings: usize) -> bool {
+    fn equals_to_rounding(self, exact: f64, roundings: usize) -> bool {
         let scale = self.absolute + exact.abs();
         (self.value - exact).abs() <= roundings as f64 * f64::EPSILON * scale
     }
@@ -41,13 +41,17 @@ impl<const S: usize> Tableau<S> {
             return Err(TableauError::NotFinite);
         }
         for (stage, (row, &node)) in self.a.iter().zip(&self.c).enumerate() {
-            let sum = TreeSum::of(row.iter().copied());
-            if !sum.equals(node, S + 1) {
+            let sum = TreeSum::of_terms(row.iter().copied());
+            if !sum.equals_to_rounding(node, S + 1) {
                 return Err(TableauError::RowSum { stage, sum: sum.value, node });
             }
         }
-        let sum = TreeSum::of(self.b.iter().copied());
-        if sum.equals(1.0, S + 1) { Ok(()) } else { Err(TableauError::WeightSum { sum: sum.value }) }
+        let sum = TreeSum::of_terms(self.b.iter().copied());
+        if sum.equals_to_rounding(1.0, S + 1) {
+            Ok(())
+        } else {
+            Err(TableauError::WeightSum { sum: sum.value })
+        }
     }
 
     /// The order: by trees as far as they are checked, beyond that by `B(p), C(q), D(r)` with
@@ -68,8 +72,8 @@ impl<const S: usize> Tableau<S> {
     /// The largest `p` with `B(p)`: `Σ_i b_i c_i^{k−1} = 1/k` for `k ≤ p`. At most `2S`.
     fn quadrature_order(&self) -> usize {
         let holds = |k: usize| {
-            let sum = TreeSum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1)));
-            sum.equals(1.0 / k as f64, S + 2 * k)
+            let sum = TreeSum::of_terms((0..S).map(|i| self.b[i] * integer_power(self.c[i], k - 1)));
+            sum.equals_to_rounding(1.0 / k as f64, S + 2 * k)
         };
         (1..=2 * S).take_while(|&k| holds(k)).count()
     }
@@ -79,8 +83,8 @@ impl<const S: usize> Tableau<S> {
     fn stage_order_c(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|i| {
-                let sum = TreeSum::of((0..S).map(|j| self.a[i][j] * power(self.c[j], k - 1)));
-                sum.equals(power(self.c[i], k) / k as f64, S + 2 * k)
+                let sum = TreeSum::of_terms((0..S).map(|j| self.a[i][j] * integer_power(self.c[j], k - 1)));
+                sum.equals_to_rounding(integer_power(self.c[i], k) / k as f64, S + 2 * k)
             })
         };
         (1..=S).take_while(|&k| holds(k)).count()
@@ -91,11 +95,13 @@ impl<const S: usize> Tableau<S> {
     fn stage_order_d(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|j| {
-                let sum = TreeSum::of((0..S).map(|i| self.b[i] * power(self.c[i], k - 1) * self.a[i][j]));
+                let sum = TreeSum::of_terms(
+                    (0..S).map(|i| self.b[i] * integer_power(self.c[i], k - 1) * self.a[i][j]),
+                );
                 // The right-hand side cancels: its rounding error has the scale of b_j / k.
-                let exact = self.b[j] * (1.0 - power(self.c[j], k)) / k as f64;
+                let exact = self.b[j] * (1.0 - integer_power(self.c[j], k)) / k as f64;
                 let scaled = TreeSum { absolute: sum.absolute + self.b[j].abs() / k as f64, ..sum };
-                scaled.equals(exact, S + 2 * k + 1)
+                scaled.equals_to_rounding(exact, S + 2 * k + 1)
             })
         };
         (1..=S).take_while(|&k| holds(k)).count()
@@ -103,11 +109,11 @@ impl<const S: usize> Tableau<S> {
 
     /// Whether `Σ_i b_i Φ_i(t) = 1/γ(t)` holds for all rooted trees with `nodes` nodes.
     fn satisfies_trees(&self, nodes: usize) -> bool {
-        let mut tree = Tree::path(nodes);
+        let mut tree = Tree::first_tree(nodes);
         loop {
             let (weight, density) = self.elementary_weight(&tree);
             // A term is a product of `nodes` coefficients, summed over S stages as often.
-            if !weight.equals(1.0 / density, nodes * (S + 2)) {
+            if !weight.equals_to_rounding(1.0 / density, nodes * (S + 2)) {
                 return false;
             }
             if !tree.next_tree() {
@@ -147,7 +153,7 @@ fn weighted_row_sum<const S: usize>(row: &[f64; S], phi: &[TreeSum; S]) -> TreeS
 }
 
 /// `baseⁿ`, without the elementary functions that `no_std` lacks.
-fn power(base: f64, n: usize) -> f64 {
+fn integer_power(base: f64, n: usize) -> f64 {
     (0..n).fold(1.0, |product, _| product * base)
 }
 
@@ -160,7 +166,7 @@ struct Tree {
 
 impl Tree {
     /// The first tree: a path.
-    fn path(nodes: usize) -> Self {
+    fn first_tree(nodes: usize) -> Self {
         Self { levels: core::array::from_fn(|i| i), nodes }
     }
 

@@ -3,7 +3,7 @@
 use super::{Gauss, Method, Tableau};
 
 /// `ℓ_i(θ)`
-fn polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
+fn lagrange_polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
     let mut product = 1.0;
     for (j, other) in nodes.iter().enumerate() {
         if j != i {
@@ -20,7 +20,7 @@ fn polynomial(nodes: &[f64], i: usize, own: f64, theta: f64) -> f64 {
 #[cfg_attr(not(feature = "std"), inline(always))]
 fn lagrange(nodes: &[f64], theta: f64, values: &mut [f64]) {
     for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
-        *value = polynomial(nodes, i, *own, theta);
+        *value = lagrange_polynomial(nodes, i, *own, theta);
     }
 }
 
@@ -38,7 +38,7 @@ fn integrals(nodes: &[f64], theta: f64, values: &mut [f64]) {
     for (i, (own, value)) in nodes.iter().zip(values).enumerate() {
         let mut sum = 0.0;
         for (weight, node) in b.iter().zip(c) {
-            sum += weight * polynomial(nodes, i, *own, theta * node);
+            sum += weight * lagrange_polynomial(nodes, i, *own, theta * node);
         }
         *value = theta * sum;
     }

@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 /// zero, with `s = (x − x₀)/h` and `r = 1 − s`, they are
 /// `[r² (1 + 2s), s² (3 − 2s), h s r², −h s² r]` (Hermite), and outside linear in `x`.
 #[inline(always)]
-pub fn weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
+pub fn hermite_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
     let c = S::from_f64;
     let (zero, one, three) = (c(0.0), c(1.0), c(3.0));
     let (d, h) = (x - x0, x1 - x0);
@@ -62,12 +62,12 @@ pub enum EndConditions {
 /// The matrix is tridiagonal, and no pivots have to be looked for: it is diagonally dominant, but
 /// for the rows of ends that are no knots, whose pivots are positive too.
 pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
-    let slopes = solve(points, values, ends);
+    let slopes = solve_slopes(points, values, ends);
     check_slopes(&slopes);
     slopes
 }
 
-const fn solve<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
+const fn solve_slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: EndConditions) -> [f64; N] {
     if let (EndConditions::NotAKnot, 3) = (ends, N) {
         return parabola(points, values);
     }

@@ -1,7 +1,7 @@
 //! Linear tables.
 
-use super::points::{check, check_linear_slopes, check_values, interval, pair};
-use super::{KINKS, Table, cell};
+use super::points::{adjacent_pair, check_increasing, check_linear_slopes, check_values, interval_index};
+use super::{KINKS, Table, cell_number};
 use crate::scalar::{Real, Rows, Scalar};
 
 /// A function that is linear between points, and beyond them.
@@ -28,7 +28,7 @@ impl<const N: usize> Linear<N> {
     /// error of the compiler.
     #[must_use]
     pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
-        check(&points);
+        check_increasing(&points);
         check_values(&values);
         check_linear_slopes(&points, &values);
         Self { points, values }
@@ -50,8 +50,8 @@ impl<const N: usize> Linear<N> {
 impl<const N: usize> Rows<1, 4> for &Linear<N> {
     #[inline(always)]
     fn row<T: Real>(self, [x]: [T; 1]) -> [T; 4] {
-        let i = interval(&self.points, x);
-        let ([x0, x1], [f0, f1]) = (pair(&self.points, i), pair(&self.values, i));
+        let i = interval_index(&self.points, x);
+        let ([x0, x1], [f0, f1]) = (adjacent_pair(&self.points, i), adjacent_pair(&self.values, i));
         [x0, x1, f0, f1].map(|&number| T::from_f64(number))
     }
 }
@@ -63,7 +63,7 @@ impl<const N: usize> Table<1> for Linear<N> {
         if order == KINKS {
             return x0;
         }
-        let [a, b] = weights(x, [x0, x1], order);
+        let [a, b] = linear_weights(x, [x0, x1], order);
         a * f0 + b * f1
     }
 }
@@ -94,8 +94,8 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
     /// error of the compiler.
     #[must_use]
     pub const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
-        check(&x);
-        check(&y);
+        check_increasing(&x);
+        check_increasing(&y);
         let mut i = 0;
         while i < N {
             check_values(&values[i]);
@@ -132,9 +132,9 @@ impl<const N: usize, const M: usize> Linear2<N, M> {
 impl<const N: usize, const M: usize> Rows<2, 8> for &Linear2<N, M> {
     #[inline(always)]
     fn row<T: Real>(self, [x, y]: [T; 2]) -> [T; 8] {
-        let (i, j) = (interval(&self.x, x), interval(&self.y, y));
-        let ([x0, x1], [y0, y1]) = (pair(&self.x, i), pair(&self.y, j));
-        let [[f00, f01], [f10, f11]] = pair(&self.values, i).map(|row| pair(row, j));
+        let (i, j) = (interval_index(&self.x, x), interval_index(&self.y, y));
+        let ([x0, x1], [y0, y1]) = (adjacent_pair(&self.x, i), adjacent_pair(&self.y, j));
+        let [[f00, f01], [f10, f11]] = adjacent_pair(&self.values, i).map(|row| adjacent_pair(row, j));
         [x0, x1, y0, y1, f00, f01, f10, f11].map(|&number| T::from_f64(number))
     }
 }
@@ -144,17 +144,17 @@ impl<const N: usize, const M: usize> Table<2> for Linear2<N, M> {
     fn partial<S: Scalar>(&self, [x, y]: [S; 2], orders: [u32; 2]) -> S {
         let [x0, x1, y0, y1, f00, f01, f10, f11] = S::look_up([x, y], self);
         if orders[0] == KINKS {
-            return cell(x0, y0);
+            return cell_number(x0, y0);
         }
-        let [a0, a1] = weights(x, [x0, x1], orders[0]);
-        let [b0, b1] = weights(y, [y0, y1], orders[1]);
+        let [a0, a1] = linear_weights(x, [x0, x1], orders[0]);
+        let [b0, b1] = linear_weights(y, [y0, y1], orders[1]);
         a0 * (b0 * f00 + b1 * f01) + a1 * (b0 * f10 + b1 * f11)
     }
 }
 
 /// The weights with which a derivative of a linear piece is made of the values at its ends.
 #[inline(always)]
-fn weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 2] {
+fn linear_weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 2] {
     let (one, h) = (S::from_f64(1.0), x1 - x0);
     match order {
         0 => {

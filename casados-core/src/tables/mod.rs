@@ -77,7 +77,7 @@ pub(crate) const KNOTS: u32 = 255;
 
 /// A number of a cell, by its lower left corner.
 #[inline(always)]
-fn cell<S: Scalar>(x0: S, y0: S) -> S {
+fn cell_number<S: Scalar>(x0: S, y0: S) -> S {
     x0 + S::from_f64(core::f64::consts::SQRT_2) * y0
 }
 

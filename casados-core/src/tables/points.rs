@@ -3,7 +3,7 @@
 use crate::scalar::Real;
 
 /// Stops the compiler where points do not increase.
-pub const fn check<const N: usize>(points: &[f64; N]) {
+pub const fn check_increasing<const N: usize>(points: &[f64; N]) {
     assert!(N >= 2, "a table has at least two points");
     let mut i = 0;
     while i < N {
@@ -47,7 +47,7 @@ pub const fn check_slopes<const N: usize>(slopes: &[f64; N]) {
 
 /// The interval from this point to the next one is that of `x`; outside of all, the nearest.
 #[inline(always)]
-pub fn interval<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {
+pub fn interval_index<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {
     let (mut first, mut count) = (0, N.saturating_sub(1));
     while count > 1 {
         let half = count / 2;
@@ -60,7 +60,7 @@ pub fn interval<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {
 
 /// Two numbers that follow each other in a table.
 #[inline(always)]
-pub fn pair<T>(table: &[T], first: usize) -> [&T; 2] {
+pub fn adjacent_pair<T>(table: &[T], first: usize) -> [&T; 2] {
     match table.get(first..) {
         Some([a, b, ..]) => [a, b],
         // Tables have two points at least, and intervals lie between them.
@@ -80,11 +80,11 @@ mod tests {
                 let x = 0.5 * f64::from(step);
                 let counted = points.iter().filter(|&&point| point <= x).count();
                 let expected = counted.saturating_sub(1).min(N - 2);
-                assert_eq!(interval(&points, x), expected, "{x} of {N}");
-                assert_eq!(interval(&points, x as f32), expected);
+                assert_eq!(interval_index(&points, x), expected, "{x} of {N}");
+                assert_eq!(interval_index(&points, x as f32), expected);
             }
-            assert_eq!(interval(&points, f64::NAN), 0);
-            assert_eq!(interval(&points, f64::INFINITY), N - 2);
+            assert_eq!(interval_index(&points, f64::NAN), 0);
+            assert_eq!(interval_index(&points, f64::INFINITY), N - 2);
         }
         check_interval_search::<2>();
         check_interval_search::<3>();

@@ -1,8 +1,8 @@
 //! Cubic splines.
 
-use super::cubic::{EndConditions, slopes, weights};
-use super::points::{check, check_values, interval, pair};
-use super::{KNOTS, Table, cell};
+use super::cubic::{EndConditions, hermite_weights, slopes};
+use super::points::{adjacent_pair, check_increasing, check_values, interval_index};
+use super::{KNOTS, Table, cell_number};
 use crate::scalar::{Real, Rows, Scalar};
 
 /// A cubic spline: twice continuously differentiable, through all points, linear beyond them.
@@ -48,7 +48,7 @@ impl<const N: usize> Spline<N> {
     /// error of the compiler.
     #[must_use]
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
-        check(&points);
+        check_increasing(&points);
         check_values(&values);
         Self::new(points, values, EndConditions::Natural)
     }
@@ -60,7 +60,7 @@ impl<const N: usize> Spline<N> {
     /// As [`Spline::natural`].
     #[must_use]
     pub const fn clamped(points: [f64; N], values: [f64; N], slopes: [f64; 2]) -> Self {
-        check(&points);
+        check_increasing(&points);
         check_values(&values);
         check_values(&slopes);
         Self::new(points, values, EndConditions::Slopes(slopes))
@@ -75,7 +75,7 @@ impl<const N: usize> Spline<N> {
     /// As [`Spline::natural`].
     #[must_use]
     pub const fn not_a_knot(points: [f64; N], values: [f64; N]) -> Self {
-        check(&points);
+        check_increasing(&points);
         check_values(&values);
         Self::new(points, values, EndConditions::NotAKnot)
     }
@@ -108,8 +108,9 @@ impl<const N: usize> Spline<N> {
 impl<const N: usize> Rows<1, 6> for &Spline<N> {
     #[inline(always)]
     fn row<T: Real>(self, [x]: [T; 1]) -> [T; 6] {
-        let i = interval(&self.points, x);
-        let ([x0, x1], [[f0, m0], [f1, m1]]) = (pair(&self.points, i), pair(&self.nodes, i));
+        let i = interval_index(&self.points, x);
+        let ([x0, x1], [[f0, m0], [f1, m1]]) =
+            (adjacent_pair(&self.points, i), adjacent_pair(&self.nodes, i));
         [x0, x1, f0, f1, m0, m1].map(|&number| T::from_f64(number))
     }
 }
@@ -121,7 +122,7 @@ impl<const N: usize> Table<1> for Spline<N> {
         if order == KNOTS {
             return x0;
         }
-        let [a0, a1, b0, b1] = weights(x, [x0, x1], order);
+        let [a0, a1, b0, b1] = hermite_weights(x, [x0, x1], order);
         (a0 * f0 + a1 * f1) + (b0 * m0 + b1 * m1)
     }
 }
@@ -159,8 +160,8 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// error of the compiler.
     #[must_use]
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
-        check(&x);
-        check(&y);
+        check_increasing(&x);
+        check_increasing(&y);
         Self::new(x, y, values, EndConditions::Natural)
     }
 
@@ -171,8 +172,8 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// As [`Spline2::natural`].
     #[must_use]
     pub const fn not_a_knot(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
-        check(&x);
-        check(&y);
+        check_increasing(&x);
+        check_increasing(&y);
         Self::new(x, y, values, EndConditions::NotAKnot)
     }
 
@@ -224,9 +225,9 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
 impl<const N: usize, const M: usize> Rows<2, 20> for &Spline2<N, M> {
     #[inline(always)]
     fn row<T: Real>(self, [x, y]: [T; 2]) -> [T; 20] {
-        let (i, j) = (interval(&self.x, x), interval(&self.y, y));
-        let ([x0, x1], [y0, y1]) = (pair(&self.x, i), pair(&self.y, j));
-        let [[f00, f01], [f10, f11]] = pair(&self.nodes, i).map(|row| pair(row, j));
+        let (i, j) = (interval_index(&self.x, x), interval_index(&self.y, y));
+        let ([x0, x1], [y0, y1]) = (adjacent_pair(&self.x, i), adjacent_pair(&self.y, j));
+        let [[f00, f01], [f10, f11]] = adjacent_pair(&self.nodes, i).map(|row| adjacent_pair(row, j));
         let numbers = [[*x0, *x1, *y0, *y1], *f00, *f01, *f10, *f11];
         let mut row = [T::ZERO; 20];
         for (to, &number) in row.iter_mut().zip(numbers.as_flattened()) {
@@ -242,10 +243,10 @@ impl<const N: usize, const M: usize> Table<2> for Spline2<N, M> {
         let row = S::look_up([x, y], self);
         let [x0, x1, y0, y1] = [row[0], row[1], row[2], row[3]];
         if orders[0] == KNOTS {
-            return cell(x0, y0);
+            return cell_number(x0, y0);
         }
-        let [a0, a1, b0, b1] = weights(x, [x0, x1], orders[0]);
-        let [c0, c1, d0, d1] = weights(y, [y0, y1], orders[1]);
+        let [a0, a1, b0, b1] = hermite_weights(x, [x0, x1], orders[0]);
+        let [c0, c1, d0, d1] = hermite_weights(y, [y0, y1], orders[1]);
         // Of the node `k` of the cell, by its value and its slope in x.
         let node = |k: usize, a: S, b: S| {
             let at = |n: usize| row[4 + 4 * k + n];

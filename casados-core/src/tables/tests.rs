@@ -26,7 +26,7 @@ const NATURAL_2D: Spline2<6, 4> = Spline2::natural(X, Y, G);
 const NOT_A_KNOT_2D: Spline2<6, 4> = Spline2::not_a_knot(X, Y, G);
 const LINEAR_2D: Linear2<6, 4> = Linear2::new(X, Y, G);
 
-fn close(found: f64, expected: f64, tolerance: f64) {
+fn assert_close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * (1.0 + expected.abs()), "{found} is not {expected}");
 }
 
@@ -36,7 +36,7 @@ fn sample_points() -> impl Iterator<Item = f64> {
 }
 
 #[test]
-fn values_at_the_points_are_kept_to_the_last_bit() {
+fn values_at_the_points() {
     for (x, f) in X.into_iter().zip(F) {
         assert_eq!((NATURAL.value(x), LINEAR.value(x)), (f, f));
         assert_eq!((CLAMPED.value(x), NOT_A_KNOT.value(x)), (f, f));
@@ -51,7 +51,7 @@ fn values_at_the_points_are_kept_to_the_last_bit() {
 /// The natural spline through 0, 1, 0 at 0, 1, 2 is `(3x − x³)/2` up to the middle, and outside a
 /// line.
 #[test]
-fn the_least_spline_has_its_closed_form() {
+fn spline_through_three_points() {
     const HAT: Spline<3> = Spline::natural([0.0, 1.0, 2.0], [0.0, 1.0, 0.0]);
     const PRODUCT: Spline2<3, 3> = Spline2::natural(
         [0.0, 1.0, 2.0],
@@ -69,12 +69,12 @@ fn the_least_spline_has_its_closed_form() {
     let places = [-2.5, -0.3, 0.2, 0.7, 1.1, 1.9, 2.4, 7.0];
     for x in places {
         for (order, expected) in form(x).into_iter().enumerate() {
-            close(HAT.partial([x], [order as u32]), expected, 1e-14);
+            assert_close(HAT.partial([x], [order as u32]), expected, 1e-14);
         }
         for y in places {
             for (i, a) in form(x).into_iter().enumerate() {
                 for (j, b) in form(y).into_iter().enumerate() {
-                    close(PRODUCT.partial([x, y], [i as u32, j as u32]), a * b, 1e-14);
+                    assert_close(PRODUCT.partial([x, y], [i as u32, j as u32]), a * b, 1e-14);
                 }
             }
         }
@@ -85,7 +85,7 @@ fn the_least_spline_has_its_closed_form() {
 /// A cubic polynomial with its derivatives: the spline that knows the slopes at its ends, and the
 /// one without knots next to them, are the polynomial itself.
 #[test]
-fn cubic_polynomials_are_kept() {
+fn cubic_polynomials_are_reproduced() {
     let cubic =
         |x: f64| [((0.3 * x - 0.7) * x + 1.1) * x + 0.4, (0.9 * x - 1.4) * x + 1.1, 1.8 * x - 1.4, 1.8];
     fn check_on_points<const N: usize>(points: [f64; N], cubic: impl Fn(f64) -> [f64; 4]) {
@@ -98,7 +98,7 @@ fn cubic_polynomials_are_kept() {
         for (spline, k) in splines.iter().flat_map(|spline| (0..=50).map(move |k| (spline, k))) {
             let x = points[0] + (points[N - 1] - points[0]) * f64::from(k) / 50.0;
             for (order, expected) in cubic(x).into_iter().enumerate() {
-                close(spline.partial([x], [order as u32]), expected, 1e-12);
+                assert_close(spline.partial([x], [order as u32]), expected, 1e-12);
             }
         }
     }
@@ -108,8 +108,8 @@ fn cubic_polynomials_are_kept() {
     check_on_points(X, cubic);
     let product = |x: f64, y: f64| cubic(x)[0] * cubic(0.1 * y)[0];
     let of_two = Spline2::not_a_knot(X, Y, X.map(|x| Y.map(|y| product(x, y))));
-    close(of_two.value(0.9, 13.0), product(0.9, 13.0), 1e-12);
-    close(of_two.partial([0.9, 13.0], [1, 2]), cubic(0.9)[1] * 0.01 * cubic(1.3)[2], 1e-12);
+    assert_close(of_two.value(0.9, 13.0), product(0.9, 13.0), 1e-12);
+    assert_close(of_two.partial([0.9, 13.0], [1, 2]), cubic(0.9)[1] * 0.01 * cubic(1.3)[2], 1e-12);
 }
 
 #[test]
@@ -117,9 +117,9 @@ fn fewer_points_than_four_are_a_polynomial() {
     let parabola = Spline::not_a_knot([0.0, 1.0, 3.0], [0.0, 1.0, 9.0]);
     let line = Spline::not_a_knot([1.0, 3.0], [2.0, -2.0]);
     for x in [0.0, 0.4, 1.0, 2.0, 3.0] {
-        close(parabola.value(x), x * x, 1e-14);
-        close(parabola.derivative(x), 2.0 * x, 1e-14);
-        close(line.value(x), 4.0 - 2.0 * x, 1e-14);
+        assert_close(parabola.value(x), x * x, 1e-14);
+        assert_close(parabola.derivative(x), 2.0 * x, 1e-14);
+        assert_close(line.value(x), 4.0 - 2.0 * x, 1e-14);
     }
 }
 
@@ -160,7 +160,7 @@ enum TestEnds {
 }
 
 /// The same spline by its second derivatives at the points, from a dense system.
-fn by_moments(ends: TestEnds, points: &[f64], values: &[f64], x: f64) -> f64 {
+fn spline_by_moments(ends: TestEnds, points: &[f64], values: &[f64], x: f64) -> f64 {
     let n = points.len();
     let h = |i: usize| points[i + 1] - points[i];
     let slope = |i: usize| (values[i + 1] - values[i]) / h(i);
@@ -201,35 +201,35 @@ fn by_moments(ends: TestEnds, points: &[f64], values: &[f64], x: f64) -> f64 {
 }
 
 #[test]
-fn splines_are_those_of_second_derivatives() {
+fn splines_by_their_moments() {
     for x in sample_points().filter(|x| (X[0]..X[5]).contains(x)) {
-        close(NATURAL.value(x), by_moments(TestEnds::Natural, &X, &F, x), 1e-14);
-        close(CLAMPED.value(x), by_moments(TestEnds::Slopes, &X, &F, x), 1e-13);
-        close(NOT_A_KNOT.value(x), by_moments(TestEnds::NotAKnot, &X, &F, x), 1e-13);
+        assert_close(NATURAL.value(x), spline_by_moments(TestEnds::Natural, &X, &F, x), 1e-14);
+        assert_close(CLAMPED.value(x), spline_by_moments(TestEnds::Slopes, &X, &F, x), 1e-13);
+        assert_close(NOT_A_KNOT.value(x), spline_by_moments(TestEnds::NotAKnot, &X, &F, x), 1e-13);
         for y in [10.3, 12.9, 16.0, 19.99] {
             for (spline, ends, tolerance) in
                 [(NATURAL_2D, TestEnds::Natural, 1e-14), (NOT_A_KNOT_2D, TestEnds::NotAKnot, 1e-13)]
             {
-                let rows: Vec<f64> = G.iter().map(|row| by_moments(ends, &Y, row, y)).collect();
-                close(spline.value(x, y), by_moments(ends, &X, &rows, x), tolerance);
+                let rows: Vec<f64> = G.iter().map(|row| spline_by_moments(ends, &Y, row, y)).collect();
+                assert_close(spline.value(x, y), spline_by_moments(ends, &X, &rows, x), tolerance);
             }
         }
     }
 }
 
 #[test]
-fn ends_are_as_they_are_given() {
+fn end_conditions() {
     assert_eq!([X[0], X[5]].map(|x| CLAMPED.derivative(x)), SLOPES);
     assert_eq!([X[0] - 3.0, X[5] + 2.0].map(|x| CLAMPED.derivative(x)), SLOPES);
     for spline in [CLAMPED, NOT_A_KNOT] {
         for x in &X[1..5] {
             let sides = [x - 1e-9, x + 1e-9].map(|x| spline.partial([x], [2]));
-            close(sides[0], sides[1], 1e-6);
+            assert_close(sides[0], sides[1], 1e-6);
         }
     }
     for x in [X[1], X[4]] {
         let sides = [x - 1e-9, x + 1e-9].map(|x| NOT_A_KNOT.partial([x], [3]));
-        close(sides[0], sides[1], 1e-12);
+        assert_close(sides[0], sides[1], 1e-12);
     }
 }
 
@@ -239,12 +239,12 @@ fn splines_are_twice_continuously_differentiable_everywhere() {
     for x in X {
         for order in 0..3 {
             let sides = [x - step, x + step].map(|x| NATURAL.partial([x], [order]));
-            close(sides[0], sides[1], 1e-7);
+            assert_close(sides[0], sides[1], 1e-7);
             for (y, other) in Y.into_iter().flat_map(|y| (0..3).map(move |other| (y, other))) {
                 let sides = [x - step, x + step].map(|x| NATURAL_2D.partial([x, y], [order, other]));
-                close(sides[0], sides[1], 1e-7);
+                assert_close(sides[0], sides[1], 1e-7);
                 let sides = [y - step, y + step].map(|y| NATURAL_2D.partial([x, y], [order, other]));
-                close(sides[0], sides[1], 1e-7);
+                assert_close(sides[0], sides[1], 1e-7);
             }
         }
     }
@@ -256,15 +256,15 @@ fn splines_are_twice_continuously_differentiable_everywhere() {
 fn all_tables_are_continued_linearly() {
     for (end, away) in [(X[0], -2.0), (X[5], 3.0)] {
         let x = end + away;
-        close(NATURAL.value(x), NATURAL.value(end) + away * NATURAL.derivative(end), 1e-14);
-        close(LINEAR.value(x), LINEAR.value(end) + away * LINEAR.derivative(end), 1e-14);
+        assert_close(NATURAL.value(x), NATURAL.value(end) + away * NATURAL.derivative(end), 1e-14);
+        assert_close(LINEAR.value(x), LINEAR.value(end) + away * LINEAR.derivative(end), 1e-14);
         assert_eq!([2, 3].map(|order| NATURAL.partial([x], [order])), [0.0; 2]);
         let inside = NATURAL_2D.value(end, 11.0) + away * NATURAL_2D.gradient(end, 11.0)[0];
-        close(NATURAL_2D.value(x, 11.0), inside, 1e-14);
+        assert_close(NATURAL_2D.value(x, 11.0), inside, 1e-14);
         // Beyond a corner the function is bilinear.
         let corner = |i, j| NATURAL_2D.partial([end, Y[3]], [i, j]);
         let expected = corner(0, 0) + away * corner(1, 0) + 4.0 * corner(0, 1) + 4.0 * away * corner(1, 1);
-        close(NATURAL_2D.value(x, Y[3] + 4.0), expected, 1e-14);
+        assert_close(NATURAL_2D.value(x, Y[3] + 4.0), expected, 1e-14);
     }
     assert!(NATURAL.value(f64::NAN).is_nan() && LINEAR_2D.value(0.0, f64::NAN).is_nan());
     assert!(NATURAL.value(1e300_f64).is_finite());
@@ -279,21 +279,21 @@ fn check_derivatives<const K: usize>(table: &impl Table<K>, orders: [u32; K], at
         let exact: f64 = table.partial(at, raised(orders, j));
         let complex: [Complex64; K] =
             core::array::from_fn(|k| Complex64::new(at[k], if k == j { 1e-200 } else { 0.0 }));
-        close(table.partial(complex, orders).im / 1e-200, exact, 1e-14);
+        assert_close(table.partial(complex, orders).im / 1e-200, exact, 1e-14);
         let dual: [Dual64; K] = core::array::from_fn(|k| Dual64::new(at[k], f64::from(u8::from(k == j))));
-        close(table.partial(dual, orders).eps, exact, 1e-14);
+        assert_close(table.partial(dual, orders).eps, exact, 1e-14);
         let moved = |by: f64| value(core::array::from_fn(|k| if k == j { at[k] + by } else { at[k] }));
         let h = 1e-4;
         let difference = |n: f64| moved(n * h) - moved(-n * h);
         let difference = (45.0 * difference(1.0) - 9.0 * difference(2.0) + difference(3.0)) / (60.0 * h);
-        close(difference, exact, 1e-10);
+        assert_close(difference, exact, 1e-10);
         for l in 0..K {
             let exact: f64 = table.partial(at, raised(raised(orders, j), l));
             let hyper: [HyperDual64; K] = core::array::from_fn(|k| {
                 let part = |of: usize| f64::from(u8::from(k == of));
                 HyperDual64::new(at[k], part(j), part(l), 0.0)
             });
-            close(table.partial(hyper, orders).eps1eps2, exact, 1e-13);
+            assert_close(table.partial(hyper, orders).eps1eps2, exact, 1e-13);
         }
     }
 }
@@ -337,7 +337,7 @@ fn registers_have_the_bits_of_numbers() {
         let lanes = NATURAL.value(F32x4::<4>::load(&x)).to_array();
         assert_eq!(lanes, x.map(|x| NATURAL.value(x)));
         for (single, x) in lanes.into_iter().zip(x) {
-            close(f64::from(single), NATURAL.value(f64::from(x)), 1e-5);
+            assert_close(f64::from(single), NATURAL.value(f64::from(x)), 1e-5);
         }
     }
 }
@@ -362,19 +362,19 @@ fn slopes_have_to_be_finite() {
 
 #[test]
 #[should_panic(expected = "too close for its values")]
-fn points_have_to_be_apart() {
+fn slopes_of_close_points_have_to_be_finite() {
     let _ = Spline::natural([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0]);
 }
 
 #[test]
 #[should_panic(expected = "too close for its values")]
-fn points_of_a_grid_have_to_be_apart() {
+fn slopes_on_a_grid_have_to_be_finite() {
     let _ = Spline2::natural([0.0, 1.0, 2.0], [0.0, 1e-300, 1.0], [[0.0, 1.0, 4.0]; 3]);
 }
 
 #[test]
 #[should_panic(expected = "too close for its values")]
-fn points_of_lines_have_to_be_apart() {
+fn slopes_of_linear_tables_have_to_be_finite() {
     let _ = Linear::new([0.0, 1e-310, 1.0], [0.0, 1.0, 0.0]);
 }
 

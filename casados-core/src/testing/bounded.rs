@@ -11,9 +11,9 @@ use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Unit roundoff.
-const U: f64 = 0.5 * f64::EPSILON;
+const UNIT_ROUNDOFF: f64 = 0.5 * f64::EPSILON;
 /// Elementary functions of the standard library are off by less than one unit in the last place.
-const FUNCTION: f64 = 2.0 * U;
+const FUNCTION_ERROR: f64 = 2.0 * UNIT_ROUNDOFF;
 
 /// A number and a bound of its rounding error.
 ///
@@ -42,7 +42,7 @@ impl Bounded {
 
     /// A function of one argument, its value and the size of its derivative.
     fn function(self, value: f64, derivative: f64) -> Self {
-        Self { value, error: propagated_error(derivative, self.error) + FUNCTION * value.abs() }
+        Self { value, error: propagated_error(derivative, self.error) + FUNCTION_ERROR * value.abs() }
     }
 }
 
@@ -54,7 +54,7 @@ fn propagated_error(derivative: f64, error: f64) -> f64 {
 
 /// The bound of a rounding: zero where nothing was lost, so that exact numbers stay exact.
 fn rounding_error(value: f64, lost: f64) -> f64 {
-    if lost == 0.0 { 0.0 } else { U * value.abs() }
+    if lost == 0.0 { 0.0 } else { UNIT_ROUNDOFF * value.abs() }
 }
 
 impl Add for Bounded {
@@ -168,12 +168,12 @@ impl Scalar for Bounded {
             value,
             error: propagated_error(other.value / square, self.error)
                 + propagated_error(self.value / square, other.error)
-                + FUNCTION * value.abs(),
+                + FUNCTION_ERROR * value.abs(),
         }
     }
     fn hypot(self, other: Self) -> Self {
         let value = self.value.hypot(other.value);
-        Self { value, error: self.error + other.error + FUNCTION * value }
+        Self { value, error: self.error + other.error + FUNCTION_ERROR * value }
     }
     // Square and multiply: as many roundings as the exponent, at most.
     fn powi(self, n: i32) -> Self {
@@ -181,14 +181,15 @@ impl Scalar for Bounded {
         let derivative = f64::from(n) * self.value.powi(n - 1);
         Self {
             value,
-            error: propagated_error(derivative, self.error) + f64::from(n.unsigned_abs()) * U * value.abs(),
+            error: propagated_error(derivative, self.error)
+                + f64::from(n.unsigned_abs()) * UNIT_ROUNDOFF * value.abs(),
         }
     }
     fn powf(self, other: Self) -> Self {
         let value = self.value.powf(other.value);
         let error = propagated_error(other.value * self.value.powf(other.value - 1.0), self.error)
             + propagated_error(value * self.value.ln(), other.error);
-        Self { value, error: error + FUNCTION * value.abs() }
+        Self { value, error: error + FUNCTION_ERROR * value.abs() }
     }
     fn abs(self) -> Self {
         Self { value: self.value.abs(), error: self.error }

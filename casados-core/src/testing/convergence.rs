@@ -96,7 +96,7 @@ impl Convergence {
     }
 
     /// The rows whose errors are truncation rather than rounding: ten times above the floor.
-    fn above(&self) -> Vec<(usize, f64)> {
+    fn rows_above_floor(&self) -> Vec<(usize, f64)> {
         self.rows.iter().copied().filter(|row| row.1 > 10.0 * self.floor && row.1.is_finite()).collect()
     }
 
@@ -104,7 +104,7 @@ impl Convergence {
     /// last three of them, where the asymptote is closest. `None` with fewer than two.
     #[must_use]
     pub fn order(&self) -> Option<f64> {
-        let rows = self.above();
+        let rows = self.rows_above_floor();
         let rows = &rows[rows.len().saturating_sub(3)..];
         if rows.len() < 2 {
             return None;

@@ -1,7 +1,7 @@
 //! The derivatives of a model against independent ones.
 
+use super::declared_structure;
 use super::evaluate::{self, BoundedMatrix, derivative_variable_count};
-use super::facts;
 use super::points::{Points, Random};
 use super::report::{Entry, Report};
 use crate::model::{ArrayV, Dae, GraphDae};
@@ -32,10 +32,10 @@ use std::vec::Vec;
 /// ```
 pub fn check_derivatives<M: GraphDae>(points: &Points<M>) -> Report {
     let mut report = check_by_differences(points);
-    for (number, v, mu) in samples(points) {
-        let jacobian = evaluate::own_jacobian::<M>(&v);
-        let adjoint = evaluate::own_adjoint::<M>(&v, &mu);
-        let hessian = evaluate::own_hessian::<M>(&v, &mu);
+    for (number, v, mu) in sample_points(points) {
+        let jacobian = evaluate::model_jacobian::<M>(&v);
+        let adjoint = evaluate::model_gradient::<M>(&v, &mu);
+        let hessian = evaluate::model_hessian::<M>(&v, &mu);
 
         let dual = evaluate::dual_jacobian::<M>(&v);
         compare_jacobian::<M>(&mut report, "num-dual", number, &jacobian, &dual);
@@ -66,18 +66,18 @@ pub fn check_derivatives<M: GraphDae>(points: &Points<M>) -> Report {
 /// ```
 pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("derivatives of {}", type_name::<M>()));
-    for (number, v, mu) in samples(points) {
+    for (number, v, mu) in sample_points(points) {
         check_residual::<M>(&mut report, number, &v);
 
-        let jacobian = evaluate::own_jacobian::<M>(&v);
+        let jacobian = evaluate::model_jacobian::<M>(&v);
         let differences = evaluate::difference_jacobian::<M>(&v);
         compare_jacobian::<M>(&mut report, "differences", number, &jacobian, &differences);
 
-        let adjoint = evaluate::own_adjoint::<M>(&v, &mu);
+        let adjoint = evaluate::model_gradient::<M>(&v, &mu);
         let product = transposed_product(&jacobian, &mu);
         compare_adjoint::<M>(&mut report, "Jacobian", number, &adjoint, &product);
 
-        let hessian = evaluate::own_hessian::<M>(&v, &mu);
+        let hessian = evaluate::model_hessian::<M>(&v, &mu);
         let differences = evaluate::difference_hessian::<M>(&v, &mu);
         compare_hessian::<M>(&mut report, "differences", number, &hessian, &differences);
 
@@ -114,7 +114,7 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
         declared_twice[(i, j)] = true;
         declared_twice[(j, i)] = true;
     }
-    for (number, v, mu) in samples(points) {
+    for (number, v, mu) in sample_points(points) {
         let outside = |declared: &DMatrix<bool>, found: &BoundedMatrix| -> Vec<(usize, Entry)> {
             (0..found.value.len())
                 .filter(|&i| !declared[i])
@@ -123,22 +123,22 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
         };
         let found = evaluate::difference_jacobian::<M>(&v);
         let entries = outside(&declared, &found);
-        let (scale, name) = (largest(&found.value), |i| jacobian_entry_name::<M>(i));
+        let (scale, name) = (largest_magnitude(&found.value), |i| jacobian_entry_name::<M>(i));
         report.compare("Jacobian outside", "differences", number, scale, entries.into_iter(), name);
         let found = evaluate::difference_hessian::<M>(&v, &mu);
         let entries = outside(&declared_twice, &found);
-        let (scale, name) = (largest(&found.value), |i| hessian_entry_name::<M>(i));
+        let (scale, name) = (largest_magnitude(&found.value), |i| hessian_entry_name::<M>(i));
         report.compare("Hessian outside", "differences", number, scale, entries.into_iter(), name);
     }
-    let points: Vec<_> = samples(points).collect();
+    let points: Vec<_> = sample_points(points).collect();
     for ((number, v, _), (_, other, _)) in points.iter().zip(points.iter().cycle().skip(1)) {
-        facts::compare::<M>(&mut report, *number, v, other);
+        declared_structure::check_declared_structure::<M>(&mut report, *number, v, other);
     }
     report
 }
 
 /// The points with their numbers, and seeds `μ` in `[-1, 1]` for each.
-fn samples<M: Dae>(points: &Points<M>) -> impl Iterator<Item = (usize, ArrayV<M, f64>, Vec<f64>)> {
+fn sample_points<M: Dae>(points: &Points<M>) -> impl Iterator<Item = (usize, ArrayV<M, f64>, Vec<f64>)> {
     points.iter().enumerate().map(|(number, v)| {
         let mut random = Random::new(number as u64 + 1);
         (number, v, (0..M::Shape::NK).map(|_| random.symmetric()).collect())
@@ -191,8 +191,10 @@ fn compare_jacobian<M: Dae>(
     own: &BoundedMatrix,
     other: &BoundedMatrix,
 ) {
-    let scale = largest(&own.value);
-    report.compare("Jacobian", reference, point, scale, entries(own, other), |i| jacobian_entry_name::<M>(i));
+    let scale = largest_magnitude(&own.value);
+    report.compare("Jacobian", reference, point, scale, matrix_entries(own, other), |i| {
+        jacobian_entry_name::<M>(i)
+    });
 }
 
 fn compare_adjoint<M: Dae>(
@@ -202,9 +204,9 @@ fn compare_adjoint<M: Dae>(
     own: &BoundedMatrix,
     other: &BoundedMatrix,
 ) {
-    let scale = largest(&own.value);
+    let scale = largest_magnitude(&own.value);
     let name = |i| format!("by {}", variable_name::<M>(i));
-    report.compare("adjoint", reference, point, scale, entries(own, other), name);
+    report.compare("adjoint", reference, point, scale, matrix_entries(own, other), name);
 }
 
 fn compare_hessian<M: Dae>(
@@ -214,12 +216,14 @@ fn compare_hessian<M: Dae>(
     own: &BoundedMatrix,
     other: &BoundedMatrix,
 ) {
-    let scale = largest(&own.value);
-    report.compare("Hessian", reference, point, scale, entries(own, other), |i| hessian_entry_name::<M>(i));
+    let scale = largest_magnitude(&own.value);
+    report.compare("Hessian", reference, point, scale, matrix_entries(own, other), |i| {
+        hessian_entry_name::<M>(i)
+    });
 }
 
 /// Entries in column-major order.
-fn entries<'a>(
+fn matrix_entries<'a>(
     own: &'a BoundedMatrix,
     other: &'a BoundedMatrix,
 ) -> impl Iterator<Item = (usize, Entry)> + 'a {
@@ -229,7 +233,7 @@ fn entries<'a>(
     })
 }
 
-fn largest(values: &DMatrix<f64>) -> f64 {
+fn largest_magnitude(values: &DMatrix<f64>) -> f64 {
     values.iter().fold(0.0, |a, b| if b.is_finite() { f64::max(a, b.abs()) } else { a })
 }
 

@@ -9,7 +9,7 @@ use std::vec::Vec;
 const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
 
 /// Step sizes `2^-k` times the size of the variable, at least one.
-const STEPS: core::ops::RangeInclusive<i32> = 2..=12;
+const STEP_EXPONENTS: core::ops::RangeInclusive<i32> = 2..=12;
 
 /// By how much two successive differences between estimates must shrink, unless they are rounding:
 /// 256 where the order is reached. At a kink, or where the function is not resolved, they do not,
@@ -32,7 +32,7 @@ pub(super) fn derivative(
     let mut best: Vec<Bounded> =
         core::iter::repeat_n(Bounded { value: f64::NAN, error: f64::INFINITY }, outputs).collect();
     let mut last: Vec<(f64, f64)> = Vec::new();
-    for k in STEPS {
+    for k in STEP_EXPONENTS {
         let h = size * (2.0_f64).powi(-k);
         let mut moved = |m: f64| {
             let value = a + m * h;

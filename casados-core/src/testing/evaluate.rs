@@ -36,27 +36,27 @@ pub(super) const fn derivative_variable_count<M: Dae>() -> usize {
 }
 
 /// A point in another arithmetic.
-fn lift<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
+fn convert_point<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
     Array::from_fn(|i| S::from_f64(v[i]))
 }
 
-fn filled<S: Lanes<Cell = S>, A: Array<S>>(value: f64) -> A {
+fn filled_array<S: Lanes<Cell = S>, A: Array<S>>(value: f64) -> A {
     A::from_fn(|_| S::from_f64(value))
 }
 
 /// `f(v)`
 pub(super) fn residual<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>) -> ArrayK<M, S> {
-    let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
+    let mut f = filled_array::<S, ArrayK<M, S>>(f64::NAN);
     M::residual::<S>(v, &mut f);
     f
 }
 
 /// `f(v)` beside its Jacobian, and the Jacobian. Entries that nothing has written are NaN.
 pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, DMatrix<S>) {
-    let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
-    let mut values = filled::<S, M::Jacobian<S>>(f64::NAN);
+    let mut f = filled_array::<S, ArrayK<M, S>>(f64::NAN);
+    let mut values = filled_array::<S, M::Jacobian<S>>(f64::NAN);
     M::jacobian_constants::<S>(&mut values);
-    M::residual_jacobian::<S>(&lift::<M, S>(v), &mut f, &mut values);
+    M::residual_jacobian::<S>(&convert_point::<M, S>(v), &mut f, &mut values);
     let mut dense = DMatrix::from_element(M::Shape::NK, derivative_variable_count::<M>(), S::from_f64(0.0));
     for entry in 0..M::STRUCTURE.jacobian.len() {
         dense[M::STRUCTURE.jacobian.at(entry)] = values[entry];
@@ -67,7 +67,7 @@ pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (Array
 /// `∇(μᵀ f)`, with `t`.
 pub(super) fn adjoint<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>, mu: &[f64]) -> ArrayV<M, S> {
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
-    let mut gradient = filled::<S, ArrayV<M, S>>(f64::NAN);
+    let mut gradient = filled_array::<S, ArrayV<M, S>>(f64::NAN);
     M::adjoint::<S>(v, &mu, &mut gradient);
     gradient
 }
@@ -75,8 +75,8 @@ pub(super) fn adjoint<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>, mu: &[f64]) 
 /// `∇²(μᵀ f)`, both triangles.
 pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]) -> DMatrix<S> {
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
-    let mut values = filled::<S, M::Hessian<S>>(f64::NAN);
-    M::hessian::<S>(&lift::<M, S>(v), &mu, &mut values);
+    let mut values = filled_array::<S, M::Hessian<S>>(f64::NAN);
+    M::hessian::<S>(&convert_point::<M, S>(v), &mu, &mut values);
     let mut dense = DMatrix::from_element(
         derivative_variable_count::<M>(),
         derivative_variable_count::<M>(),
@@ -91,14 +91,14 @@ pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]
 }
 
 /// The model's own values with bounds of their rounding.
-pub(super) fn own_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
+pub(super) fn model_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
     let bounds = jacobian::<M, Bounded>(v).1;
     BoundedMatrix { value: jacobian::<M, f64>(v).1, error: bounds.map(|b| b.error) }
 }
 
 /// The model's own gradient as one column, with bounds.
-pub(super) fn own_adjoint<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
-    let bounds = adjoint::<M, Bounded>(&lift::<M, Bounded>(v), mu);
+pub(super) fn model_gradient<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
+    let bounds = adjoint::<M, Bounded>(&convert_point::<M, Bounded>(v), mu);
     let values = adjoint::<M, f64>(v, mu);
     BoundedMatrix {
         value: DMatrix::from_fn(M::Shape::NV, 1, |i, _| values[i]),
@@ -107,13 +107,13 @@ pub(super) fn own_adjoint<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatr
 }
 
 /// The model's own Hessian with bounds.
-pub(super) fn own_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
+pub(super) fn model_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let bounds = hessian::<M, Bounded>(v, mu);
     BoundedMatrix { value: hessian::<M, f64>(v, mu), error: bounds.map(|b| b.error) }
 }
 
 /// A function of a point in another arithmetic, at `v` in the direction of variable `j`.
-fn at<S: Scalar<Cell = S>>(
+fn evaluate_seeded<S: Scalar<Cell = S>>(
     v: &[f64],
     outputs: usize,
     seed: impl Fn(usize, f64) -> S,
@@ -133,7 +133,10 @@ fn forward_seed(j: usize) -> impl Fn(usize, f64) -> Forward<Bounded> {
 pub(super) fn dual_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
     let value = matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
         let seed = |i, value| Dual64::new(value, f64::from(u8::from(i == j)));
-        at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Dual64>).iter().map(|f| f.eps).collect()
+        evaluate_seeded(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Dual64>)
+            .iter()
+            .map(|f| f.eps)
+            .collect()
     });
     BoundedMatrix { value, error: jacobian_bounds::<M>(v) }
 }
@@ -141,7 +144,7 @@ pub(super) fn dual_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
 /// The Jacobian by the complex step.
 pub(super) fn complex_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> BoundedMatrix {
     let value = matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
-        at(v.as_ref(), M::Shape::NK, complex_seed(j), M::residual_of::<Complex64>)
+        evaluate_seeded(v.as_ref(), M::Shape::NK, complex_seed(j), M::residual_of::<Complex64>)
             .iter()
             .map(|f| f.im / COMPLEX_STEP)
             .collect()
@@ -155,7 +158,7 @@ fn complex_seed(j: usize) -> impl Fn(usize, f64) -> Complex64 {
 
 fn jacobian_bounds<M: GraphDae>(v: &ArrayV<M, f64>) -> DMatrix<f64> {
     matrix_from_columns(derivative_variable_count::<M>(), M::Shape::NK, |j| {
-        at(v.as_ref(), M::Shape::NK, forward_seed(j), M::residual_of::<Forward<Bounded>>)
+        evaluate_seeded(v.as_ref(), M::Shape::NK, forward_seed(j), M::residual_of::<Forward<Bounded>>)
             .iter()
             .map(|f| REFERENCE_ERROR_FACTOR * f.d.error)
             .collect()
@@ -170,7 +173,7 @@ pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Bound
     for i in 0..n {
         for j in 0..=i {
             let seed = |k, value| HyperDual64::new(value, is(k, i), is(k, j), 0.0);
-            let f = at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<HyperDual64>);
+            let f = evaluate_seeded(v.as_ref(), M::Shape::NK, seed, M::residual_of::<HyperDual64>);
             // Rows without second derivative add exact zeros.
             let mut sum = Bounded::exact(0.0);
             if f.iter().any(|f| f.eps1eps2 != 0.0) {
@@ -178,7 +181,12 @@ pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Bound
                     re: Forward { re: Bounded::exact(value), d: Bounded::exact(is(k, i)) },
                     d: Forward { re: Bounded::exact(is(k, j)), d: Bounded::exact(0.0) },
                 };
-                let bounds = at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Forward<Forward<Bounded>>>);
+                let bounds = evaluate_seeded(
+                    v.as_ref(),
+                    M::Shape::NK,
+                    seed,
+                    M::residual_of::<Forward<Forward<Bounded>>>,
+                );
                 for ((f, bound), &mu) in f.iter().zip(&bounds).zip(mu) {
                     let term = Bounded { value: f.eps1eps2, error: bound.d.d.error };
                     sum = sum + Bounded::exact(mu) * term;
@@ -195,19 +203,19 @@ pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Bound
 /// The Hessian of `μᵀ f` by the complex step through the model's gradient.
 pub(super) fn complex_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> BoundedMatrix {
     let n = derivative_variable_count::<M>();
-    fn seeds<S: Scalar>(mu: &[f64]) -> Vec<S> {
+    fn multiplier_seeds<S: Scalar>(mu: &[f64]) -> Vec<S> {
         mu.iter().map(|&mu| S::from_f64(mu)).collect()
     }
     let value = matrix_from_columns(n, n, |j| {
-        let gradient = |v: &[Complex64], g: &mut [Complex64]| M::adjoint_of(v, &seeds(mu), g);
-        let column = at(v.as_ref(), M::Shape::NV, complex_seed(j), gradient);
+        let gradient = |v: &[Complex64], g: &mut [Complex64]| M::adjoint_of(v, &multiplier_seeds(mu), g);
+        let column = evaluate_seeded(v.as_ref(), M::Shape::NV, complex_seed(j), gradient);
         column[..n].iter().map(|g| g.im / COMPLEX_STEP).collect()
     });
     let error = matrix_from_columns(n, n, |j| {
         let gradient = |v: &[Forward<Bounded>], g: &mut [Forward<Bounded>]| {
-            M::adjoint_of(v, &seeds(mu), g);
+            M::adjoint_of(v, &multiplier_seeds(mu), g);
         };
-        let column = at(v.as_ref(), M::Shape::NV, forward_seed(j), gradient);
+        let column = evaluate_seeded(v.as_ref(), M::Shape::NV, forward_seed(j), gradient);
         column[..n].iter().map(|g| REFERENCE_ERROR_FACTOR * g.d.error).collect()
     });
     BoundedMatrix { value, error }
@@ -231,7 +239,7 @@ fn difference_matrix<M: Dae>(
     outputs: usize,
     function: impl Fn(&ArrayV<M, Bounded>) -> Vec<Bounded>,
 ) -> BoundedMatrix {
-    let point = lift::<M, Bounded>(v);
+    let point = convert_point::<M, Bounded>(v);
     let columns: Vec<Vec<Bounded>> = (0..derivative_variable_count::<M>())
         .map(|j| {
             super::differences::derivative(v[j], outputs, |value| {

@@ -1,10 +1,10 @@
 //! An integrator against an exact solution.
 
 use super::integrator::CheckedInterval;
-use super::names::{direction_name, second_name, state_name};
-use super::noise::{MAX_DEVIATIONS, largest, noise};
+use super::names::{direction_name, second_derivative_name, state_name};
 use super::report::{Entry, Report};
-use super::sensitivities::warn;
+use super::rounding_noise::{MAX_DEVIATIONS, largest_magnitude, measure_noise};
+use super::sensitivities::warn_outside_ranges;
 use crate::error::Error;
 use crate::integrator::Integrator;
 use crate::memory::{WithAdjoint, WithHessian};
@@ -88,16 +88,16 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
     // than some ε of the largest. Samples do not show this where a model is linear, since its
     // matrices stay the same. Rounding errors of ε/2 in each of n steps add up to about √n ε/2: 3ε
     // after 32 steps, and as in the other comparisons 4ε are granted.
-    let largest_first = exact.first.iter().map(|row| largest(row)).fold(0.0, f64::max);
-    let largest_second = exact.second.iter().flatten().map(|row| largest(row)).fold(0.0, f64::max);
+    let largest_first = exact.first.iter().map(|row| largest_magnitude(row)).fold(0.0, f64::max);
+    let largest_second = exact.second.iter().flatten().map(|row| largest_magnitude(row)).fold(0.0, f64::max);
     for i in 0..nx {
         let lambda: Vec<f64> = (0..nx).map(|j| f64::from(u8::from(i == j))).collect();
         let answer = interval.hessian(fine, &lambda)?;
         if i == 0 {
-            warn::<M>(&mut report, &answer.states);
+            warn_outside_ranges::<M>(&mut report, &answer.states);
         }
         let rough = interval.hessian(coarse, &lambda)?;
-        let noise = noise(fine, &interval, &lambda, &answer)?;
+        let noise = measure_noise(fine, &interval, &lambda, &answer)?;
         let mut compare = |quantity,
                            own: &[f64],
                            rough: &[f64],
@@ -110,7 +110,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
                 let tolerance = (own[k] - rough[k]).abs() + MAX_DEVIATIONS * noise[k] + floor;
                 (k, Entry { value: own[k], expected, tolerance })
             });
-            report.compare(quantity, "exact", 0, largest(exact), entries, name);
+            report.compare(quantity, "exact", 0, largest_magnitude(exact), entries, name);
         };
         if i == 0 {
             compare(
@@ -119,7 +119,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
                 &rough.states,
                 &noise.states,
                 &exact.states,
-                largest(&exact.states),
+                largest_magnitude(&exact.states),
                 &|k| state_name::<M>(k),
             );
             for (row, first) in exact.first.iter().enumerate() {
@@ -146,7 +146,7 @@ pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory: WithHe
             let flat: Vec<f64> = second.iter().take(nw).flatten().copied().collect();
             let (own, rough) = (answer.hessian.as_slice(), rough.hessian.as_slice());
             compare("second derivative", own, rough, noise.hessian.as_slice(), &flat, largest_second, &|k| {
-                format!("{} {}", state_name::<M>(i), second_name::<M>(k))
+                format!("{} {}", state_name::<M>(i), second_derivative_name::<M>(k))
             });
         }
     }

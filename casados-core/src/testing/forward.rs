@@ -96,30 +96,30 @@ impl<S: Scalar> Scalar for Forward<S> {
     own_cell!();
 
     functions! {
-        sqrt(a, f) = n::<S>(0.5) / f;
-        cbrt(a, f) = f / (n::<S>(3.0) * a);
+        sqrt(a, f) = from_constant::<S>(0.5) / f;
+        cbrt(a, f) = f / (from_constant::<S>(3.0) * a);
         exp(a, f) = f;
-        exp2(a, f) = n::<S>(LN_2) * f;
+        exp2(a, f) = from_constant::<S>(LN_2) * f;
         exp_m1(a, f) = a.exp();
-        ln(a, f) = n::<S>(1.0) / a;
-        ln_1p(a, f) = n::<S>(1.0) / (n::<S>(1.0) + a);
-        log2(a, f) = n::<S>(1.0) / (a * n::<S>(LN_2));
-        log10(a, f) = n::<S>(1.0) / (a * n::<S>(LN_10));
+        ln(a, f) = from_constant::<S>(1.0) / a;
+        ln_1p(a, f) = from_constant::<S>(1.0) / (from_constant::<S>(1.0) + a);
+        log2(a, f) = from_constant::<S>(1.0) / (a * from_constant::<S>(LN_2));
+        log10(a, f) = from_constant::<S>(1.0) / (a * from_constant::<S>(LN_10));
         sin(a, f) = a.cos();
         cos(a, f) = -a.sin();
-        tan(a, f) = n::<S>(1.0) + f * f;
-        asin(a, f) = n::<S>(1.0) / (n::<S>(1.0) - a * a).sqrt();
-        acos(a, f) = n::<S>(-1.0) / (n::<S>(1.0) - a * a).sqrt();
-        atan(a, f) = n::<S>(1.0) / (n::<S>(1.0) + a * a);
+        tan(a, f) = from_constant::<S>(1.0) + f * f;
+        asin(a, f) = from_constant::<S>(1.0) / (from_constant::<S>(1.0) - a * a).sqrt();
+        acos(a, f) = from_constant::<S>(-1.0) / (from_constant::<S>(1.0) - a * a).sqrt();
+        atan(a, f) = from_constant::<S>(1.0) / (from_constant::<S>(1.0) + a * a);
         sinh(a, f) = a.cosh();
         cosh(a, f) = a.sinh();
-        tanh(a, f) = n::<S>(1.0) - f * f;
-        asinh(a, f) = n::<S>(1.0) / (n::<S>(1.0) + a * a).sqrt();
-        acosh(a, f) = n::<S>(1.0) / (a * a - n::<S>(1.0)).sqrt();
-        atanh(a, f) = n::<S>(1.0) / (n::<S>(1.0) - a * a);
+        tanh(a, f) = from_constant::<S>(1.0) - f * f;
+        asinh(a, f) = from_constant::<S>(1.0) / (from_constant::<S>(1.0) + a * a).sqrt();
+        acosh(a, f) = from_constant::<S>(1.0) / (a * a - from_constant::<S>(1.0)).sqrt();
+        atanh(a, f) = from_constant::<S>(1.0) / (from_constant::<S>(1.0) - a * a);
     }
     fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
-        S::look_up(a.map(|a| a.re), rows).map(|re| Self { re, d: n::<S>(0.0) })
+        S::look_up(a.map(|a| a.re), rows).map(|re| Self { re, d: from_constant::<S>(0.0) })
     }
     fn sin_cos(self) -> (Self, Self) {
         (self.sin(), self.cos())
@@ -136,20 +136,26 @@ impl<S: Scalar> Scalar for Forward<S> {
         if exponent == 0 {
             return Self::from_f64(1.0);
         }
-        self.chain(self.re.powi(exponent), n::<S>(f64::from(exponent)) * self.re.powi(exponent - 1))
+        self.chain(
+            self.re.powi(exponent),
+            from_constant::<S>(f64::from(exponent)) * self.re.powi(exponent - 1),
+        )
     }
     fn powf(self, other: Self) -> Self {
         let value = self.re.powf(other.re);
-        let zero = n::<S>(0.0);
+        let zero = from_constant::<S>(0.0);
         // The logarithm does not exist for a negative base, which may have a constant exponent.
         let by_exponent = S::select(S::eq(other.d, zero), zero, value * self.re.ln() * other.d);
-        Self { re: value, d: other.re * self.re.powf(other.re - n::<S>(1.0)) * self.d + by_exponent }
+        Self {
+            re: value,
+            d: other.re * self.re.powf(other.re - from_constant::<S>(1.0)) * self.d + by_exponent,
+        }
     }
     fn abs(self) -> Self {
         self.chain(self.re.abs(), self.re.signum())
     }
     fn signum(self) -> Self {
-        Self { re: self.re.signum(), d: n::<S>(0.0) }
+        Self { re: self.re.signum(), d: from_constant::<S>(0.0) }
     }
     fn lt(self, other: Self) -> S::Mask {
         S::lt(self.re, other.re)
@@ -172,6 +178,6 @@ impl<S: Scalar> Scalar for Forward<S> {
 }
 
 /// A constant.
-fn n<S: Scalar>(value: f64) -> S {
+fn from_constant<S: Scalar>(value: f64) -> S {
     S::from_f64(value)
 }

@@ -30,10 +30,10 @@ impl CheckedInterval {
     ) -> Result<(VectorX<M, f64>, VectorU<M, f64>), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         if M::Shape::NP > 0 {
-            integrator.set_parameters(&vector(&self.w[nx + nu..]))?;
+            integrator.set_parameters(&vector_from(&self.w[nx + nu..]))?;
         }
         integrator.reset();
-        Ok((vector(&self.w[..nx]), vector(&self.w[nx..nx + nu])))
+        Ok((vector_from(&self.w[..nx]), vector_from(&self.w[nx..nx + nu])))
     }
 
     /// `(x, z, z0)`
@@ -42,7 +42,7 @@ impl CheckedInterval {
         integrator: &mut impl Integrator<Model = M, Number = f64, Memory: WithHessian + WithAdjoint<1>>,
     ) -> Result<Vec<f64>, Error> {
         let (x0, u) = self.prepare(integrator)?;
-        Ok(states(integrator.solve(&x0, &u, self.h)?))
+        Ok(states_of(integrator.solve(&x0, &u, self.h)?))
     }
 
     /// `(x, z, z0)` and its derivatives by `w`.
@@ -52,7 +52,7 @@ impl CheckedInterval {
     ) -> Result<(Vec<f64>, DMatrix<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
         let forward = integrator.forward(&x0, &u, self.h)?;
-        Ok((states(forward), matrix_of_forward(forward)))
+        Ok((states_of(forward), matrix_of_forward(forward)))
     }
 
     /// `(x, z, z0)` and the gradient by `w`.
@@ -62,9 +62,9 @@ impl CheckedInterval {
         lambda: &[f64],
     ) -> Result<(Vec<f64>, Vec<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
-        let adjoint = integrator.adjoint(&x0, &u, self.h, &vector(lambda))?;
+        let adjoint = integrator.adjoint(&x0, &u, self.h, &vector_from(lambda))?;
         let gradient = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
-        Ok((states(adjoint), gradient.concat()))
+        Ok((states_of(adjoint), gradient.concat()))
     }
 
     /// Everything in one call.
@@ -74,7 +74,7 @@ impl CheckedInterval {
         lambda: &[f64],
     ) -> Result<CallResults, Error> {
         let (x0, u) = self.prepare(integrator)?;
-        let result = integrator.hessian(&x0, &u, self.h, &vector(lambda))?;
+        let result = integrator.hessian(&x0, &u, self.h, &vector_from(lambda))?;
         let gradient = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
         // The upper blocks are given; inside of the diagonal blocks, both triangles.
@@ -90,7 +90,7 @@ impl CheckedInterval {
         let below =
             |i: usize, j: usize| i > j && block_and_position(i, nx, nu).0 != block_and_position(j, nx, nu).0;
         Ok(CallResults {
-            states: states(result),
+            states: states_of(result),
             derivatives: matrix_of_forward(result),
             gradient: gradient.concat(),
             hessian: DMatrix::from_fn(nw, nw, |i, j| if below(i, j) { element(j, i) } else { element(i, j) }),
@@ -122,13 +122,13 @@ const fn block_and_position(i: usize, nx: usize, nu: usize) -> (usize, usize) {
     }
 }
 
-fn vector<V: Matrix<f64> + Zeroable>(values: &[f64]) -> V {
+fn vector_from<V: Matrix<f64> + Zeroable>(values: &[f64]) -> V {
     let mut vector = V::zeroed();
     vector.as_mut_slice().copy_from_slice(values);
     vector
 }
 
-fn states<M: Dae>(nominal: &Nominal<M>) -> Vec<f64> {
+fn states_of<M: Dae>(nominal: &Nominal<M>) -> Vec<f64> {
     [nominal.x.as_slice(), nominal.z.as_slice(), nominal.z0.as_slice()].concat()
 }
 

@@ -17,21 +17,21 @@
 
 mod bounded;
 mod convergence;
+mod declared_structure;
 mod derivatives;
 mod differences;
 mod evaluate;
 mod exact;
-mod facts;
 mod forward;
 mod integrator;
 mod names;
-mod noise;
 mod points;
 mod report;
+mod rounding_noise;
 mod sensitivities;
 
 #[doc(hidden)]
-pub use crate::scalar::lanes::{Level, limit, limit_cache};
+pub use crate::scalar::lanes::{Level, limit_cache, limit_level};
 pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};

@@ -31,7 +31,7 @@ pub(super) fn derivative_name<M: Dae>(i: usize) -> String {
     format!("{} by {}", state_name::<M>(i % rows), direction_name::<M>(i / rows))
 }
 
-pub(super) fn second_name<M: Dae>(i: usize) -> String {
+pub(super) fn second_derivative_name<M: Dae>(i: usize) -> String {
     let n = M::Shape::NW;
     format!("by {} and {}", direction_name::<M>(i % n), direction_name::<M>(i / n))
 }

@@ -3,12 +3,13 @@
 use super::bounded::Bounded;
 use super::differences;
 use super::integrator::{CallResults, CheckedInterval};
-use super::names::{derivative_name, direction_name, second_name, state_name};
-use super::noise::{
-    MAX_DEVIATIONS, compare_results, compare_with_differences, largest, noise, values_with_noise,
-};
+use super::names::{derivative_name, direction_name, second_derivative_name, state_name};
 use super::points::Random;
 use super::report::{Entry, Report};
+use super::rounding_noise::{
+    MAX_DEVIATIONS, compare_results, compare_with_differences, largest_magnitude, measure_noise,
+    values_with_noise,
+};
 use crate::error::Error;
 use crate::integrator::Integrator;
 use crate::memory::{WithAdjoint, WithHessian};
@@ -62,15 +63,16 @@ pub fn check_sensitivities<
     let mut report = Report::new(format!("sensitivities of {}", type_name::<I>()));
 
     let solved = interval.solve(integrator)?;
-    warn::<M>(&mut report, &solved);
+    warn_outside_ranges::<M>(&mut report, &solved);
     let (states, derivatives) = interval.forward(integrator)?;
     let (adjoint_states, gradient) = interval.adjoint(integrator, &lambda)?;
     let all = interval.hessian(integrator, &lambda)?;
 
-    let first = CallRecord { solved: &solved, derivatives: &derivatives, gradient: &gradient, all: &all };
+    let first =
+        CallRecord { states: &solved, derivatives: &derivatives, gradient: &gradient, combined_call: &all };
     first.check_repeated_calls(&mut report, integrator, &interval, &lambda)?;
 
-    let noise = noise(integrator, &interval, &lambda, &all)?;
+    let noise = measure_noise(integrator, &interval, &lambda, &all)?;
     let state = |i| state_name::<M>(i);
     compare_results(&mut report, "state", "solve", &states, &solved, &noise.states, state);
     compare_results(&mut report, "state of adjoint", "solve", &adjoint_states, &solved, &noise.states, state);
@@ -128,8 +130,8 @@ pub fn check_sensitivities<
         expected,
         tolerance: 0.0,
     });
-    let scale = largest(all.hessian.as_slice());
-    report.compare("Hessian", "its transpose", 0, scale, entries.enumerate(), second_name::<M>);
+    let scale = largest_magnitude(all.hessian.as_slice());
+    report.compare("Hessian", "its transpose", 0, scale, entries.enumerate(), second_derivative_name::<M>);
 
     first.check_differences(&mut report, integrator, &interval, (&lambda, &noise));
     Ok(report)
@@ -137,10 +139,10 @@ pub fn check_sensitivities<
 
 /// What the calls have given.
 struct CallRecord<'a> {
-    solved: &'a [f64],
+    states: &'a [f64],
     derivatives: &'a DMatrix<f64>,
     gradient: &'a [f64],
-    all: &'a CallResults,
+    combined_call: &'a CallResults,
 }
 
 impl CallRecord<'_> {
@@ -163,14 +165,14 @@ impl CallRecord<'_> {
                 format!("element {i}")
             });
         };
-        same(report, "solve", &interval.solve(integrator)?, self.solved);
+        same(report, "solve", &interval.solve(integrator)?, self.states);
         same(report, "forward", interval.forward(integrator)?.1.as_slice(), self.derivatives.as_slice());
         same(report, "adjoint", &interval.adjoint(integrator, lambda)?.1, self.gradient);
         same(
             report,
             "hessian",
             interval.hessian(integrator, lambda)?.hessian.as_slice(),
-            self.all.hessian.as_slice(),
+            self.combined_call.hessian.as_slice(),
         );
         Ok(())
     }
@@ -188,17 +190,18 @@ impl CallRecord<'_> {
                 w: interval.w.iter().zip(&direction.seed).map(|(w, d)| w + value.value * d).collect(),
                 h: interval.h,
             };
-            let by_solve = differences::derivative(0.0, self.solved.len(), |value| {
+            let by_solve = differences::derivative(0.0, self.states.len(), |value| {
                 values_with_noise(moved(value).solve(integrator).ok(), &noise.states)
             });
-            let (own, bounds) = direction.of(self.derivatives, &noise.derivatives);
+            let (own, bounds) = direction.directional_derivatives(self.derivatives, &noise.derivatives);
             compare_with_differences(report, "forward", &own, &by_solve, &bounds, |i| {
                 format!("{} by {}", state_name::<M>(i), direction.name)
             });
             let by_adjoint = differences::derivative(0.0, M::Shape::NW, |value| {
                 values_with_noise(moved(value).adjoint(integrator, lambda).ok().map(|a| a.1), &noise.gradient)
             });
-            let (own, bounds) = direction.of(&self.all.hessian, &noise.hessian);
+            let (own, bounds) =
+                direction.directional_derivatives(&self.combined_call.hessian, &noise.hessian);
             compare_with_differences(report, "Hessian", &own, &by_adjoint, &bounds, |i| {
                 format!("by {} and {}", direction_name::<M>(i), direction.name)
             });
@@ -207,7 +210,7 @@ impl CallRecord<'_> {
 }
 
 /// Warns where states `(x, z, z0)` are outside of the ranges of the model.
-pub(super) fn warn<M: Dae>(report: &mut Report, states: &[f64]) {
+pub(super) fn warn_outside_ranges<M: Dae>(report: &mut Report, states: &[f64]) {
     let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
     for (i, &value) in states.iter().enumerate() {
         let variable = nx + if i < nx + nz { i } else { i - nz };
@@ -232,7 +235,7 @@ struct Direction {
 /// takes part.
 fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
     const MAX_UNIT_DIRECTIONS: usize = 12;
-    const RANDOM: usize = 4;
+    const RANDOM_DIRECTIONS: usize = 4;
     let size = |w: f64| w.abs().max(1.0);
     if M::Shape::NW <= MAX_UNIT_DIRECTIONS {
         return (0..M::Shape::NW)
@@ -243,7 +246,7 @@ fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
             .collect();
     }
     let mut random = Random::new(11);
-    (0..RANDOM)
+    (0..RANDOM_DIRECTIONS)
         .map(|number| Direction {
             name: format!("random direction {number}"),
             seed: interval.w.iter().map(|&w| random.symmetric() * size(w)).collect(),
@@ -253,7 +256,7 @@ fn directions<M: Dae>(interval: &CheckedInterval) -> Vec<Direction> {
 
 impl Direction {
     /// The derivatives in this direction, and their noise: that of the entries and that of the sum.
-    fn of(&self, matrix: &DMatrix<f64>, noise: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
+    fn directional_derivatives(&self, matrix: &DMatrix<f64>, noise: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
         let n = self.seed.len() as f64;
         let sum = |term: &dyn Fn(usize, f64) -> f64| -> f64 {
             self.seed.iter().enumerate().map(|(j, &d)| term(j, d)).sum()

@@ -14,7 +14,7 @@ pub const INTERVALS: usize = 20;
 const SAMPLE: f64 = 0.08;
 const SAMPLES: usize = 100;
 /// When it is kicked, and how fast that makes the ball turn.
-const KICK: (usize, f64) = (50, 1.0);
+const DISTURBANCE: (usize, f64) = (50, 1.0);
 pub const FORCE: f64 = 15.0;
 pub const RAIL: f64 = 1.0;
 /// Two sides of the force at every stage but the last, of the position at every one but the first.
@@ -135,16 +135,16 @@ fn drive<T: Real>(controller: &mut Controller<T>) -> Result<(), OcpError> {
     let mut x = HANGING.map(number);
     let (mut preparation, mut feedback, mut iterations) = ([u32::MAX, 0], [u32::MAX, 0], [u32::MAX, 0]);
     for sample in 0..SAMPLES {
-        if sample == KICK.0 {
-            x[3] = x[3] + number(KICK.1);
+        if sample == DISTURBANCE.0 {
+            x[3] = x[3] + number(DISTURBANCE.1);
         }
         let (count, prepared) = board::count(|| controller.prepare());
-        note(&mut preparation, count);
+        update_range(&mut preparation, count);
         let prepared = prepared?;
         let (count, result) = board::count(|| prepared.feedback(&x));
-        note(&mut feedback, count);
+        update_range(&mut feedback, count);
         let result = result?;
-        note(&mut iterations, result.statistics.iterations as u32);
+        update_range(&mut iterations, result.statistics.iterations as u32);
         let force = result.u.first().copied().unwrap_or(T::ZERO);
         let integrator = &mut controller.ocp_mut().problem().dynamics;
         let step = integrator.solve(&Vector4::from(x), &Vector1::new(force), number(SAMPLE))?;
@@ -161,6 +161,6 @@ fn drive<T: Real>(controller: &mut Controller<T>) -> Result<(), OcpError> {
 }
 
 /// The least and the most.
-fn note([least, most]: &mut [u32; 2], count: u32) {
+fn update_range([least, most]: &mut [u32; 2], count: u32) {
     (*least, *most) = ((*least).min(count), (*most).max(count));
 }

@@ -28,7 +28,7 @@ const NOISE: f32 = 0.02; // rad, standard deviation of a measurement
 const DRIFT: f32 = 1e-4; // rad/s, of the rate in a sample
 
 /// Noise of that deviation between ±√3 of it (Knuth's linear congruences).
-fn noise(seed: &mut u32) -> f32 {
+fn random_noise(seed: &mut u32) -> f32 {
     *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
     NOISE * 1.732 * ((*seed >> 8) as f32 / 8_388_608.0 - 1.0)
 }
@@ -48,7 +48,7 @@ fn run() -> Result<bool, Error> {
     for sample in 0..SAMPLES {
         let push = vector![if sample < 50 { 2.0 } else { 0.0 }];
         truth = predictor.solve(&truth, &push, SAMPLE)?.x;
-        let measured = truth[0] + noise(&mut seed);
+        let measured = truth[0] + random_noise(&mut seed);
 
         // Predict.
         let step = predictor.forward(&x, &push, SAMPLE)?;

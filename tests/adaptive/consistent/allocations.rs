@@ -9,10 +9,10 @@ use std::cell::Cell;
 thread_local!(static COUNT: Cell<usize> = const { Cell::new(0) });
 
 /// Counts the allocations of each thread.
-struct Counting;
+struct CountingAllocator;
 
 // SAFETY: every call is passed on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get() + 1));
         unsafe { System.alloc(layout) }
@@ -31,7 +31,7 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// The number of allocations in the third call.
 fn third(mut call: impl FnMut()) -> usize {
@@ -57,7 +57,7 @@ fn bounce(x: [f64; 2], _u: f64, p: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn later_calls_allocate_what_results_own() {
+fn allocations_of_later_calls() {
     let (x0, u, p, lambda) = (vector![1.0, 0.0], Vector1::new(0.1), vector![9.81, 0.8], vector![1.0, 0.5]);
     macro_rules! check {
         ($method:ty) => {

@@ -31,7 +31,7 @@ fn floor(x: f64, u: f64) -> f64 {
 /// The last argument of a call is a length, whatever the time at the start is; `dense` takes a
 /// time.
 #[test]
-fn intervals_have_lengths_and_solutions_have_times() {
+fn interval_lengths_and_solution_times() {
     let none = SVector::<f64, 0>::zeros();
     let exact = |t: f64| (0.5 * (t * t - 1.0)).exp();
     let options = AdaptiveOptions { rtol: 1e-10, atol: 1e-10, ..Default::default() };
@@ -88,7 +88,7 @@ fn intervals_have_lengths_and_solutions_have_times() {
 
 /// A length that is lost beside the time would be no interval at all.
 #[test]
-fn lengths_that_the_time_does_not_resolve_are_an_error() {
+fn unresolved_interval_lengths() {
     let mut adaptive = Adaptive::<Growth, Radau>::new(AdaptiveOptions::default()).unwrap();
     adaptive.set_time(1e20).unwrap();
     let error = adaptive.solve(&vector![1.0], &SVector::zeros(), 1.0).unwrap_err();
@@ -105,8 +105,8 @@ fn lengths_that_the_time_does_not_resolve_are_an_error() {
 trait Calls {
     /// One of the four modes, with a control.
     fn call(&mut self, mode: usize, u: f64) -> Result<(), Error>;
-    fn at(&mut self, t: f64) -> Result<casados::result::Dense<Falling>, Error>;
-    fn keep(&mut self, kept: bool) -> Result<(), Error>;
+    fn dense_at(&mut self, t: f64) -> Result<casados::result::Dense<Falling>, Error>;
+    fn freeze(&mut self, kept: bool) -> Result<(), Error>;
 }
 
 macro_rules! calls {
@@ -121,10 +121,10 @@ macro_rules! calls {
                     _ => self.hessian(&x0, $($inputs),*, &lambda).map(|_| ()),
                 }
             }
-            fn at(&mut self, t: f64) -> Result<casados::result::Dense<Falling>, Error> {
+            fn dense_at(&mut self, t: f64) -> Result<casados::result::Dense<Falling>, Error> {
                 self.dense(t).copied()
             }
-            fn keep(&mut self, kept: bool) -> Result<(), Error> {
+            fn freeze(&mut self, kept: bool) -> Result<(), Error> {
                 if kept { self.freeze() } else { Ok(self.thaw()) }
             }
         }
@@ -141,8 +141,8 @@ of_method!(Radau);
 of_method!(DormandPrince5);
 
 /// The state falls below zero with the second of these controls, where the model has no value.
-const GOOD: f64 = 0.5;
-const BAD: f64 = 5.0;
+const VALID_CONTROL: f64 = 0.5;
+const FAILING_CONTROL: f64 = 5.0;
 
 /// After a call that failed, whichever it was and however late it failed, there is nothing to be
 /// asked or frozen; after one that succeeds there is again, and it is that of an integrator that
@@ -151,28 +151,28 @@ fn leaves_no_answers<C: Calls>(make: impl Fn() -> C) {
     let (mut object, mut calm) = (make(), make());
     for mode in 0..4 {
         for frozen in [false, true] {
-            object.call(mode, GOOD).unwrap();
+            object.call(mode, VALID_CONTROL).unwrap();
             if frozen {
-                object.keep(true).unwrap();
+                object.freeze(true).unwrap();
             }
-            object.at(0.2).unwrap();
-            let error = object.call(mode, BAD).unwrap_err();
-            assert_eq!(object.at(0.2), Err(Error::NoResult), "after {error}");
-            assert_eq!(object.keep(true), Err(Error::NoResult), "after {error}");
-            object.keep(false).unwrap();
-            assert_eq!(object.at(0.2), Err(Error::NoResult), "after {error}");
-            object.call(mode, GOOD).unwrap();
-            calm.call(mode, GOOD).unwrap();
-            assert_eq!(object.at(0.2), calm.at(0.2));
+            object.dense_at(0.2).unwrap();
+            let error = object.call(mode, FAILING_CONTROL).unwrap_err();
+            assert_eq!(object.dense_at(0.2), Err(Error::NoResult), "after {error}");
+            assert_eq!(object.freeze(true), Err(Error::NoResult), "after {error}");
+            object.freeze(false).unwrap();
+            assert_eq!(object.dense_at(0.2), Err(Error::NoResult), "after {error}");
+            object.call(mode, VALID_CONTROL).unwrap();
+            calm.call(mode, VALID_CONTROL).unwrap();
+            assert_eq!(object.dense_at(0.2), calm.dense_at(0.2));
         }
     }
     // An argument that is none is a call that failed, too.
     assert!(object.call(0, f64::NAN).is_err());
-    assert_eq!(object.at(0.2), Err(Error::NoResult));
+    assert_eq!(object.dense_at(0.2), Err(Error::NoResult));
 }
 
 #[test]
-fn failed_calls_leave_no_answers() {
+fn results_after_failed_calls() {
     let options = AdaptiveOptions { rtol: 1e-8, atol: 1e-8, ..Default::default() };
     let events = [Event::terminal::<Floor>(Crossing::Rising)];
     macro_rules! all {
@@ -203,7 +203,7 @@ fn up(x: f64, u: f64) -> f64 {
 
 /// A part between two events that has no length in one call has its steps again in the next.
 #[test]
-fn parts_that_vanish_come_back() {
+fn segments_of_no_length() {
     let events = [Event::jump::<Down, Up>(Crossing::Falling)];
     let radau = Adaptive::<Weight, Radau>::new(AdaptiveOptions::default()).unwrap();
     let mut hybrid = Hybrid::new(radau, &events).unwrap();
@@ -301,7 +301,7 @@ fn logarithm(x: [f64; 2], z: f64, u: f64) -> f64 {
 /// Derivatives of dense output are those of the last good call to the last bit, whatever a call
 /// that failed has left.
 #[test]
-fn dense_derivatives_are_those_of_the_last_good_call() {
+fn dense_derivatives_after_failed_calls() {
     let (x0, u, negative) = (vector![0.3, -0.7], vector![0.9], vector![-50.0, -0.2]);
     macro_rules! check {
         ($($method:ty),*) => {$(
@@ -323,7 +323,7 @@ fn dense_derivatives_are_those_of_the_last_good_call() {
 
 /// A tolerance of zero or infinity divides by that.
 #[test]
-fn tolerances_are_numbers_of_the_type() {
+fn tolerances_in_single_precision() {
     type Single = Adaptive<Growth, Radau, f32>;
     for atol in [1e-60, 1e60] {
         let options = AdaptiveOptions { rtol: 1e-4, atol, ..Default::default() };

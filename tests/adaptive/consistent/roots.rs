@@ -64,7 +64,7 @@ fn is_root(root: fn(f64) -> f64, x0: f64, x: f64, z0: f64, z: f64) {
 const X0: f64 = 1.2;
 
 #[test]
-fn integrators_start_at_nominal_values() {
+fn nominal_values_of_integrators() {
     let (x0, none, lambda) = (vector![X0], SVector::<f64, 0>::zeros(), vector![1.0]);
     macro_rules! check {
         ($model:ty, $root:ident, $method:ty) => {
@@ -97,7 +97,7 @@ fn integrators_start_at_nominal_values() {
 }
 
 #[test]
-fn so_do_static_memory_batches_and_lifted_stages() {
+fn nominal_values_of_batches_and_lifted_stages() {
     let (x0, none) = (vector![X0], SVector::<f64, 0>::zeros());
     let options = Options { steps: 8, ..Default::default() };
     let mut inline = Irk::<Larger, RadauIIA<2>, f64, Inline<mode::Nominal, 8>>::inline(options).unwrap();
@@ -126,7 +126,7 @@ fn so_do_static_memory_batches_and_lifted_stages() {
 }
 
 #[test]
-fn so_do_steps_of_variable_size() {
+fn nominal_values_of_adaptive_integrators() {
     let (x0, none) = (vector![X0], SVector::<f64, 0>::zeros());
     let options = AdaptiveOptions { rtol: 1e-10, atol: 1e-12, ..Default::default() };
     let mut radau = Adaptive::<Larger, Radau>::new(options).unwrap();
@@ -162,7 +162,7 @@ fn derivatives_with_several_roots_start_at_their_nominal_values() {
 }
 
 #[test]
-fn later_steps_stay_on_the_branch_of_the_first() {
+fn roots_of_later_steps() {
     macro_rules! check {
         ($($method:ty),*) => {$(
             let options = Options { steps: 25, ..Default::default() };
@@ -250,7 +250,7 @@ fn elsewhere(xdot: f64, x: f64, z: f64) -> [f64; 2] {
 }
 
 #[test]
-fn reports_warn_of_solutions_outside_of_their_ranges() {
+fn warnings_about_ranges() {
     use casados::testing::{Exact, Points, check_derivatives, check_exact, check_sensitivities};
     let (x0, none) = (vector![X0], SVector::<f64, 0>::zeros());
     let mut irk = Irk::<Larger, RadauIIA<2>>::new(Options::default()).unwrap();

@@ -28,7 +28,7 @@ const P: f64 = 0.9;
 
 /// `z = 0.5` is where `p x + u = 0.625`: at `t = ln((x₀ − u/p)/(x* − u/p))/p`.
 #[test]
-fn a_relay_at_a_voltage() {
+fn event_at_an_algebraic_state() {
     let formula = |[x, u, p]: [nalgebra::Complex<f64>; 3]| {
         let at = (-u + 0.625) / p;
         let time = ((x - u / p) / (at - u / p)).ln() / p;
@@ -73,7 +73,7 @@ fn two_volts(_x: f64, z: f64) -> f64 {
 /// `e⁻ᵗ + t² = 2` is solved; its derivatives are not known, since nobody differentiates the model
 /// by the time.
 #[test]
-fn equations_that_depend_on_the_time() {
+fn event_functions_of_time() {
     let event = Event::terminal::<TwoVolts>(Crossing::Rising);
     let mut hybrid = Hybrid::new(Adaptive::<Rising, Radau>::new(options(1e-10)).unwrap(), &[event]).unwrap();
     let solution = hybrid.solve(&Vector1::new(1.0), &vector![], 3.0).unwrap();

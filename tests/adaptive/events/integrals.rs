@@ -14,7 +14,7 @@ fn speed(x: [f64; 2], _p: [f64; 2]) -> f64 {
 }
 
 /// The parts between bounces: height and velocity at the start of each, and its start and end.
-fn parts(w: [Complex<f64>; 4], n: usize, t: f64) -> Vec<[Complex<f64>; 4]> {
+fn bounce_segments(w: [Complex<f64>; 4], n: usize, t: f64) -> Vec<[Complex<f64>; 4]> {
     let [height, velocity, gravity, restitution] = w;
     let (mut times, _) = bouncing(w, n, t);
     times.push(Complex::new(t, 0.0));
@@ -30,7 +30,7 @@ fn parts(w: [Complex<f64>; 4], n: usize, t: f64) -> Vec<[Complex<f64>; 4]> {
 /// The integrals of `energies`.
 fn integrals(w: [Complex<f64>; 4], n: usize, t: f64) -> [Complex<f64>; 2] {
     let g = w[2];
-    parts(w, n, t).into_iter().fold([Complex::new(0.0, 0.0); 2], |[a, b], [h, v, start, end]| {
+    bounce_segments(w, n, t).into_iter().fold([Complex::new(0.0, 0.0); 2], |[a, b], [h, v, start, end]| {
         let d = end - start;
         let height = h * d + v * d * d * 0.5 - g * d * d * d / 6.0;
         [a + g * height, b + v * v * d - v * g * d * d + g * g * d * d * d / 3.0]
@@ -42,7 +42,7 @@ fn squares(w: [f64; 4], n: usize, t: f64) -> [[f64; 4]; 4] {
     let mut h = [[0.0; 4]; 4];
     for k in 0..=n {
         // v = v_a − g (t − t_a)
-        let (part, slopes) = differentiate(w, |w| parts(w, n, t)[k]);
+        let (part, slopes) = differentiate(w, |w| bounce_segments(w, n, t)[k]);
         let a: [f64; 4] = core::array::from_fn(|i| slopes[1][i] + w[2] * slopes[2][i]);
         let (b, d) = ([0.0, 0.0, -1.0, 0.0], part[3] - part[2]);
         for i in 0..4 {
@@ -118,12 +118,12 @@ fn integrals_over_a_bouncing_ball() {
 
 /// Up to where the ball lands, the kinetic energy: the gradient has the upper limit.
 #[test]
-fn an_integral_up_to_an_event() {
+fn integrals_up_to_an_event() {
     let event = Event::terminal::<Height>(Crossing::Falling);
     let mut hybrid = Hybrid::new(Adaptive::<Ball, Radau>::new(options(1e-8)).unwrap(), &[event]).unwrap();
     hybrid.integrator().set_parameters(&vector![9.81, 0.8]).unwrap();
     let (value, derivative) = differentiate([1.3, 0.4, 9.81, 0.8], |w| {
-        let [h, v, start, end] = parts(w, 1, 9.0)[0];
+        let [h, v, start, end] = bounce_segments(w, 1, 9.0)[0];
         let (d, g) = (end - start, w[2]);
         [v * v * d - v * g * d * d + g * g * d * d * d / 3.0 + h * 0.0]
     });

@@ -188,7 +188,7 @@ fn refill(x: f64, _z: f64, u: f64, p: f64, t: f64) -> f64 {
 }
 
 /// The flow of `decay` over a time `s`.
-fn flow(x: Complex<f64>, u: Complex<f64>, p: Complex<f64>, s: Complex<f64>) -> Complex<f64> {
+fn exact_flow(x: Complex<f64>, u: Complex<f64>, p: Complex<f64>, s: Complex<f64>) -> Complex<f64> {
     u / p + (x - u / p) * (-p * s).exp()
 }
 
@@ -234,7 +234,7 @@ fn a_terminal_event() {
 /// Two events: at `t = p/2` and where the level is reached the state jumps, in ways that depend on
 /// everything.
 #[test]
-fn several_events_that_depend_on_everything() {
+fn events_of_all_arguments() {
     let events =
         [Event::jump::<Level, Refill>(Crossing::Falling), Event::jump::<Clock, Refill>(Crossing::Any)];
     let (x0, u, p) = (Vector1::new(X0), Vector1::new(0.05), Vector1::new(P));
@@ -242,11 +242,11 @@ fn several_events_that_depend_on_everything() {
     let formula = |[x, u, p]: [Complex<f64>; 3]| {
         let refill = |x: Complex<f64>, t: Complex<f64>| x * x * 0.5 + t * 0.3 + p * u + 1.0;
         let first = p * 0.5;
-        let x = refill(flow(x, u, p, first), first);
+        let x = refill(exact_flow(x, u, p, first), first);
         let c = p * 0.1 + u * 0.5;
         let second = first + ((x - u / p) / (c - u / p)).ln() / p;
         let x = refill(c, second);
-        [flow(x, u, p, Complex::new(t_end, 0.0) - second), first, second]
+        [exact_flow(x, u, p, Complex::new(t_end, 0.0) - second), first, second]
     };
     let (value, derivative) = differentiate([X0, u[0], P], formula);
     let mut hybrid = Hybrid::new(Adaptive::<Decay, Radau>::new(options(1e-11)).unwrap(), &events).unwrap();
@@ -281,7 +281,7 @@ fn same(x: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn starts_on_the_level_and_both_directions() {
+fn crossings_in_both_directions() {
     use core::f64::consts::PI;
     let count = |crossing: Crossing, t_end: f64| {
         let event = Event::jump::<First, Same>(crossing);
@@ -322,7 +322,7 @@ fn root(x: f64) -> f64 {
 }
 
 #[test]
-fn touching_and_undefined_functions() {
+fn grazing_and_undefined_functions() {
     let event = Event::terminal::<Cube>(Crossing::Rising);
     let mut hybrid = Hybrid::new(Adaptive::<Line, Radau>::new(options(1e-8)).unwrap(), &[event]).unwrap();
     // Newton's method on a cube gains a third with each of twenty iterations, after a millionth of

@@ -57,7 +57,7 @@ macro_rules! second_over_bounces {
 }
 
 #[test]
-fn second_derivatives_over_a_bouncing_ball() {
+fn hessian_of_a_bouncing_ball() {
     second_over_bounces!(Radau);
     second_over_bounces!(Gauss<2>);
     second_over_bounces!(DormandPrince5);
@@ -92,7 +92,7 @@ fn equations_in_any_order() {
 
 /// Where it lands: the velocity `−√(v² + 2gh)`.
 #[test]
-fn second_derivatives_up_to_an_event() {
+fn hessian_up_to_an_event() {
     let event = Event::terminal::<Height>(Crossing::Falling);
     let mut hybrid = Hybrid::new(Adaptive::<Ball, Radau>::new(options(1e-8)).unwrap(), &[event]).unwrap();
     hybrid.integrator().set_parameters(&vector![9.81, 0.8]).unwrap();
@@ -152,7 +152,7 @@ fn gradient(hybrid: &mut Hybrid<Pushed, Radau, f64>, w: [f64; 5]) -> [f64; 6] {
 /// Against differences of the gradient of order eight. Their errors are those of gradients, 1e-11
 /// times the condition of two events over `h = 5e-3`, and a ninth derivative times `h⁸/630`.
 #[test]
-fn second_derivatives_over_events_that_depend_on_everything() {
+fn hessian_over_events_of_all_arguments() {
     let mut hybrid = between_walls(AdaptiveOptions { rtol: 1e-12, atol: 1e-13, ..Default::default() });
     hybrid.integrator().set_parameters(&vector![W[3], W[4]]).unwrap();
     let found = hybrid.hessian(&vector![W[0], W[1]], &vector![W[2]], END, &vector![0.7, -1.2]).unwrap();
@@ -176,7 +176,7 @@ fn second_derivatives_over_events_that_depend_on_everything() {
 
 /// Nothing has second derivatives by the time.
 #[test]
-fn second_derivatives_need_autonomous_events() {
+fn hessian_of_nonautonomous_events() {
     let (x0, u, p) = (Vector1::new(X0), Vector1::new(0.05), Vector1::new(P));
     let events = [Event::jump::<Clock, Refill>(Crossing::Any), Event::terminal::<Level>(Crossing::Falling)];
     for (list, function) in [(&events[..], Some("Clock")), (&events[1..], None)] {
@@ -190,7 +190,7 @@ fn second_derivatives_need_autonomous_events() {
 /// Steps and events that are kept: polynomials are exact whatever the steps are, and the times of
 /// events move as they should.
 #[test]
-fn frozen_bounces() {
+fn frozen_events_of_a_bouncing_ball() {
     let event = Event::jump::<Height, Bounce>(Crossing::Falling);
     let mut hybrid = Hybrid::new(Adaptive::<Ball, Radau>::new(options(1e-8)).unwrap(), &[event]).unwrap();
     let (u, n, t_end) = (vector![], 2, 1.7);
@@ -231,7 +231,7 @@ fn frozen_bounces() {
 /// What is frozen is smooth at a coarse tolerance too: differences over different steps agree to
 /// rounding, `ε/h` and `h⁸`, and gradients are theirs up to the errors of the steps.
 #[test]
-fn frozen_events_are_smooth() {
+fn smoothness_of_frozen_events() {
     let tolerance = 1e-4;
     let mut hybrid = between_walls(options(tolerance));
     gradient(&mut hybrid, W);

@@ -79,7 +79,7 @@ macro_rules! all_happen {
 }
 
 #[test]
-fn events_at_one_time_all_happen() {
+fn simultaneous_events() {
     all_happen!(Radau);
     all_happen!(DormandPrince5);
     all_happen!(Gauss<3>);
@@ -87,7 +87,7 @@ fn events_at_one_time_all_happen() {
 
 /// Within one step, and nearer to each other than a bisection tells apart.
 #[test]
-fn events_close_to_each_other_happen_in_the_order_of_time() {
+fn events_in_order_of_time() {
     for gap in [1e-3, 1e-6, 1e-9, 1e-12] {
         let mut hybrid = clocks!(Radau, &[FIRST(), SECOND()]);
         let solution = hybrid.solve(&vector![1.0 + gap, 1.0], &vector![], 1.5).unwrap();
@@ -99,7 +99,7 @@ fn events_close_to_each_other_happen_in_the_order_of_time() {
 }
 
 #[test]
-fn the_order_of_the_list_decides() {
+fn order_of_simultaneous_events() {
     let end = || Event::terminal::<SecondClock>(Crossing::Falling);
     let (x0, u) = (vector![1.0, 1.0], vector![]);
     // Behind a jump: this happens before.
@@ -117,7 +117,7 @@ fn the_order_of_the_list_decides() {
 
 /// A jump that takes another function from zero, or from one side of it to the other: no crossing.
 #[test]
-fn jumps_over_other_functions_are_no_crossings() {
+fn sign_changes_by_jumps() {
     let jump = Event::jump::<FirstClock, WindFirstAndTurnBackSecond>(Crossing::Falling);
     for second in [1.0, 1.125] {
         let mut hybrid = clocks!(Radau, &[jump, SECOND()]);
@@ -131,7 +131,7 @@ fn jumps_over_other_functions_are_no_crossings() {
 }
 
 #[test]
-fn zero_at_the_start_is_no_crossing() {
+fn event_functions_that_start_at_zero() {
     let mut hybrid = clocks!(Radau, &[FIRST(), Event::terminal::<SecondClock>(Crossing::Falling)]);
     let solution = hybrid.solve(&vector![0.0, 0.0], &vector![], 0.5).unwrap();
     assert!(solution.occurrences.is_empty());
@@ -140,7 +140,7 @@ fn zero_at_the_start_is_no_crossing() {
 
 /// Frozen, they happen as long as it is at one time.
 #[test]
-fn frozen_events_at_one_time() {
+fn frozen_simultaneous_events() {
     let mut hybrid = clocks!(Radau, &[FIRST(), SECOND()]);
     let u = vector![];
     hybrid.solve(&vector![1.0, 1.0], &u, 1.5).unwrap();
@@ -168,7 +168,7 @@ fn rebound(x: [f64; 2]) -> [f64; 2] {
 
 /// The steps of a call are counted over all events.
 #[test]
-fn most_steps_are_those_of_a_call() {
+fn max_steps_over_all_events() {
     let event = Event::jump::<Floor, Rebound>(Crossing::Falling);
     let options = AdaptiveOptions { max_steps: 40, max_step: 0.1, ..options(1e-8) };
     let mut hybrid = Hybrid::new(Adaptive::<Fall, Radau>::new(options).unwrap(), &[event]).unwrap();

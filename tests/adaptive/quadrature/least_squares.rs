@@ -7,7 +7,7 @@ fn residuals(x: f64, u: f64, p: f64) -> [f64; 2] {
     [x - 0.3, 0.5 * u + p]
 }
 
-const T: f64 = 1.3;
+const DURATION: f64 = 1.3;
 
 /// With `u = 0`, `x = x₀ e^{−pt}` and `r = (x − 0.3, p)`:
 ///
@@ -15,20 +15,20 @@ const T: f64 = 1.3;
 /// ∫ r₀ r₀ = x₀² e₂ − 0.6 x₀ e₁ + 0.09 T        e_k = (1 − e^{−kpT})/(kp)
 /// dr₀/dx₀ = e^{−pt}, dr₀/du = (1 − e^{−pt})/p, dr₀/dp = −t x₀ e^{−pt}
 /// ```
-struct Exact {
+struct ExactLeastSquares {
     value: f64,
     grad: [f64; 3],
     hessian: [[f64; 3]; 3],
 }
 
-fn exact_least_squares(x0: f64, p: f64, w: [[f64; 2]; 2]) -> Exact {
+fn exact_least_squares(x0: f64, p: f64, w: [[f64; 2]; 2]) -> ExactLeastSquares {
     let n = 400;
-    let mut exact = Exact { value: 0.0, grad: [0.0; 3], hessian: [[0.0; 3]; 3] };
+    let mut exact = ExactLeastSquares { value: 0.0, grad: [0.0; 3], hessian: [[0.0; 3]; 3] };
     // Boole's rule on 400 pieces of length 0.003: an error of (0.003)^6.
     let boole = [7.0, 32.0, 12.0, 32.0, 7.0];
     for piece in 0..n {
         for (node, weight) in boole.iter().enumerate() {
-            let h = T / f64::from(n);
+            let h = DURATION / f64::from(n);
             let t = h * (f64::from(piece) + node as f64 / 4.0);
             let weight = weight * h / 90.0;
             let e = (-p * t).exp();
@@ -50,7 +50,7 @@ fn exact_least_squares(x0: f64, p: f64, w: [[f64; 2]; 2]) -> Exact {
     exact
 }
 
-fn assert_least_squares(found: &LeastSquares<Residuals>, exact: &Exact, tolerance: f64) {
+fn assert_least_squares(found: &LeastSquares<Residuals>, exact: &ExactLeastSquares, tolerance: f64) {
     assert_close([found.value], [exact.value], tolerance);
     assert_close([found.grad_x0[0], found.grad_u[0], found.grad_p[0]], exact.grad, tolerance);
     assert_close(
@@ -68,7 +68,7 @@ fn assert_least_squares(found: &LeastSquares<Residuals>, exact: &Exact, toleranc
 }
 
 #[test]
-fn least_squares_against_the_closed_form() {
+fn closed_form_of_least_squares() {
     let (x0, u, p) = (vector![1.4], vector![0.0], vector![0.9]);
     let w = [[2.0, 0.5], [0.5, 3.0]];
     let weights = matrix![2.0, 0.5; 0.5, 3.0];
@@ -77,26 +77,26 @@ fn least_squares_against_the_closed_form() {
     let mut fit = LeastSquares::<Residuals>::new(&weights);
     let mut irk = Irk::<Decay, Gauss<4>>::new(Options { steps: 6, ..Default::default() }).unwrap();
     irk.set_parameters(&p).unwrap();
-    irk.with(&mut fit).forward(&x0, &u, T).unwrap();
+    irk.with(&mut fit).forward(&x0, &u, DURATION).unwrap();
     // Order eight with steps of 0.2: 1e-12.
     assert_least_squares(&fit, &exact, 1e-11);
 
     let mut fit = LeastSquares::<Residuals>::new(&weights);
     let mut erk = Erk::<Decay, DormandPrince8>::new(Options { steps: 12, ..Default::default() }).unwrap();
     erk.set_parameters(&p).unwrap();
-    erk.with(&mut fit).forward(&x0, &u, T).unwrap();
+    erk.with(&mut fit).forward(&x0, &u, DURATION).unwrap();
     assert_least_squares(&fit, &exact, 1e-11);
 
     let options = AdaptiveOptions { rtol: 1e-11, atol: 1e-12, ..Default::default() };
     let mut fit = LeastSquares::<Residuals>::new(&weights);
     let mut radau = Adaptive::<Decay, Radau>::new(options).unwrap();
     radau.set_parameters(&p).unwrap();
-    radau.with(&mut fit).forward(&x0, &u, T).unwrap();
+    radau.with(&mut fit).forward(&x0, &u, DURATION).unwrap();
     assert_least_squares(&fit, &exact, 1e-9);
     let mut fit = LeastSquares::<Residuals>::new(&weights);
     let mut pair = Adaptive::<Decay, DormandPrince8>::new(options).unwrap();
     pair.set_parameters(&p).unwrap();
-    pair.with(&mut fit).forward(&x0, &u, T).unwrap();
+    pair.with(&mut fit).forward(&x0, &u, DURATION).unwrap();
     assert_least_squares(&fit, &exact, 1e-9);
 }
 
@@ -112,7 +112,7 @@ fn tracking(x: [f64; 2], u: f64) -> [f64; 3] {
 }
 
 #[test]
-fn gauss_newton_is_exact_where_nothing_is_curved() {
+fn gauss_newton_of_linear_problems() {
     let weights = matrix![2.0, 0.5, 0.0; 0.5, 3.0, -0.1; 0.0, -0.1, 1.0];
     let (x0, u, zero) = (vector![0.4, -0.2], vector![0.7], vector![0.0, 0.0]);
     let mut fit = LeastSquares::<Tracking>::new(&weights);
@@ -193,7 +193,7 @@ fn deviation(x: f64, u: f64, _p: f64) -> [f64; 2] {
 /// Where nothing is curved, the matrix of Gauss and Newton is the Hessian: to rounding, of sums of
 /// a few dozen terms. The product `p x` is curved, so that only `x₀` and the controls count.
 #[test]
-fn gauss_newton_over_piecewise_constant_controls() {
+fn gauss_newton_matrix_over_piecewise_constant_controls() {
     let mut fit = LeastSquares::<Deviation>::new(&matrix![1.0, 0.1; 0.1, 0.4]);
     let mut horizon = Piecewise::new(Adaptive::<Decay, Radau>::new(AdaptiveOptions::default()).unwrap());
     horizon.integrator().set_parameters(&vector![0.7]).unwrap();

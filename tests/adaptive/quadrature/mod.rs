@@ -137,35 +137,35 @@ macro_rules! same_as_states {
 }
 
 /// Newton's method until nothing changes: both models are at the same point.
-fn exact(steps: usize) -> Options {
+fn exact_newton_options(steps: usize) -> Options {
     Options { steps, ..Default::default() }
 }
 
 #[test]
-fn the_same_as_states_of_the_model() {
+fn integrals_as_states() {
     same_as_states!(
-        Irk::<Swing, Gauss<3>>::new(exact(4)).unwrap(),
-        Irk::<WithStates, Gauss<3>>::new(exact(4)).unwrap(),
+        Irk::<Swing, Gauss<3>>::new(exact_newton_options(4)).unwrap(),
+        Irk::<WithStates, Gauss<3>>::new(exact_newton_options(4)).unwrap(),
         Outputs
     );
     same_as_states!(
-        Irk::<Swing, RadauIIA<2>>::new(exact(5)).unwrap(),
-        Irk::<WithStates, RadauIIA<2>>::new(exact(5)).unwrap(),
+        Irk::<Swing, RadauIIA<2>>::new(exact_newton_options(5)).unwrap(),
+        Irk::<WithStates, RadauIIA<2>>::new(exact_newton_options(5)).unwrap(),
         Outputs
     );
     same_as_states!(
-        Irk::<Swing, Gauss<1>>::new(exact(1)).unwrap(),
-        Irk::<WithStates, Gauss<1>>::new(exact(1)).unwrap(),
+        Irk::<Swing, Gauss<1>>::new(exact_newton_options(1)).unwrap(),
+        Irk::<WithStates, Gauss<1>>::new(exact_newton_options(1)).unwrap(),
         Outputs
     );
     same_as_states!(
-        Irk::<Explicit, Gauss<2>>::new(exact(3)).unwrap(),
-        Irk::<ExplicitWithStates, Gauss<2>>::new(exact(3)).unwrap(),
+        Irk::<Explicit, Gauss<2>>::new(exact_newton_options(3)).unwrap(),
+        Irk::<ExplicitWithStates, Gauss<2>>::new(exact_newton_options(3)).unwrap(),
         ExplicitOutputs
     );
     same_as_states!(
-        Erk::<Explicit, Rk4>::new(exact(3)).unwrap(),
-        Erk::<ExplicitWithStates, Rk4>::new(exact(3)).unwrap(),
+        Erk::<Explicit, Rk4>::new(exact_newton_options(3)).unwrap(),
+        Erk::<ExplicitWithStates, Rk4>::new(exact_newton_options(3)).unwrap(),
         ExplicitOutputs
     );
 }
@@ -275,7 +275,7 @@ fn logarithm(x: f64, _u: f64, _p: f64) -> [f64; 2] {
 }
 
 #[test]
-fn values_that_are_not_finite_are_errors() {
+fn integrands_that_are_not_finite() {
     let mut integral = Quadrature::<Logarithm>::new();
     let (x0, u, p) = (vector![1.0], vector![0.0], vector![1.0]);
     let check = |error: Error| {

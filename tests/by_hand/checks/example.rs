@@ -13,16 +13,16 @@ pub const JACOBIAN_SIGN: u8 = 1;
 pub const ADJOINT_LAST_DIGITS: u8 = 2;
 pub const HESSIAN_TERM: u8 = 3;
 pub const HESSIAN_PATTERN: u8 = 4;
-pub const CONSTANT_FORGOTTEN: u8 = 5;
-pub const LINEAR_DECLARED: u8 = 6;
-pub const CONSTANT_DECLARED: u8 = 7;
-pub const DIRECTION_LEFT_OUT: u8 = 8;
-pub const CURVED_LEFT_OUT: u8 = 9;
-pub const QUADRATURE_DECLARED: u8 = 10;
-pub const TRIVIAL_DECLARED: u8 = 11;
-pub const STRAIGHT_DECLARED: u8 = 12;
-pub const MATRIX_DECLARED: u8 = 13;
-pub const TIME_FORGOTTEN: u8 = 14;
+pub const CONSTANT_NOT_WRITTEN: u8 = 5;
+pub const FALSELY_LINEAR: u8 = 6;
+pub const FALSELY_CONSTANT: u8 = 7;
+pub const DIRECTION_MISSING: u8 = 8;
+pub const NONLINEAR_VARIABLE_MISSING: u8 = 9;
+pub const FALSE_QUADRATURE: u8 = 10;
+pub const FALSELY_TRIVIAL: u8 = 11;
+pub const FALSELY_LINEAR_IN_STATE: u8 = 12;
+pub const FALSELY_CONSTANT_MATRIX: u8 = 13;
+pub const FALSELY_AUTONOMOUS: u8 = 14;
 
 fn residual<S: Scalar>(v: &[S], f: &mut [S]) {
     f[0] = v[0] - v[3] * v[1].sin() - v[2];
@@ -63,16 +63,16 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
             // The pattern with a fault has (2, 2) in place of (2, 1).
             columns: if FAULT == HESSIAN_PATTERN { &[1, 2, 1] } else { &[1, 1, 1] },
         },
-        linear: if FAULT == LINEAR_DECLARED { &[false, true] } else { &[false, false] },
-        linear_in_state: FAULT == STRAIGHT_DECLARED,
-        constant_matrix: FAULT == MATRIX_DECLARED,
-        autonomous: FAULT == TIME_FORGOTTEN,
-        constant_rows: if FAULT == CONSTANT_DECLARED { &[false, true] } else { &[false, false] },
-        trivial: if FAULT == TRIVIAL_DECLARED { &[0] } else { &[] },
-        quadratures: if FAULT == QUADRATURE_DECLARED { &[0] } else { &[] },
-        directions: if FAULT == DIRECTION_LEFT_OUT { &[0, 1] } else { &[0, 1, 2] },
+        linear: if FAULT == FALSELY_LINEAR { &[false, true] } else { &[false, false] },
+        linear_in_state: FAULT == FALSELY_LINEAR_IN_STATE,
+        constant_matrix: FAULT == FALSELY_CONSTANT_MATRIX,
+        autonomous: FAULT == FALSELY_AUTONOMOUS,
+        constant_rows: if FAULT == FALSELY_CONSTANT { &[false, true] } else { &[false, false] },
+        trivial: if FAULT == FALSELY_TRIVIAL { &[0] } else { &[] },
+        quadratures: if FAULT == FALSE_QUADRATURE { &[0] } else { &[] },
+        directions: if FAULT == DIRECTION_MISSING { &[0, 1] } else { &[0, 1, 2] },
         column_of_direction: &[0, 1, 2],
-        curved: if FAULT == CURVED_LEFT_OUT { &[1, 3] } else { &[1, 2, 3] },
+        curved: if FAULT == NONLINEAR_VARIABLE_MISSING { &[1, 3] } else { &[1, 2, 3] },
         symmetric: &const { symmetric::<3, 5>(&Pattern { rows: &[1, 2, 3], columns: &[1, 1, 1] }, &[1, 2, 3]) },
         diagonal_controls: &[],
         operations: NONE,
@@ -85,7 +85,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
         let f = &mut values;
         residual(v, f);
-        if FAULT == TIME_FORGOTTEN {
+        if FAULT == FALSELY_AUTONOMOUS {
             f[0] = f[0] - v[5];
         }
         cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
@@ -95,7 +95,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         let jacobian = &mut values;
         jacobian[0] = S::from_f64(1.0);
         jacobian[3] = S::from_f64(-1.0);
-        if FAULT != CONSTANT_FORGOTTEN {
+        if FAULT != CONSTANT_NOT_WRITTEN {
             jacobian[6] = S::from_f64(-1.0);
         }
         cells.iter_mut().zip(jacobian).for_each(|(cell, value)| value.store(cell));

@@ -15,19 +15,19 @@ type Along<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 
 /// An integrator whose answers are those of `x = x₀ e^{uh} + p x₀²`, `z = p x₀`, `z₀ = u x₀`, with
 /// a fault on request.
-struct Closed<const FAULT: u8> {
+struct ClosedFormIntegrator<const FAULT: u8> {
     p: f64,
     calls: f64,
     result: Hessian<Example<NO_FAULT>>,
     adjoint: Adjoint<Example<NO_FAULT>>,
 }
 
-const GRADIENT: u8 = 1;
-const SECOND: u8 = 3;
-const FORWARD: u8 = 4;
-const REPEATED: u8 = 5;
+const GRADIENT_FAULT: u8 = 1;
+const HESSIAN_FAULT: u8 = 3;
+const FORWARD_FAULT: u8 = 4;
+const REPEATED_CALL_FAULT: u8 = 5;
 
-impl<const FAULT: u8> Closed<FAULT> {
+impl<const FAULT: u8> ClosedFormIntegrator<FAULT> {
     fn new() -> Self {
         let (result, adjoint) = (bytemuck::Zeroable::zeroed(), bytemuck::Zeroable::zeroed());
         Self { p: f64::NAN, calls: 0.0, result, adjoint }
@@ -45,9 +45,9 @@ impl<const FAULT: u8> Closed<FAULT> {
         (r.h_uu[0], r.h_up[0], r.h_pp[0]) = (lambda * h * h * x0 * e, 0.0, 0.0);
         let f = &mut r.first.forward;
         match FAULT {
-            FORWARD => f.dz0_du[0] *= 1.0 + 1e-12,
-            SECOND => r.h_xu[0] *= 1.0 + 1e-8,
-            REPEATED => {
+            FORWARD_FAULT => f.dz0_du[0] *= 1.0 + 1e-12,
+            HESSIAN_FAULT => r.h_xu[0] *= 1.0 + 1e-8,
+            REPEATED_CALL_FAULT => {
                 self.calls += 1.0;
                 f.nominal.x[0] *= 1.0 + f64::EPSILON * self.calls;
             }
@@ -55,13 +55,13 @@ impl<const FAULT: u8> Closed<FAULT> {
         }
         let (x, u, p) = (f.dx_dx0[0], f.dx_du[0], f.dx_dp[0]);
         (r.first.grad_x0[0], r.first.grad_u[0], r.first.grad_p[0]) = (lambda * x, lambda * u, lambda * p);
-        if FAULT == GRADIENT {
+        if FAULT == GRADIENT_FAULT {
             r.first.grad_u[0] *= 1.0 + 1e-12;
         }
     }
 }
 
-impl<const FAULT: u8> Integrator for Closed<FAULT> {
+impl<const FAULT: u8> Integrator for ClosedFormIntegrator<FAULT> {
     type Model = Example<NO_FAULT>;
     type Number = f64;
     type Memory = Heap;
@@ -127,12 +127,18 @@ impl<const FAULT: u8> Integrator for Closed<FAULT> {
 
 fn sensitivities<const FAULT: u8>() -> Report {
     let v = SVector::<f64, 1>::new;
-    check_sensitivities::<Example<NO_FAULT>, _>(&mut Closed::<FAULT>::new(), &v(0.7), &v(-1.2), &v(0.4), 0.3)
-        .expect("a closed form does not fail")
+    check_sensitivities::<Example<NO_FAULT>, _>(
+        &mut ClosedFormIntegrator::<FAULT>::new(),
+        &v(0.7),
+        &v(-1.2),
+        &v(0.4),
+        0.3,
+    )
+    .expect("a closed form does not fail")
 }
 
 #[test]
-fn right_sensitivities_pass_and_wrong_ones_are_named() {
+fn faults_of_sensitivities() {
     let report = sensitivities::<NO_FAULT>();
     report.assert();
     for row in &report.rows {
@@ -144,10 +150,10 @@ fn right_sensitivities_pass_and_wrong_ones_are_named() {
             "{report}"
         );
     };
-    found(sensitivities::<GRADIENT>(), "adjoint", "by torque");
-    found(sensitivities::<SECOND>(), "Hessian", "by angle at the start and torque");
-    found(sensitivities::<FORWARD>(), "forward", "force at the start by torque");
-    found(sensitivities::<REPEATED>(), "solve", "element 0");
+    found(sensitivities::<GRADIENT_FAULT>(), "adjoint", "by torque");
+    found(sensitivities::<HESSIAN_FAULT>(), "Hessian", "by angle at the start and torque");
+    found(sensitivities::<FORWARD_FAULT>(), "forward", "force at the start by torque");
+    found(sensitivities::<REPEATED_CALL_FAULT>(), "solve", "element 0");
 }
 
 #[test]
@@ -165,7 +171,8 @@ fn exact_solution() {
         ]],
     };
     let run = |exact: &Exact| {
-        let (mut coarse, mut fine) = (Closed::<NO_FAULT>::new(), Closed::<NO_FAULT>::new());
+        let (mut coarse, mut fine) =
+            (ClosedFormIntegrator::<NO_FAULT>::new(), ClosedFormIntegrator::<NO_FAULT>::new());
         check_exact::<Example<NO_FAULT>, _>(&mut coarse, &mut fine, &v(x0), &v(u), &v(p), h, exact)
             .expect("a closed form does not fail")
     };
@@ -340,7 +347,7 @@ mod logistic {
     /// Stages that are given as the solution of one call are none of the next, if the first is
     /// refused: its results are those of an integrator that never had them.
     #[test]
-    fn a_refused_call_uses_up_its_solution() {
+    fn stages_given_to_refused_calls() {
         let v = SVector::<f64, 1>::new;
         let [x0, u, p] = AT.map(v);
         let none = v(f64::NAN);

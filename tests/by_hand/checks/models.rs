@@ -8,7 +8,7 @@ fn check<const FAULT: u8>() -> Report {
 }
 
 #[test]
-fn right_model_passes() {
+fn correct_model() {
     check::<NO_FAULT>().assert();
     check_pattern::<Example<NO_FAULT>>(&Points::random(5)).assert();
     let report = check::<NO_FAULT>();
@@ -20,7 +20,7 @@ fn right_model_passes() {
 }
 
 #[test]
-fn faults_are_found_and_named() {
+fn faults_of_models() {
     let found = |report: Report, quantity: &str, entry: &str| {
         assert!(!report.passed(), "{report}");
         assert!(
@@ -33,31 +33,31 @@ fn faults_are_found_and_named() {
     found(check::<ADJOINT_LAST_DIGITS>(), "adjoint", "by torque");
     found(check::<HESSIAN_TERM>(), "Hessian", "by angle and angle");
     found(check::<HESSIAN_PATTERN>(), "Hessian", "by force and angle");
-    found(check::<CONSTANT_FORGOTTEN>(), "Jacobian", "of equation 1 by level");
-    found(check::<LINEAR_DECLARED>(), "Hessian, linear rows", "of equation 1 by angle and angle");
+    found(check::<CONSTANT_NOT_WRITTEN>(), "Jacobian", "of equation 1 by level");
+    found(check::<FALSELY_LINEAR>(), "Hessian, linear rows", "of equation 1 by angle and angle");
     let pattern = check_pattern::<Example<HESSIAN_PATTERN>>(&Points::random(5));
     found(pattern, "Hessian outside", "by force and angle");
 }
 
 #[test]
-fn false_facts_are_found() {
-    fn found<const FAULT: u8>(quantity: &str) {
+fn false_declarations() {
+    fn faults_found<const FAULT: u8>(quantity: &str) {
         let report = check_pattern::<Example<FAULT>>(&Points::random(5));
         let wrong: Vec<_> = report.rows.iter().filter(|row| row.wrong > 0).map(|row| row.quantity).collect();
         assert_eq!(wrong, [quantity], "{report}");
     }
-    found::<CONSTANT_DECLARED>("constant rows");
-    found::<DIRECTION_LEFT_OUT>("directions");
-    found::<CURVED_LEFT_OUT>("curved variables");
-    found::<QUADRATURE_DECLARED>("quadratures");
-    found::<TRIVIAL_DECLARED>("trivial equations");
-    found::<STRAIGHT_DECLARED>("linear in the state");
-    found::<MATRIX_DECLARED>("constant matrix");
-    found::<TIME_FORGOTTEN>("autonomous");
+    faults_found::<FALSELY_CONSTANT>("constant rows");
+    faults_found::<DIRECTION_MISSING>("directions");
+    faults_found::<NONLINEAR_VARIABLE_MISSING>("curved variables");
+    faults_found::<FALSE_QUADRATURE>("quadratures");
+    faults_found::<FALSELY_TRIVIAL>("trivial equations");
+    faults_found::<FALSELY_LINEAR_IN_STATE>("linear in the state");
+    faults_found::<FALSELY_CONSTANT_MATRIX>("constant matrix");
+    faults_found::<FALSELY_AUTONOMOUS>("autonomous");
 }
 
 #[test]
-fn points_outside_of_the_domain_do_not_pass() {
+fn points_outside_of_the_domain() {
     let report = check_derivatives::<Example<NO_FAULT>>(&Points::random(3).all(1e4..=1e5));
     assert!(!report.passed(), "{report}");
 }
@@ -65,7 +65,7 @@ fn points_outside_of_the_domain_do_not_pass() {
 /// The next block of variables is not what is meant.
 #[test]
 #[should_panic = "there is no x[1]: `example` has 1 of them"]
-fn ranges_of_states_that_are_not_there() {
+fn ranges_of_missing_states() {
     let _ = Points::<Example<NO_FAULT>>::random(1).x(1, 0.0..=1.0);
 }
 
@@ -77,7 +77,7 @@ fn ranges_of_absurd_indices() {
 
 /// Nobody holds all points at once.
 #[test]
-fn points_are_drawn_one_by_one() {
+fn lazily_drawn_points() {
     let some: Vec<_> = Points::<Example<NO_FAULT>>::random(usize::MAX).iter().take(3).collect();
     let same: Vec<_> = Points::<Example<NO_FAULT>>::random(3).iter().collect();
     assert_eq!(some, same);

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use num_dual::{Dual2_64, Dual64, HyperDual64};
 
 /// Every function, over the scalar of the caller.
-fn functions<S: Scalar>(a: S, b: S) -> Vec<(&'static str, S)> {
+fn all_functions<S: Scalar>(a: S, b: S) -> Vec<(&'static str, S)> {
     let one = S::from_f64(1.0);
     let third = S::from_f64(1.0 / 3.0);
     vec![
@@ -64,17 +64,17 @@ fn arguments() -> impl Iterator<Item = (f64, f64)> {
 /// [`Forward`] within its rounding bound.
 #[test]
 fn first_derivatives_agree() {
-    const H: f64 = 1e-200;
+    const STEP: f64 = 1e-200;
     let exact = Bounded::exact;
     let mut compared = 0;
     for (a, b) in arguments() {
         for (da, db) in [(1.0, 0.0), (0.0, 1.0), (0.6, -1.4)] {
             let reference =
-                functions(Forward { re: exact(a), d: exact(da) }, Forward { re: exact(b), d: exact(db) });
-            let complex = functions(Complex64::new(a, da * H), Complex64::new(b, db * H));
-            let dual = functions(Dual64::new(a, da), Dual64::new(b, db));
+                all_functions(Forward { re: exact(a), d: exact(da) }, Forward { re: exact(b), d: exact(db) });
+            let complex = all_functions(Complex64::new(a, da * STEP), Complex64::new(b, db * STEP));
+            let dual = all_functions(Dual64::new(a, da), Dual64::new(b, db));
             let tangent =
-                functions(Tangent { value: a, derivative: da }, Tangent { value: b, derivative: db });
+                all_functions(Tangent { value: a, derivative: da }, Tangent { value: b, derivative: db });
             let others = complex.into_iter().zip(dual).zip(tangent);
             for (&(name, reference), (((_, complex), (_, dual)), (_, tangent))) in
                 reference.iter().zip(others)
@@ -94,7 +94,7 @@ fn first_derivatives_agree() {
                 };
                 near(complex.re, value);
                 near(dual.re, value);
-                near(complex.im / H, d);
+                near(complex.im / STEP, d);
                 near(dual.eps, d);
                 near(tangent.value, value);
                 near(tangent.derivative, d);
@@ -115,9 +115,9 @@ fn second_derivatives_agree() {
                 re: Forward { re: exact(value), d: exact(d) },
                 d: Forward { re: exact(d), d: exact(0.0) },
             };
-            let reference = functions(nested(a, da), nested(b, db));
-            let hyper = functions(HyperDual64::new(a, da, da, 0.0), HyperDual64::new(b, db, db, 0.0));
-            let second = functions(Dual2_64::new(a, da, 0.0), Dual2_64::new(b, db, 0.0));
+            let reference = all_functions(nested(a, da), nested(b, db));
+            let hyper = all_functions(HyperDual64::new(a, da, da, 0.0), HyperDual64::new(b, db, db, 0.0));
+            let second = all_functions(Dual2_64::new(a, da, 0.0), Dual2_64::new(b, db, 0.0));
             for ((&(name, reference), (_, hyper)), (_, second)) in reference.iter().zip(hyper).zip(second) {
                 let dd = reference.d.d;
                 if !dd.error.is_finite() || !reference.re.re.value.is_finite() {

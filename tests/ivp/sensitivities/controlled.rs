@@ -49,7 +49,7 @@ macro_rules! at_rest {
 }
 
 #[test]
-fn controlled_derivatives_where_states_rest() {
+fn sensitivity_control_at_steady_states() {
     at_rest!(Swing, Radau);
     at_rest!(Pulled, Radau);
     at_rest!(Pulled, RadauIIA<5>);
@@ -61,7 +61,7 @@ fn controlled_derivatives_where_states_rest() {
 
 /// The largest error of a column of derivatives by `(x₀, p)`, in units of what is tolerated: the
 /// root of the mean of the squares of its elements over `atol / s_c + rtol |V_rc|`.
-fn oregonator(tolerance: f64, controlled: bool) -> f64 {
+fn oregonator_error(tolerance: f64, controlled: bool) -> f64 {
     let (start, p) = problem("oregonator");
     let reference = references("first", "oregonator").remove(0);
     let mut adaptive = integrator::<Oregonator, 4>(&p, tolerance, tolerance);
@@ -89,11 +89,11 @@ fn oregonator(tolerance: f64, controlled: bool) -> f64 {
 /// hundred steps are those of a few at the tolerance, found 0.2 to 7; without it 30 to 130 at most
 /// fine tolerances, since derivatives are steeper than the states.
 #[test]
-fn controlled_derivatives_of_a_relaxation_oscillation() {
+fn sensitivity_control_of_a_relaxation_oscillation() {
     let (mut worst, mut worst_without) = (0.0f64, 0.0f64);
     for exponent in 2..=8 {
         let tolerance = 10f64.powi(-exponent);
-        let (with, without) = (oregonator(tolerance, true), oregonator(tolerance, false));
+        let (with, without) = (oregonator_error(tolerance, true), oregonator_error(tolerance, false));
         (worst, worst_without) = (worst.max(with), worst_without.max(without));
     }
     assert!(worst <= 15.0, "{worst} tolerances");
@@ -103,7 +103,7 @@ fn controlled_derivatives_of_a_relaxation_oscillation() {
 /// Magnitudes say which changes count: an input whose changes are small beside what is tolerated is
 /// not controlled.
 #[test]
-fn scales_of_controlled_derivatives() {
+fn sensitivity_scales() {
     let options = AdaptiveOptions { rtol: 1e-6, atol: 1e-6, ..Default::default() };
     let mut adaptive = Adaptive::<Swing, Radau>::new(options).expect("valid");
     adaptive.set_parameters(&SVector::from([4.0])).expect("finite");

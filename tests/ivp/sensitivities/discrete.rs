@@ -6,7 +6,7 @@ use super::*;
 /// product with the forward derivatives, and both follow the frozen map by complex or real
 /// differences.
 #[test]
-fn derivatives_of_the_frozen_map() {
+fn derivatives_of_frozen_steps() {
     let (x0, p) = problem("akzo_nobel");
     let x0 = SVector::<f64, 5>::from_column_slice(&x0) + SVector::repeat(0.01);
     let (u, t) = (SVector::zeros(), 20.0);
@@ -107,7 +107,7 @@ fn derivatives_of_frozen_explicit_steps() {
 /// At any tolerance derivatives are those of the run that was made: jumps, which amplify by a
 /// million, do not lead elsewhere what is taken again.
 #[test]
-fn derivatives_of_coarse_runs() {
+fn derivatives_at_coarse_tolerances() {
     let (x0, p) = problem("van_der_pol_1e3");
     let (x0, t) = (SVector::<f64, 2>::from_column_slice(&x0), 2000.0);
     let references = references("first", "van_der_pol_1e3");
@@ -129,7 +129,7 @@ fn derivatives_of_coarse_runs() {
 
 /// Wherever a run ends well it has derivatives, however coarsely its stages were solved.
 #[test]
-fn coarse_runs_have_derivatives() {
+fn existence_of_derivatives_at_coarse_tolerances() {
     let (x0, p) = problem("van_der_pol_1e3");
     let (x0, u, t) = (SVector::<f64, 2>::from_column_slice(&x0), SVector::zeros(), 2000.0);
     for k in 0..=30 {
@@ -157,7 +157,7 @@ fn unchanged(x: [f64; 2], _p: f64) -> [f64; 2] {
 /// ways to a gradient give the same. Other steps have other errors, which the jumps amplify by a
 /// million: found are up to 83 tolerances.
 #[test]
-fn derivatives_of_coarse_runs_in_parts() {
+fn derivatives_over_events_and_intervals() {
     let (x0, p) = problem("van_der_pol_1e3");
     let (x0, t) = (SVector::<f64, 2>::from_column_slice(&x0), 2000.0);
     let references = references("first", "van_der_pol_1e3");
@@ -188,7 +188,7 @@ fn derivatives_of_coarse_runs_in_parts() {
 
 /// An interval without length: the identity.
 #[test]
-fn no_time() {
+fn intervals_of_zero_length() {
     let (x0, p) = problem("akzo_nobel");
     let x0 = SVector::<f64, 5>::from_column_slice(&x0);
     let mut adaptive = integrator::<AkzoNobel, 9>(&p, 1e-6, 1e-9);

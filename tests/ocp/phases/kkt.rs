@@ -9,7 +9,7 @@ use casados::qp::{Block, Bounds, SolutionStage, Stage};
 const TOLERANCE: f64 = 1e-5;
 
 /// An element, zero where there is none.
-pub fn element(block: Block<'_, f64>, i: usize, j: usize) -> f64 {
+pub fn element_or_zero(block: Block<'_, f64>, i: usize, j: usize) -> f64 {
     block.get(i, j).unwrap_or(0.0)
 }
 
@@ -17,9 +17,9 @@ pub fn element(block: Block<'_, f64>, i: usize, j: usize) -> f64 {
 pub fn hessian(stage: &Stage<'_, f64>, i: usize, j: usize) -> f64 {
     let (i, j, nx) = (i.max(j), i.min(j), stage.dims().nx);
     match (i.checked_sub(nx), j.checked_sub(nx)) {
-        (None, _) => element(stage.q(), i, j),
-        (Some(i), None) => element(stage.s(), i, j),
-        (Some(i), Some(j)) => element(stage.r(), i, j),
+        (None, _) => element_or_zero(stage.q(), i, j),
+        (Some(i), None) => element_or_zero(stage.s(), i, j),
+        (Some(i), Some(j)) => element_or_zero(stage.r(), i, j),
     }
 }
 
@@ -30,7 +30,7 @@ pub fn jacobian(stage: &Stage<'_, f64>, row: usize, j: usize) -> f64 {
         None => ([stage.a(), stage.b()], row),
         Some(row) => ([stage.c(), stage.d()], row),
     };
-    if j < nx { element(rows[0], row, j) } else { element(rows[1], row, j - nx) }
+    if j < nx { element_or_zero(rows[0], row, j) } else { element_or_zero(rows[1], row, j - nx) }
 }
 
 pub fn variables(at: &SolutionStage<'_, f64>) -> Vec<f64> {
@@ -38,7 +38,7 @@ pub fn variables(at: &SolutionStage<'_, f64>) -> Vec<f64> {
 }
 
 /// Bounds with their multipliers hold at values.
-fn sides(bounds: &Bounds<'_, f64>, values: &[f64], lower: &[f64], upper: &[f64]) -> Test {
+fn check_bounds(bounds: &Bounds<'_, f64>, values: &[f64], lower: &[f64], upper: &[f64]) -> Test {
     for (i, &value) in values.iter().enumerate() {
         for (distance, multiplier) in
             [(value - bounds.lower[i], lower[i]), (bounds.upper[i] - value, upper[i])]
@@ -68,9 +68,9 @@ pub fn check(ocp: &mut HeapOcp<Phases<'_>>) -> Test {
             assert!(gap.abs() < TOLERANCE * (1.0 + stages[k + 1].x[i].abs()), "gap {k} {i}: {gap}");
         }
         let g: Vec<f64> = (0..at.g_lower.len()).map(|i| row(next + i)).collect();
-        sides(&stage.x_bounds(), at.x, at.x_lower, at.x_upper)?;
-        sides(&stage.u_bounds(), at.u, at.u_lower, at.u_upper)?;
-        sides(&stage.g_bounds(), &g, at.g_lower, at.g_upper)?;
+        check_bounds(&stage.x_bounds(), at.x, at.x_lower, at.x_upper)?;
+        check_bounds(&stage.u_bounds(), at.u, at.u_lower, at.u_upper)?;
+        check_bounds(&stage.g_bounds(), &g, at.g_lower, at.g_upper)?;
         let gradient: Vec<f64> = stage.gradient_x().iter().chain(stage.gradient_u()).copied().collect();
         let force = |lower: &[f64], upper: &[f64], i: usize| upper[i] - lower[i];
         for j in 0..v.len() {

@@ -98,7 +98,7 @@ const BURNS: [f64; 3] = [0.0752, 0.261, 0.7];
 
 /// What [`orbit`](ascent) is of an ellipse: `√(μ a (1 − e²))` along the normal, and `e` at the
 /// argument of the perigee.
-fn target() -> [f64; 5] {
+fn target_orbit() -> [f64; 5] {
     let (a, e) = (24.361140_f64, 0.7308_f64);
     let [i, node, perigee] = [28.5_f64, 269.8, 130.5].map(f64::to_radians);
     let h = (MU * a * (1.0 - e * e)).sqrt();
@@ -122,7 +122,7 @@ fn stage(phase: usize) -> [f64; 4] {
 type Burning<P> = Result<HeapOcp<P>, OcpError>;
 
 /// A phase of known duration, with a guess that follows from one direction.
-fn burning(
+fn burning_phase(
     phase: usize,
     n: usize,
     x0: &mut [f64; 7],
@@ -139,9 +139,9 @@ fn burning(
     Ok(burning)
 }
 
-fn last(n: usize, x0: &[f64; 7], u: [f64; 3]) -> Burning<impl ExactFormulation<f64> + use<>> {
+fn last_phase(n: usize, x0: &[f64; 7], u: [f64; 3]) -> Burning<impl ExactFormulation<f64> + use<>> {
     let direction = Constraint::<Direction>::new([1.0], [1.0]);
-    let orbit = target();
+    let orbit = target_orbit();
     let mut last = Problem::new(Irk::<Insertion, Gauss<4>>::new(Options::default())?)
         .path_constraints(direction)
         .terminal_constraints((
@@ -156,7 +156,7 @@ fn last(n: usize, x0: &[f64; 7], u: [f64; 3]) -> Burning<impl ExactFormulation<f
 
 /// The outcome with so many intervals in each phase, the duration of the last one, and how much
 /// thrusts differ from their directions.
-fn launch(n: usize, by_sqp: bool) -> Result<(Outcome, f64), Box<dyn std::error::Error>> {
+fn solve_launch(n: usize, by_sqp: bool) -> Result<(Outcome, f64), Box<dyn std::error::Error>> {
     let latitude = 28.5_f64.to_radians();
     let place = Vector3::new(RADIUS * latitude.cos(), 0.0, RADIUS * latitude.sin());
     let velocity = vector![0.0, OMEGA * place[0], 0.0];
@@ -166,10 +166,10 @@ fn launch(n: usize, by_sqp: bool) -> Result<(Outcome, f64), Box<dyn std::error::
     // Up, then to the east.
     let up = [latitude.cos(), 0.0, latitude.sin()];
     let east = [0.3 * up[0], 0.95, 0.3 * up[2]];
-    let mut first = burning(0, n, &mut x, up)?;
-    let mut second = burning(1, n, &mut x, east)?;
-    let mut third = burning(2, n, &mut x, east)?;
-    let mut fourth = last(n, &x, east)?;
+    let mut first = burning_phase(0, n, &mut x, up)?;
+    let mut second = burning_phase(1, n, &mut x, east)?;
+    let mut third = burning_phase(2, n, &mut x, east)?;
+    let mut fourth = last_phase(n, &x, east)?;
     first.fix_initial_state(&start)?;
     let mut launch = Phases::new(&mut first)
         .then(Jump::<Separation>::new(), &mut second)
@@ -192,14 +192,14 @@ fn launch(n: usize, by_sqp: bool) -> Result<(Outcome, f64), Box<dyn std::error::
 }
 
 #[test]
-fn final_mass_is_as_published() -> Test {
+fn published_final_mass() -> Test {
     // Betts: 7529.712412 kg after 924.139 s.
     const MASS: f64 = 7.529712412;
     const END: f64 = 0.924139;
     // PSOPT, with 18 to 25 nodes of Chebyshev's polynomials in a phase.
     const PSOPT: f64 = 7.529661;
     for (n, by_sqp) in [(8, false), (8, true), (16, false)] {
-        let (outcome, duration) = launch(n, by_sqp)?;
+        let (outcome, duration) = solve_launch(n, by_sqp)?;
         println!("{n} {by_sqp} {outcome} {:.9} {:.7}", -outcome.objective, duration + 0.261);
         assert!(outcome.is_converged(), "{n} {by_sqp}: {outcome}");
         assert!((-outcome.objective - MASS).abs() < 1e-4);

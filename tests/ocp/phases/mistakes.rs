@@ -40,7 +40,7 @@ fn by_time(x: [f64; 2], _u: f64, _p: f64, t: f64) -> [f64; 2] {
     [x[0] + t, x[1]]
 }
 
-fn ride() -> Result<HeapOcp<impl casados::ocp::ExactFormulation<f64>>, OcpError> {
+fn ride_phases() -> Result<HeapOcp<impl casados::ocp::ExactFormulation<f64>>, OcpError> {
     let mut ride = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
         .running_cost(GeneralCost::<Effort>::new())
         .on(Horizon::free(4, 0.5..=3.0, 1.0))?;
@@ -49,14 +49,14 @@ fn ride() -> Result<HeapOcp<impl casados::ocp::ExactFormulation<f64>>, OcpError>
 }
 
 fn first() -> Result<HeapOcp<impl casados::ocp::ExactFormulation<f64>>, OcpError> {
-    let mut ride = ride()?;
+    let mut ride = ride_phases()?;
     ride.fix_initial_state(&[0.0; 2])?;
     Ok(ride)
 }
 
 #[test]
-fn links_that_do_not_fit() -> Test {
-    let (mut one, mut other) = (first()?, ride()?);
+fn invalid_links() -> Test {
+    let (mut one, mut other) = (first()?, ride_phases()?);
     let error = Phases::new(&mut one).then(Jump::<Three>::new(), &mut other).join().err().ok_or("it fits")?;
     let expected =
         matches!(error, OcpError::LinkDimension { link: "Three", what: "output", expected: 2, found: 3 });
@@ -92,8 +92,8 @@ fn links_that_do_not_fit() -> Test {
 }
 
 #[test]
-fn phases_that_are_not_complete() -> Test {
-    let (mut one, mut other) = (ride()?, ride()?);
+fn incomplete_phases() -> Test {
+    let (mut one, mut other) = (ride_phases()?, ride_phases()?);
     let error = Phases::new(&mut one).then(Continuous, &mut other).join().err().ok_or("it is not said")?;
     assert!(matches!(error, OcpError::Missing { part: Part::InitialState, .. }), "{error}");
 
@@ -102,12 +102,12 @@ fn phases_that_are_not_complete() -> Test {
     assert!(matches!(error, OcpError::Phase { phase: 1, model: "Cart", .. }), "{error}");
     assert!(error.to_string().contains("an initial state"), "{error}");
 
-    let (mut one, mut other) = (first()?, ride()?);
+    let (mut one, mut other) = (first()?, ride_phases()?);
     other.shared("u")?;
     let error = Phases::new(&mut one).then(Continuous, &mut other).join().err().ok_or("it is shared")?;
     assert!(matches!(error, OcpError::Phase { phase: 1, .. }), "{error}");
 
-    let (mut one, mut other) = (first()?, ride()?);
+    let (mut one, mut other) = (first()?, ride_phases()?);
     one.free_initial_state().periodic("x")?;
     let error = Phases::new(&mut one).then(Continuous, &mut other).join().err().ok_or("it is periodic")?;
     assert!(matches!(error, OcpError::Phase { phase: 0, .. }), "{error}");
@@ -115,7 +115,7 @@ fn phases_that_are_not_complete() -> Test {
 }
 
 #[test]
-fn times_and_names() -> Test {
+fn invalid_times_and_names() -> Test {
     // Times that cross, and times that are none.
     let problem = || -> Result<_, OcpError> {
         Ok(Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
@@ -128,16 +128,16 @@ fn times_and_names() -> Test {
     assert!(matches!(error, OcpError::Times { .. }), "{error}");
     let error = problem()?.on(Horizon::free(4, 1.0..=2.0, 5.0)).err().ok_or("it is outside")?;
     assert!(matches!(error, OcpError::OutOfRange { name: "p", .. }), "{error}");
-    let error = ride()?.bound("speed", .., 0.0, 1.0).err().ok_or("there is none")?;
+    let error = ride_phases()?.bound("speed", .., 0.0, 1.0).err().ok_or("there is none")?;
     assert!(matches!(error, OcpError::UnknownName { known, .. } if known.model == "Cart"), "{error}");
     Ok(())
 }
 
 /// A verdict names the phase.
 #[test]
-fn what_is_infeasible_is_said_of_its_phase() -> Test {
+fn phase_of_an_infeasible_constraint() -> Test {
     for by_sqp in [false, true] {
-        let (mut one, mut other) = (first()?, ride()?);
+        let (mut one, mut other) = (first()?, ride_phases()?);
         one.bound("u", .., -1.0, 1.0)?.bound("x[0]", 4.., -1e3, 1.0)?;
         // In three seconds, from one metre and three metres per second.
         other.bound("u", .., -1.0, 1.0)?.bound("x[0]", 4.., 50.0, 50.0)?;

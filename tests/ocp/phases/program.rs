@@ -54,7 +54,7 @@ mod roll {
 }
 
 /// A point with multipliers where nothing is zero.
-fn disturb(ocp: &mut HeapOcp<Phases<'_>>) -> Test {
+fn random_iterate(ocp: &mut HeapOcp<Phases<'_>>) -> Test {
     for k in 0..ocp.qp().dims().len() {
         let wave = |i: usize| 0.8 + 0.5 * ((3 * k + 5 * i + 1) as f64).sin();
         let stage = ocp.iterate_mut().stage_mut(k).ok_or("no stage")?;
@@ -68,7 +68,7 @@ fn disturb(ocp: &mut HeapOcp<Phases<'_>>) -> Test {
 
 /// The gradient of the Lagrangian by the variables of a stage, and values of dynamics and
 /// constraints, from the first derivatives.
-fn first_order(
+fn lagrangian_gradient_and_values(
     ocp: &mut HeapOcp<Phases<'_>>,
     k: usize,
 ) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Error>> {
@@ -94,7 +94,7 @@ fn first_order(
 }
 
 #[test]
-fn derivatives_are_differences() -> Test {
+fn derivatives_by_differences() -> Test {
     let mut first = Problem::new(Irk::<Swing, Gauss<2>>::new(Options::default())?)
         .running_cost(GeneralCost::<SwingPrice>::new())
         .path_constraints(Constraint::<SwingLimit>::new([-1.0], [1.0]))
@@ -114,14 +114,15 @@ fn derivatives_are_differences() -> Test {
         .then(Jump::<Cross>::new(), &mut second)
         .then(Jump::<Uncross>::new(), &mut third)
         .join()?;
-    disturb(&mut ocp)?;
+    random_iterate(&mut ocp)?;
     let dims = ocp.qp().dims().to_vec();
     assert_eq!(dims.iter().map(|stage| stage.nx).collect::<Vec<_>>(), [0, 3, 3, 3, 6, 6, 6, 4, 4, 4]);
     assert_eq!(dims.iter().map(|stage| stage.nu).collect::<Vec<_>>(), [3, 1, 1, 2, 2, 2, 2, 1, 1, 0]);
 
     // What links make of the ends, in this program once more.
-    let values =
-        |ocp: &mut HeapOcp<Phases<'_>>, k: usize| Ok::<_, Box<dyn std::error::Error>>(first_order(ocp, k)?.1);
+    let values = |ocp: &mut HeapOcp<Phases<'_>>, k: usize| {
+        Ok::<_, Box<dyn std::error::Error>>(lagrangian_gradient_and_values(ocp, k)?.1)
+    };
     let at = variables(&ocp.iterate().stage(3).ok_or("no stage")?);
     let [x0, x1, duration, linear, p] = at[..] else { return Err("five".into()) };
     let expected = [x0 * x0 * 1.3, (x0 * x1).sin(), 1.3 * duration + x1, linear, 0.0, p];
@@ -147,7 +148,7 @@ fn derivatives_are_differences() -> Test {
             let mut at = |change: f64| {
                 let stage = ocp.iterate_mut().stage_mut(k).ok_or("no stage")?;
                 *(if j < dims.nx { &mut stage.x[j] } else { &mut stage.u[j - dims.nx] }) = here + change;
-                first_order(&mut ocp, k)
+                lagrangian_gradient_and_values(&mut ocp, k)
             };
             let (mut second, mut first) = (vec![0.0; size], vec![0.0; rows]);
             for (i, weight) in weights.into_iter().enumerate() {

@@ -36,11 +36,11 @@ fn triple_end(x: [f64; 3], _u: [f64; 2]) -> [f64; 3] {
 }
 
 /// A quadratic function `½ xᵀ P x + pᵀ x + c` of the state at the start of a stage.
-struct Value(DMatrix<f64>, DVector<f64>, f64);
+struct ValueFunction(DMatrix<f64>, DVector<f64>, f64);
 
-impl Value {
+impl ValueFunction {
     /// Before a stage with `x₊ = A x + B u + b` and the cost `½ xᵀQx + ½ uᵀRu`; the gains.
-    fn before(
+    fn value_before_stage(
         self,
         [a, b, q, r]: [&DMatrix<f64>; 4],
         offset: &DVector<f64>,
@@ -59,7 +59,7 @@ impl Value {
 }
 
 #[test]
-fn solution_is_that_of_the_recursion_of_riccati() -> Test {
+fn riccati_recursion_over_phases() -> Test {
     let (first_intervals, second_intervals) = (5, 7);
     for by_sqp in [false, true] {
         let mut first = Problem::new(Map::<Single, f64>::new())
@@ -83,32 +83,32 @@ fn solution_is_that_of_the_recursion_of_riccati() -> Test {
         let target = dvector![1.0, 0.0, -0.5];
         let weights = DMatrix::from_diagonal(&dvector![5.0, 1.0, 2.0]);
         let mut value =
-            Value(weights.clone(), -(&weights * &target), 0.5 * (&weights * &target).dot(&target));
+            ValueFunction(weights.clone(), -(&weights * &target), 0.5 * (&weights * &target).dot(&target));
         let (a, b) =
             (dmatrix![1.0, 0.1, 0.0; 0.0, 0.8, 0.2; 0.0, 0.0, 0.7], dmatrix![0.0, 0.0; 1.0, 0.0; -0.3, 1.0]);
         let (q, r) =
             (DMatrix::from_diagonal(&dvector![0.2, 1.0, 0.4]), DMatrix::from_diagonal(&dvector![0.1, 0.7]));
         let mut gains = Vec::new();
         for _ in 0..second_intervals {
-            let (before, gain, shift) = value.before([&a, &b, &q, &r], &DVector::zeros(3));
+            let (before, gain, shift) = value.value_before_stage([&a, &b, &q, &r], &DVector::zeros(3));
             value = before;
             gains.push((gain, shift));
         }
         // The link costs nothing, and nothing is decided there.
         let (jump, constant) = (dmatrix![1.0; 0.5; -2.0], dvector![0.0, 0.25, 0.0]);
-        let Value(p, linear, rest) = value;
-        value = Value(
+        let ValueFunction(p, linear, rest) = value;
+        value = ValueFunction(
             jump.transpose() * &p * &jump,
             jump.transpose() * (&p * &constant + &linear),
             rest + 0.5 * (&p * &constant).dot(&constant) + linear.dot(&constant),
         );
         for _ in 0..first_intervals {
             let [a, b, q, r] = [dmatrix![0.9], dmatrix![0.5], dmatrix![1.0], dmatrix![0.3]];
-            let (before, gain, shift) = value.before([&a, &b, &q, &r], &DVector::zeros(1));
+            let (before, gain, shift) = value.value_before_stage([&a, &b, &q, &r], &DVector::zeros(1));
             value = before;
             gains.push((gain, shift));
         }
-        let Value(p, linear, rest) = value;
+        let ValueFunction(p, linear, rest) = value;
         let cost = 0.5 * p[(0, 0)] * 4.0 + linear[0] * 2.0 + rest;
         assert!((outcome.objective - cost).abs() < 1e-7 * cost, "{} {cost}", outcome.objective);
 
@@ -154,7 +154,7 @@ mod pendulum {
 }
 
 #[test]
-fn a_horizon_that_is_cut_has_the_same_solution() -> Test {
+fn divided_horizon() -> Test {
     let swing = |n: usize| -> Result<_, casados::ocp::OcpError> {
         let mut swing = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
             .running_cost(GeneralCost::<Price>::new())
@@ -205,7 +205,7 @@ mod sledge {
 
 /// In each phase integrals begin at zero, and a linear control where it is best.
 #[test]
-fn linear_controls_and_integrals_begin_anew() -> Test {
+fn linear_controls_and_integrals_of_phases() -> Test {
     let ride = |n: usize| -> Result<_, casados::ocp::OcpError> {
         let mut ride = Problem::new(Irk::<Sledge, Gauss<3>>::new(Options::default())?)
             .running_cost(GeneralCost::<Effort>::new())

@@ -54,7 +54,7 @@ fn second(n: usize) -> Phase<impl ExactFormulation<f64>> {
 }
 
 #[test]
-fn cost_is_at_most_that_of_full_force_at_the_corner() -> Test {
+fn cost_of_a_robot_path() -> Test {
     // Full force from 0.025 s before the corner to as long behind it, and along the path elsewhere:
     // `½ ∫` of rates 10 s from zero on, and of angles 5 s², twice for each of two joints. It has a
     // node at each switch, so that the best stairs cost no more.

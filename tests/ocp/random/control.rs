@@ -2,7 +2,7 @@
 
 use super::{Draw, Numbers, linear, nonlinear, pendulum_step, spring_step};
 use crate::Test;
-use crate::runs::{Counts, kind, seeds, shows};
+use crate::runs::{Counts, error_kind, prints_verdicts, seeds};
 use casados::ocp::{Formulation, HeapOcp, HeapRealTime, OcpError};
 use casados::qp::{QpError, QpView, residuals};
 
@@ -16,7 +16,7 @@ fn is_solved_by_clarabel(qp: QpView<'_, f64>) -> Result<bool, QpError> {
 /// Some samples of a controller, of states near the start and far from it, beside another one that
 /// sees only those which the first has an answer for. Of equations that are linear the start itself
 /// has a plan always.
-fn control<P: Formulation<f64>>(
+fn run_controller<P: Formulation<f64>>(
     counts: &mut Counts,
     seed: u64,
     random: &mut Numbers,
@@ -54,12 +54,12 @@ fn control<P: Formulation<f64>>(
                     assert!(far > 0.0 || !linear, "{seed}: {error}");
                     assert!(!is_solved_by_clarabel(ocp.qp())?, "{seed}: {error}");
                 }
-                if shows() {
+                if prints_verdicts() {
                     println!("{counts} {seed}: {error}");
                 }
                 match error {
-                    OcpError::Qp(error) => counts.count(&kind(&error)),
-                    error => counts.count(&kind(&error)),
+                    OcpError::Qp(error) => counts.count(&error_kind(&error)),
+                    error => counts.count(&error_kind(&error)),
                 }
             }
         }
@@ -77,16 +77,16 @@ fn real_time_iterations() -> Test {
         let random = &mut Numbers(seed ^ (1 << 40));
         let draw = Draw::new(random, spring_step);
         let both = [linear(&draw)?, linear(&draw)?];
-        control(&mut spring, seed, random, both, (&draw.x[0], true))?;
+        run_controller(&mut spring, seed, random, both, (&draw.x[0], true))?;
         let draw = Draw::new(random, pendulum_step);
         let both = [nonlinear(&draw)?, nonlinear(&draw)?];
-        control(&mut pendulum, seed, random, both, (&draw.x[0], false))?;
+        run_controller(&mut pendulum, seed, random, both, (&draw.x[0], false))?;
     }
     println!("{spring}\n{pendulum}");
     // Guesses far away leave linearisations of the pendulum that no plan satisfies.
     for (counts, part) in [(spring, 2), (pendulum, 10)] {
-        let given_up = counts.among(&["MaxIterations", "Stalled"]);
-        assert!(part * counts.of("Ok") >= counts.all() && 100 * given_up <= counts.all(), "{counts}");
+        let given_up = counts.count_of_any(&["MaxIterations", "Stalled"]);
+        assert!(part * counts.count_of("Ok") >= counts.all() && 100 * given_up <= counts.all(), "{counts}");
     }
     Ok(())
 }

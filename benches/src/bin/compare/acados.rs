@@ -27,11 +27,11 @@ impl Acados {
     ///
     /// # Errors
     /// One line that says what is missing.
-    pub fn start() -> Result<Vec<Self>, String> {
-        Peer::acados("acados_peers.py")?.into_iter().map(Self::greet).collect()
+    pub fn start_all() -> Result<Vec<Self>, String> {
+        Peer::acados("acados_peers.py")?.into_iter().map(Self::read_version).collect()
     }
 
-    fn greet((home, mut peer): (PathBuf, Peer)) -> Result<Self, String> {
+    fn read_version((home, mut peer): (PathBuf, Peer)) -> Result<Self, String> {
         let missing = |_| format!("no acados with acados_template in {}", home.display());
         let answer = peer.ask(&json!({ "do": "versions" })).map_err(missing)?;
         let name = home.file_name().unwrap_or_default().to_string_lossy();
@@ -51,9 +51,9 @@ impl Acados {
         reference: Option<&Values>,
     ) -> Result<Measured, String> {
         let answer = self.peer.ask(&json!({
-            "do": "time", "case": case.json(case.single), "integrator": integrator, "mode": mode.name(), "seconds": seconds,
+            "do": "time", "case": case.to_json(case.single), "integrator": integrator, "mode": mode.name(), "seconds": seconds,
         }))?;
-        let error = reference.and_then(|r| Values::read(&answer["values"]).error(r, mode));
+        let error = reference.and_then(|r| Values::read(&answer["values"]).relative_error(r, mode));
         if let Some(error) = error.filter(|error| error.is_nan() || *error > MAX_PEER_ERROR) {
             return Err(format!("{}, {integrator}: an error of {error:.0e}", case.name));
         }
@@ -62,7 +62,7 @@ impl Acados {
 }
 
 /// The integrators that a row has columns for, where acados has them.
-pub fn integrators(case: &Case, mode: Mode) -> [Option<&'static str>; 2] {
+pub fn integrators_of_row(case: &Case, mode: Mode) -> [Option<&'static str>; 2] {
     if case.family == Family::Rk4 {
         return [Some("ERK"), None];
     }

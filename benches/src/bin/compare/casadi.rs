@@ -34,7 +34,7 @@ impl Casadi {
     /// What CasADi says.
     pub fn values(&mut self, case: &Case, modes: &[Mode]) -> Result<Values, String> {
         let names: Vec<_> = modes.iter().map(|m| m.name()).collect();
-        let answer = self.peer.ask(&json!({ "do": "values", "case": case.json(1), "modes": names }))?;
+        let answer = self.peer.ask(&json!({ "do": "values", "case": case.to_json(1), "modes": names }))?;
         let mut values = Values::default();
         for mode in modes {
             let part = Values::read(&answer[mode.name()][0]);
@@ -52,8 +52,8 @@ impl Casadi {
     ///
     /// # Errors
     /// What CasADi says.
-    pub fn flow(&mut self, case: &Case) -> Result<(Values, f64), String> {
-        let answer = self.peer.ask(&json!({ "do": "flow", "case": case.json(1) }))?;
+    pub fn exact_flow(&mut self, case: &Case) -> Result<(Values, f64), String> {
+        let answer = self.peer.ask(&json!({ "do": "flow", "case": case.to_json(1) }))?;
         let apart = answer["uncertainty"].as_object().into_iter().flatten().filter_map(|(_, v)| v.as_f64());
         Ok((Values::read(&answer["values"]), apart.fold(0.0, f64::max)))
     }
@@ -72,11 +72,11 @@ impl Casadi {
     ) -> Result<Measured, String> {
         let modes = [mode.name()];
         let answer = self.peer.ask(
-            &json!({ "do": "time", "case": case.json(1), "solver": solver, "modes": modes, "seconds": seconds }),
+            &json!({ "do": "time", "case": case.to_json(1), "solver": solver, "modes": modes, "seconds": seconds }),
         )?;
         let answer = &answer[mode.name()];
         let values = Values::read(&answer["values"][0]);
-        let error = reference.and_then(|r| values.error(r, mode));
+        let error = reference.and_then(|r| values.relative_error(r, mode));
         Ok(Measured { time: Summary::read(&answer["time"]), error, ..Default::default() })
     }
 }

@@ -33,7 +33,7 @@ pub fn measure(
         _ => return Vec::new(),
     };
     let one = |mode: Mode, solve: &dyn Fn() -> Result<Values, String>| -> Result<Measured, String> {
-        let error = solve()?.error(flow, mode);
+        let error = solve()?.relative_error(flow, mode);
         let time = sample(effort.budget(), || solve().map(drop))?;
         Ok(Measured { time, error, ..Default::default() })
     };

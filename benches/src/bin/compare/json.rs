@@ -1,7 +1,7 @@
 //! Everything as JSON.
 
 use super::Results;
-use super::rows::{Measured, Theirs};
+use super::rows::{AcadosTime, Measured};
 use casados_benches::case::Mode;
 use serde_json::{Value, json};
 
@@ -10,15 +10,15 @@ fn measured(m: &Measured) -> Value {
 }
 
 /// A measurement, or the seconds that were carried over.
-fn theirs(acados: &Theirs) -> Value {
+fn acados_time(acados: &AcadosTime) -> Value {
     match acados {
-        Theirs::Measured(m) => measured(m),
-        Theirs::Carried(seconds) => json!({ "carried": seconds }),
+        AcadosTime::Measured(m) => measured(m),
+        AcadosTime::CarriedOver(seconds) => json!({ "carried": seconds }),
     }
 }
 
 /// Times in seconds.
-pub fn of(results: &Results) -> Value {
+pub fn seconds_of(results: &Results) -> Value {
     let rows: Vec<_> = results
         .rows
         .iter()
@@ -26,10 +26,10 @@ pub fn of(results: &Results) -> Value {
             json!({
                 "case": row.case, "nx": row.nx, "mode": row.mode.name(), "reference": row.reference,
                 "cold": measured(&row.cold), "rounding": measured(&row.rounding),
-                "warm": row.warm.as_ref().map(measured), "forty": measured(&row.forty),
+                "warm": row.warm.as_ref().map(measured), "forty": measured(&row.batch_of_forty),
                 "batch": row.batch.as_ref().map(measured),
                 "casadi": row.casadi.as_ref().map(measured),
-                "acados_irk": row.acados[0].as_ref().map(theirs), "acados_gnsf": row.acados[1].as_ref().map(theirs),
+                "acados_irk": row.acados[0].as_ref().map(acados_time), "acados_gnsf": row.acados[1].as_ref().map(acados_time),
             })
         })
         .collect();
@@ -41,7 +41,7 @@ pub fn of(results: &Results) -> Value {
         "stages": g.stages, "steps": g.steps,
         "points": g.points.iter().map(|(nx, times)| json!({
             "nx": nx,
-            "times": times.iter().zip(Mode::ALL).map(|(m, mode)| (mode.name().to_owned(), measured(m))).collect::<serde_json::Map<_, _>>(),
+            "times": times.iter().zip(Mode::ALL_MODES).map(|(m, mode)| (mode.name().to_owned(), measured(m))).collect::<serde_json::Map<_, _>>(),
         })).collect::<Vec<_>>(),
     })).collect();
     let precision: Vec<_> = results.precision.iter().flat_map(|(all, _)| all).map(|p| json!({

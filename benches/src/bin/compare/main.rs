@@ -7,7 +7,6 @@
 
 mod acados;
 mod adaptive;
-mod anchors;
 mod casadi;
 #[cfg(feature = "diffsol")]
 mod diffsol;
@@ -15,16 +14,17 @@ mod growth;
 mod json;
 mod machine;
 mod plots;
+mod reference_times;
 mod report;
 mod rows;
 
 use acados::Acados;
-use anchors::Anchors;
 use casadi::Casadi;
 use casados_benches::case::{Case, Family};
-use casados_benches::record::{insert, repository};
-use casados_benches::time::pin;
-use growth::Growth;
+use casados_benches::record::{insert_between_markers, repository_path};
+use casados_benches::time::pin_to_last_core;
+use growth::ScalingWithSize;
+use reference_times::ReferenceTimes;
 use rows::Peers;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -66,7 +66,7 @@ fn arguments() -> Result<Arguments, Failure> {
         only: None,
         effort: Effort { seconds: 0.3 },
         peers: true,
-        out: repository("plots/compare"),
+        out: repository_path("plots/compare"),
         write: None,
     };
     let mut words = std::env::args().skip(1);
@@ -87,20 +87,20 @@ fn arguments() -> Result<Arguments, Failure> {
 fn cases() -> Result<Vec<Case>, String> {
     use Family::{Gauss, Rk4};
     let mut cases = vec![
-        Case::pendulum(Gauss, 2, 1).with("pendulum/pendulum_T005_irk_s2n1.json")?,
+        Case::pendulum(Gauss, 2, 1).with_reference("pendulum/pendulum_T005_irk_s2n1.json")?,
         Case::pendulum(Gauss, 4, 4),
     ];
     for masses in [3, 5, 7, 9, 13, 33] {
         for (stages, steps) in [(2, 1), (4, 4)] {
             let case = Case::chain(masses, Gauss, stages, steps);
             let file = format!("chain/chain_{masses}_irk_s{stages}n{steps}.json");
-            let known = repository("tests/data").join(&file).exists();
-            cases.push(if known { case.with(&file)? } else { case });
+            let known = repository_path("tests/data").join(&file).exists();
+            cases.push(if known { case.with_reference(&file)? } else { case });
         }
     }
     cases.push(Case::awe()?);
-    cases.push(Case::pendulum(Rk4, 4, 1).with("pendulum/pendulum_T005_erk4n1.json")?);
-    cases.push(Case::chain(5, Rk4, 4, 1).with("chain/chain_5_erk4n1.json")?);
+    cases.push(Case::pendulum(Rk4, 4, 1).with_reference("pendulum/pendulum_T005_erk4n1.json")?);
+    cases.push(Case::chain(5, Rk4, 4, 1).with_reference("chain/chain_5_erk4n1.json")?);
     cases.push(Case::chain(9, Rk4, 4, 1));
     Ok(cases)
 }
@@ -111,13 +111,13 @@ pub struct Results {
     machine: Vec<String>,
     rows: Vec<rows::Row>,
     scale: f64,
-    adaptive: Vec<adaptive::Line>,
-    growth: Vec<Growth>,
+    adaptive: Vec<adaptive::SolverRow>,
+    growth: Vec<ScalingWithSize>,
     precision: Option<(Vec<growth::Precision>, f64)>,
 }
 
 /// Those that are there, and a line about each.
-fn peers(wanted: bool) -> (Peers, Vec<String>) {
+fn start_peers(wanted: bool) -> (Peers, Vec<String>) {
     let mut peers = Peers::default();
     let mut lines = Vec::new();
     match if wanted { Casadi::start() } else { Err("not asked for".into()) } {
@@ -127,7 +127,7 @@ fn peers(wanted: bool) -> (Peers, Vec<String>) {
         }
         Err(why) => lines.push(format!("without CasADi: {why}")),
     }
-    match if wanted { Acados::start() } else { Err("not asked for".into()) } {
+    match if wanted { Acados::start_all() } else { Err("not asked for".into()) } {
         Ok(all) => {
             lines.extend(all.iter().map(|acados| acados.version.clone()));
             peers.acados = all;
@@ -137,12 +137,12 @@ fn peers(wanted: bool) -> (Peers, Vec<String>) {
     (peers, lines)
 }
 
-fn run() -> Result<(), Failure> {
+fn measure_all() -> Result<(), Failure> {
     let arguments = arguments()?;
     let effort = arguments.effort;
-    let pinned = pin();
-    let anchors = Anchors::load()?;
-    let (mut peers, versions) = peers(arguments.peers);
+    let pinned = pin_to_last_core();
+    let anchors = ReferenceTimes::load()?;
+    let (mut peers, versions) = start_peers(arguments.peers);
     versions.iter().for_each(|version| eprintln!("{version}"));
     let mut results = Results { machine: machine::describe(pinned, &versions), ..Default::default() };
 
@@ -156,29 +156,29 @@ fn run() -> Result<(), Failure> {
             eprintln!("    {:<11} {:10.2} µs", row.mode.name(), 1e6 * row.cold.time.median);
         }
     }
-    rows::carry(&mut results.rows, &anchors);
-    results.scale = anchors.general_scale(&results.rows);
+    rows::carry_over(&mut results.rows, &anchors);
+    results.scale = anchors.median_machine_ratio(&results.rows);
 
     if arguments.only.is_none() {
         if let Some(casadi) = peers.casadi.as_mut() {
             eprintln!("solvers with step-size control");
-            results.adaptive = adaptive::measure(casadi, effort)?;
+            results.adaptive = adaptive::measure_adaptive(casadi, effort)?;
             eprintln!("work-precision");
             results.precision = Some(growth::work_precision(casadi, effort)?);
         }
         eprintln!("growth");
         for (stages, steps) in [(2, 1), (4, 4)] {
-            results.growth.push(Growth::measure(&[9, 13, 17, 33, 65], stages, steps, effort)?);
+            results.growth.push(ScalingWithSize::measure(&[9, 13, 17, 33, 65], stages, steps, effort)?);
         }
     }
 
     let text = report::markdown(&results);
     println!("{text}");
     std::fs::create_dir_all(&arguments.out)?;
-    std::fs::write(arguments.out.join("compare.json"), json::of(&results).to_string() + "\n")?;
-    plots::draw(&results, &arguments.out)?;
+    std::fs::write(arguments.out.join("compare.json"), json::seconds_of(&results).to_string() + "\n")?;
+    plots::draw_all(&results, &arguments.out)?;
     match &arguments.write {
-        Some(file) => insert(file, "compare", &text)?,
+        Some(file) => insert_between_markers(file, "compare", &text)?,
         None => std::fs::write(arguments.out.join("compare.md"), &text)?,
     }
     eprintln!("tables, JSON and plots are in {}", arguments.out.display());
@@ -186,7 +186,7 @@ fn run() -> Result<(), Failure> {
 }
 
 fn main() -> ExitCode {
-    match run() {
+    match measure_all() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("compare: {error}");

@@ -1,7 +1,7 @@
 //! The plots: time over the size of the chain, error over time, and how many times faster.
 
-use super::growth::{Growth, Precision};
-use super::report::{label, origin};
+use super::growth::{Precision, ScalingWithSize};
+use super::report::{mode_label, time_origin};
 use super::rows::Measured;
 use super::{Failure, Results};
 use casados::plot::{Curve, Figure, Panel};
@@ -9,33 +9,33 @@ use casados_benches::case::Mode;
 use std::path::Path;
 
 /// Writes all plots that there is something for.
-pub fn draw(results: &Results, folder: &Path) -> Result<(), Failure> {
+pub fn draw_all(results: &Results, folder: &Path) -> Result<(), Failure> {
     for growth in &results.growth {
         let name = format!("growth_s{}n{}.svg", growth.stages, growth.steps);
-        Figure::new().size(720, 520).with(of_growth(growth)).save(folder.join(name))?;
+        Figure::new().size(720, 520).with(growth_plot(growth)).save(folder.join(name))?;
     }
     if let Some((all, _)) = &results.precision {
-        let figure = Figure::new().size(1100, 480).with(of_precision("state", all, |p| p.simulation));
-        let figure = figure.column(1.0).with(of_precision("Jacobian", all, |p| p.forward));
+        let figure = Figure::new().size(1100, 480).with(work_precision_plot("state", all, |p| p.simulation));
+        let figure = figure.column(1.0).with(work_precision_plot("Jacobian", all, |p| p.forward));
         figure.save(folder.join("work_precision.svg"))?;
     }
     if results.rows.iter().any(|row| row.acados[0].is_some()) {
-        Figure::new().size(1100, 480).with(of_speedup(results)).save(folder.join("speedup.svg"))?;
+        Figure::new().size(1100, 480).with(speedup_plot(results)).save(folder.join("speedup.svg"))?;
     }
     Ok(())
 }
 
-fn of_growth(growth: &Growth) -> Panel {
+fn growth_plot(growth: &ScalingWithSize) -> Panel {
     let title = format!("Chain of masses, s = {}, {} steps", growth.stages, growth.steps);
     let panel = Panel::new(title).x("states nx").y("µs of one call").log_x().log_y();
-    Mode::ALL.into_iter().enumerate().fold(panel, |panel, (k, mode)| {
+    Mode::ALL_MODES.into_iter().enumerate().fold(panel, |panel, (k, mode)| {
         let points = growth.points.iter().map(|(nx, m)| (*nx as f64, 1e6 * m[k].time.median));
-        let name = format!("{}, nx^{:.2}", label(mode), growth.exponent(k));
+        let name = format!("{}, nx^{:.2}", mode_label(mode), growth.fitted_exponent(k));
         panel.with(Curve::line(name, points).marked())
     })
 }
 
-fn of_precision(what: &str, all: &[Precision], of: fn(&Precision) -> Measured) -> Panel {
+fn work_precision_plot(what: &str, all: &[Precision], of: fn(&Precision) -> Measured) -> Panel {
     let panel = Panel::new(format!("Chain of 5 masses: error of the {what}"));
     let panel = panel.x("µs of one call").y("relative error").log_x().log_y();
     (1..=5).fold(panel, |panel, stages| {
@@ -48,7 +48,7 @@ fn of_precision(what: &str, all: &[Precision], of: fn(&Precision) -> Measured) -
 }
 
 /// How many times faster one call is than acados' IRK.
-fn of_speedup(results: &Results) -> Panel {
+fn speedup_plot(results: &Results) -> Panel {
     let mut cases: Vec<&str> = Vec::new();
     for row in results.rows.iter().filter(|row| row.acados[0].is_some()) {
         if cases.last() != Some(&row.case.as_str()) {
@@ -59,14 +59,17 @@ fn of_speedup(results: &Results) -> Panel {
         let row = results.rows.iter().find(|row| row.case == case && row.mode == mode)?;
         Some(row.acados[0]?.seconds() / row.cold.time.median)
     };
-    let how = origin(results.rows.iter().filter_map(|row| row.acados[0].as_ref()));
+    let how = time_origin(results.rows.iter().filter_map(|row| row.acados[0].as_ref()));
     let short = |case: &&str| case.replace("chain ", "ch").replace("pendulum", "pend").replace("radau ", "");
     let panel = Panel::new(format!("One call: times faster than acados' IRK ({how})")).log_y().limit(1.0);
-    Mode::ALL.into_iter().enumerate().fold(panel.x_names(cases.iter().map(short)), |panel, (k, mode)| {
-        let points = cases
-            .iter()
-            .enumerate()
-            .filter_map(|(i, case)| Some((i as f64 + 0.15 * (k as f64 - 1.5), ratio(case, mode)?)));
-        panel.dots(label(mode), points)
-    })
+    Mode::ALL_MODES.into_iter().enumerate().fold(
+        panel.x_names(cases.iter().map(short)),
+        |panel, (k, mode)| {
+            let points = cases
+                .iter()
+                .enumerate()
+                .filter_map(|(i, case)| Some((i as f64 + 0.15 * (k as f64 - 1.5), ratio(case, mode)?)));
+            panel.dots(mode_label(mode), points)
+        },
+    )
 }

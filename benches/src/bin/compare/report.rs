@@ -1,12 +1,12 @@
 //! The tables.
 
 use super::Results;
-use super::rows::{Measured, Row, Theirs};
+use super::rows::{AcadosTime, Measured, Row};
 use casados_benches::case::Mode;
 use std::fmt::Write;
 
 /// Three digits.
-pub fn three(value: f64) -> String {
+pub fn three_digits(value: f64) -> String {
     match value {
         v if !v.is_finite() => "–".into(),
         v if v < 0.995 => format!("{v:.3}"),
@@ -16,12 +16,12 @@ pub fn three(value: f64) -> String {
     }
 }
 
-fn optional(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
+fn optional_text(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| "–".into(), show)
 }
 
 fn microseconds(seconds: f64) -> String {
-    three(1e6 * seconds)
+    three_digits(1e6 * seconds)
 }
 
 /// The median, and the range of rounds or the quartiles.
@@ -30,7 +30,7 @@ fn spread(m: &Measured) -> String {
 }
 
 fn error(m: &Measured) -> String {
-    optional(m.error, |e| format!("{e:.0e}"))
+    optional_text(m.error, |e| format!("{e:.0e}"))
 }
 
 /// Iterations of Newton's method, and how many factorisations pivoted the whole matrix if any did.
@@ -39,11 +39,11 @@ fn iterations(m: &Measured) -> String {
 }
 
 /// Where times of acados are from, in a word or two.
-pub fn origin<'a>(all: impl Iterator<Item = &'a Theirs>) -> &'static str {
+pub fn time_origin<'a>(all: impl Iterator<Item = &'a AcadosTime>) -> &'static str {
     let (mut measured, mut carried) = (false, false);
     all.for_each(|theirs| match theirs {
-        Theirs::Measured(_) => measured = true,
-        Theirs::Carried(_) => carried = true,
+        AcadosTime::Measured(_) => measured = true,
+        AcadosTime::CarriedOver(_) => carried = true,
     });
     match (measured, carried) {
         (true, false) => "measured",
@@ -54,55 +54,55 @@ pub fn origin<'a>(all: impl Iterator<Item = &'a Theirs>) -> &'static str {
 }
 
 /// What was measured with its range, what was carried over with a sign.
-fn theirs(acados: &Theirs) -> String {
+fn acados_time(acados: &AcadosTime) -> String {
     match acados {
-        Theirs::Measured(measured) => spread(measured),
-        Theirs::Carried(seconds) => format!("≈ {}", microseconds(*seconds)),
+        AcadosTime::Measured(measured) => spread(measured),
+        AcadosTime::CarriedOver(seconds) => format!("≈ {}", microseconds(*seconds)),
     }
 }
 
-fn times(ratio: f64) -> String {
-    format!("{}×", three(ratio))
+fn speedup(ratio: f64) -> String {
+    format!("{}×", three_digits(ratio))
 }
 
 /// All tables as Markdown.
 pub fn markdown(results: &Results) -> String {
     let mut text = String::new();
-    write(&mut text, results).expect("a string takes everything");
+    write_report(&mut text, results).expect("a string takes everything");
     text
 }
 
-fn write(text: &mut String, results: &Results) -> std::fmt::Result {
+fn write_report(text: &mut String, results: &Results) -> std::fmt::Result {
     writeln!(text, "### The run\n")?;
     for line in &results.machine {
         writeln!(text, "- {line}")?;
     }
     let (implicit, explicit): (Vec<_>, Vec<_>) =
         results.rows.iter().partition(|row| !row.case.contains("erk4"));
-    let carried = |row: &Row| row.acados.iter().any(|a| matches!(a, Some(Theirs::Carried(_))));
+    let carried = |row: &Row| row.acados.iter().any(|a| matches!(a, Some(AcadosTime::CarriedOver(_))));
     if results.scale.is_finite() && results.rows.iter().any(carried) {
-        let s = three(results.scale);
+        let s = three_digits(results.scale);
         writeln!(
             text,
             "- CasADi's simulations took {s} times (median) what they took where acados was measured beside them"
         )?;
     }
     if !implicit.is_empty() {
-        single(text, &implicit)?;
-        peers(text, &implicit)?;
-        forty(text, &implicit)?;
+        single_calls_section(text, &implicit)?;
+        peers_section(text, &implicit)?;
+        batch_section(text, &implicit)?;
     }
     if !explicit.is_empty() {
         writeln!(text, "\n### Explicit: RK4, one step, one call\n")?;
         single_table(text, &explicit)?;
         peers_table(text, &explicit)?;
     }
-    adaptive(text, results)?;
-    growth(text, results)?;
-    precision(text, results)
+    adaptive_section(text, results)?;
+    growth_section(text, results)?;
+    precision_section(text, results)
 }
 
-fn single(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+fn single_calls_section(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### One call\n")?;
     writeln!(
         text,
@@ -140,7 +140,7 @@ fn single_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     Ok(())
 }
 
-fn peers(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+fn peers_section(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### One call beside CasADi and acados\n")?;
     writeln!(
         text,
@@ -152,7 +152,7 @@ fn peers(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
 }
 
 fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
-    let from = |k: usize| origin(rows.iter().filter_map(|row| row.acados[k].as_ref()));
+    let from = |k: usize| time_origin(rows.iter().filter_map(|row| row.acados[k].as_ref()));
     writeln!(
         text,
         "\n| case | mode | casados | CasADi | error | acados IRK, {} | error | GNSF, {} | than CasADi | than IRK | than GNSF |",
@@ -162,7 +162,7 @@ fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
     for row in rows {
         let own = row.cold.time.median;
-        let ratio = |time: Option<f64>| optional(time, |t| times(t / own));
+        let ratio = |time: Option<f64>| optional_text(time, |t| speedup(t / own));
         let irk = row.acados[0].and_then(|theirs| theirs.measured());
         writeln!(
             text,
@@ -173,18 +173,18 @@ fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
             row.casadi.as_ref().map_or_else(|| "–".into(), spread),
             // Its own values are no reference for it.
             row.casadi.as_ref().filter(|_| row.reference != "CasADi").map_or_else(|| "–".into(), error),
-            row.acados[0].as_ref().map_or_else(|| "–".into(), theirs),
+            row.acados[0].as_ref().map_or_else(|| "–".into(), acados_time),
             irk.as_ref().map_or_else(|| "–".into(), error),
-            row.acados[1].as_ref().map_or_else(|| "–".into(), theirs),
+            row.acados[1].as_ref().map_or_else(|| "–".into(), acados_time),
             ratio(row.casadi.map(|c| c.time.median)),
-            ratio(row.acados[0].as_ref().map(Theirs::seconds)),
-            ratio(row.acados[1].as_ref().map(Theirs::seconds))
+            ratio(row.acados[0].as_ref().map(AcadosTime::seconds)),
+            ratio(row.acados[1].as_ref().map(AcadosTime::seconds))
         )?;
     }
     Ok(())
 }
 
-fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+fn batch_section(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### Forty intervals\n")?;
     writeln!(
         text,
@@ -204,18 +204,18 @@ fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
             "| {} | {} | {} | {} | {} | {} | {} | {} |",
             row.case,
             row.mode.name(),
-            spread(&row.forty),
-            optional(than(&row.forty), times),
+            spread(&row.batch_of_forty),
+            optional_text(than(&row.batch_of_forty), speedup),
             batch.map_or("–".into(), spread),
             batch.map_or("–".into(), error),
-            optional(batch.map(|batch| row.forty.time.median / batch.time.median), times),
-            optional(batch.and_then(than), times)
+            optional_text(batch.map(|batch| row.batch_of_forty.time.median / batch.time.median), speedup),
+            optional_text(batch.and_then(than), speedup)
         )?;
     }
     Ok(())
 }
 
-fn adaptive(text: &mut String, results: &Results) -> std::fmt::Result {
+fn adaptive_section(text: &mut String, results: &Results) -> std::fmt::Result {
     if results.adaptive.is_empty() {
         return Ok(());
     }
@@ -243,7 +243,7 @@ fn adaptive(text: &mut String, results: &Results) -> std::fmt::Result {
     Ok(())
 }
 
-fn growth(text: &mut String, results: &Results) -> std::fmt::Result {
+fn growth_section(text: &mut String, results: &Results) -> std::fmt::Result {
     for growth in &results.growth {
         writeln!(text, "\n### Growth, s = {}, {} steps\n", growth.stages, growth.steps)?;
         writeln!(
@@ -256,15 +256,16 @@ fn growth(text: &mut String, results: &Results) -> std::fmt::Result {
             let [a, b, c, d] = measured.map(|m| microseconds(m.time.median));
             writeln!(text, "| {nx} | {a} | {b} | {c} | {d} |")?;
         }
-        let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.exponent(mode)));
+        let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.fitted_exponent(mode)));
         writeln!(text, "| exponent | {a} | {b} | {c} | {d} |")?;
-        let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.exponent_of_an_iteration(mode)));
+        let [a, b, c, d] =
+            [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.fitted_exponent_per_iteration(mode)));
         writeln!(text, "| of an iteration of Newton's method | {a} | {b} | {c} | {d} |")?;
     }
     Ok(())
 }
 
-fn precision(text: &mut String, results: &Results) -> std::fmt::Result {
+fn precision_section(text: &mut String, results: &Results) -> std::fmt::Result {
     let Some((all, uncertainty)) = &results.precision else { return Ok(()) };
     writeln!(text, "\n### What accuracy costs\n")?;
     writeln!(
@@ -291,7 +292,7 @@ fn precision(text: &mut String, results: &Results) -> std::fmt::Result {
 }
 
 /// The name of a mode, as in plots.
-pub fn label(mode: Mode) -> &'static str {
+pub fn mode_label(mode: Mode) -> &'static str {
     match mode {
         Mode::Simulation => "simulation",
         Mode::Forward => "forward",

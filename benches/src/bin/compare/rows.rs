@@ -1,11 +1,11 @@
 //! What is measured, line by line.
 
 use super::acados::{self, Acados};
-use super::anchors::Anchors;
 use super::casadi::Casadi;
+use super::reference_times::ReferenceTimes;
 use super::{Effort, Failure};
 use casados::prelude::*;
-use casados_benches::calls::{Calls, Together, open, open_batch, options};
+use casados_benches::calls::{BatchCalls, IntegratorCalls, open_batch, open_calls, options};
 use casados_benches::case::{Case, Family, Mode};
 use casados_benches::time::{Summary, measure};
 use std::ops::Range;
@@ -41,30 +41,30 @@ pub struct Row {
     /// From the stages of an interval that is 1e-2 away, to 1e-8 / steps.
     pub warm: Option<Measured>,
     /// Forty calls for the intervals of a horizon; one of them.
-    pub forty: Measured,
+    pub batch_of_forty: Measured,
     /// The same in one call of a batch; one of them.
     pub batch: Option<Measured>,
     /// CasADi, in the same rounds.
     pub casadi: Option<Measured>,
     /// acados' IRK (or ERK) and GNSF.
-    pub acados: [Option<Theirs>; 2],
+    pub acados: [Option<AcadosTime>; 2],
 }
 
 /// What is known about acados.
 #[derive(Clone, Copy, Debug)]
-pub enum Theirs {
+pub enum AcadosTime {
     /// Measured in the same rounds.
     Measured(Measured),
-    /// Seconds, carried over from another machine; see [`Anchors`].
-    Carried(f64),
+    /// Seconds, carried over from another machine; see [`ReferenceTimes`].
+    CarriedOver(f64),
 }
 
-impl Theirs {
+impl AcadosTime {
     /// None if it was carried over.
     pub fn measured(&self) -> Option<Measured> {
         match self {
             Self::Measured(measured) => Some(*measured),
-            Self::Carried(_) => None,
+            Self::CarriedOver(_) => None,
         }
     }
 
@@ -72,7 +72,7 @@ impl Theirs {
     pub fn seconds(&self) -> f64 {
         match self {
             Self::Measured(measured) => measured.time.median,
-            Self::Carried(seconds) => *seconds,
+            Self::CarriedOver(seconds) => *seconds,
         }
     }
 }
@@ -86,7 +86,7 @@ pub struct Peers {
 }
 
 /// Jacobians of this size and Hessians of that keep CasADi busy for minutes.
-fn affordable(case: &Case, mode: Mode) -> bool {
+fn is_affordable(case: &Case, mode: Mode) -> bool {
     let work = case.nx * case.stages * case.steps;
     match mode {
         Mode::Simulation => true,
@@ -98,13 +98,13 @@ fn affordable(case: &Case, mode: Mode) -> bool {
 /// All questions to one case, the peers and casados in turn.
 pub fn measure_case(case: &Case, peers: &mut Peers, effort: Effort) -> Result<Vec<Row>, Failure> {
     let mut case = case.clone();
-    let modes: Vec<Mode> = Mode::ALL.into_iter().filter(|m| affordable(&case, *m)).collect();
+    let modes: Vec<Mode> = Mode::ALL_MODES.into_iter().filter(|m| is_affordable(&case, *m)).collect();
     if case.reference.is_none()
         && let Some(casadi) = peers.casadi.as_mut()
     {
         case.reference = casadi.values(&case, &modes).ok().map(|values| ("CasADi", values));
     }
-    Mode::ALL.into_iter().map(|mode| measure_row(&case, mode, peers, effort)).collect()
+    Mode::ALL_MODES.into_iter().map(|mode| measure_row(&case, mode, peers, effort)).collect()
 }
 
 /// A question to a peer, given the seconds that it may take.
@@ -133,21 +133,21 @@ impl<'a> PeerTimer<'a> {
     }
 
     fn finish(self) -> (usize, Measured) {
-        (self.column, Measured { time: of_rounds(&self.rounds), ..self.first })
+        (self.column, Measured { time: from_rounds(&self.rounds), ..self.first })
     }
 }
 
-fn ask_all<'a>(case: &'a Case, mode: Mode, peers: &'a mut Peers) -> Vec<PeerTimer<'a>> {
+fn ask_all_peers<'a>(case: &'a Case, mode: Mode, peers: &'a mut Peers) -> Vec<PeerTimer<'a>> {
     let reference = case.reference.as_ref().map(|(_, values)| values);
     let solver = if case.family == Family::Rk4 { "rk" } else { "collocation" };
     let mut all = Vec::new();
-    if let Some(casadi) = peers.casadi.as_mut().filter(|_| affordable(case, mode)) {
+    if let Some(casadi) = peers.casadi.as_mut().filter(|_| is_affordable(case, mode)) {
         let ask = move |seconds| casadi.time(case, solver, mode, seconds, reference);
         all.extend(PeerTimer::new(0, Box::new(ask)));
     }
     for acados in &mut peers.acados {
         let acados = std::rc::Rc::new(std::cell::RefCell::new(acados));
-        for (column, integrator) in (1..).zip(acados::integrators(case, mode)) {
+        for (column, integrator) in (1..).zip(acados::integrators_of_row(case, mode)) {
             let Some(integrator) = integrator else { continue };
             let acados = acados.clone();
             let ask = move |seconds| acados.borrow_mut().time(case, integrator, mode, seconds, reference);
@@ -163,13 +163,13 @@ fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Re
     let mut timers = vec![
         Timer::new(case, 1e-8, Start::Zero, mode, single.clone())?,
         Timer::new(case, 0.0, Start::Zero, mode, single)?,
-        Timer::new(case, 1e-8, Start::Zero, mode, 0..case.inputs.len())?.keeping(),
+        Timer::new(case, 1e-8, Start::Zero, mode, 0..case.inputs.len())?.keeping_results(),
     ];
     if warm {
         timers.push(Timer::new(case, 1e-8, Start::Warm, mode, 0..2)?);
     }
     let mut batch = BatchTimer::new(case, mode)?;
-    let mut asked = ask_all(case, mode, peers);
+    let mut asked = ask_all_peers(case, mode, peers);
     for _ in 0..ROUNDS {
         asked.iter_mut().try_for_each(|timer| timer.round(effort))?;
         timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
@@ -188,16 +188,16 @@ fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Re
         nx: case.nx,
         mode,
         reference: match &case.reference {
-            Some((source, values)) if !values.of(mode).is_empty() => source,
+            Some((source, values)) if !values.part_of_mode(mode).is_empty() => source,
             _ => "none",
         },
         cold: measured[0],
         rounding: measured[1],
-        forty: measured[2],
+        batch_of_forty: measured[2],
         batch: batch.map(BatchTimer::finish),
         warm: measured.get(3).copied(),
         casadi: theirs[0],
-        acados: [theirs[1], theirs[2]].map(|measured| measured.map(Theirs::Measured)),
+        acados: [theirs[1], theirs[2]].map(|measured| measured.map(AcadosTime::Measured)),
     })
 }
 
@@ -206,8 +206,8 @@ fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Re
 const ROUNDS: usize = 5;
 
 /// The median round, the least, and the greatest.
-fn of_rounds(rounds: &[Summary]) -> Summary {
-    let all = Summary::of(rounds.iter().map(|r| r.median).collect());
+fn from_rounds(rounds: &[Summary]) -> Summary {
+    let all = Summary::from_samples(rounds.iter().map(|r| r.median).collect());
     let (least, greatest) =
         rounds.iter().fold((f64::INFINITY, 0.0f64), |(a, b), r| (a.min(r.median), b.max(r.median)));
     Summary { q1: least, q3: greatest, samples: rounds.iter().map(|r| r.samples).sum(), ..all }
@@ -215,11 +215,11 @@ fn of_rounds(rounds: &[Summary]) -> Summary {
 
 /// Passes over some inputs of a case: the time of one call, and the error at the first of them.
 pub struct Timer {
-    calls: Box<dyn Calls>,
+    calls: Box<dyn IntegratorCalls>,
     mode: Mode,
     inputs: Range<usize>,
     /// Whether the results of all inputs are kept, as a batch keeps them.
-    keeps: bool,
+    keeps_results: bool,
     error: Option<f64>,
     rounds: Vec<Summary>,
 }
@@ -232,24 +232,24 @@ impl Timer {
         mode: Mode,
         inputs: Range<usize>,
     ) -> Result<Self, Failure> {
-        let mut calls = open(case, options(case, tolerance, start))?;
-        let values = calls.values(mode, 0).map_err(|e| format!("{}: {e}", case.name))?;
-        let error = case.reference.as_ref().and_then(|(_, reference)| values.error(reference, mode));
-        Ok(Self { calls, mode, inputs, keeps: false, error, rounds: Vec::new() })
+        let mut calls = open_calls(case, options(case, tolerance, start))?;
+        let values = calls.results_of(mode, 0).map_err(|e| format!("{}: {e}", case.name))?;
+        let error = case.reference.as_ref().and_then(|(_, reference)| values.relative_error(reference, mode));
+        Ok(Self { calls, mode, inputs, keeps_results: false, error, rounds: Vec::new() })
     }
 
     /// With all inputs, whose results are kept.
-    fn keeping(self) -> Self {
-        Self { keeps: true, ..self }
+    fn keeping_results(self) -> Self {
+        Self { keeps_results: true, ..self }
     }
 
     pub fn round(&mut self, effort: Effort) -> Result<(), Failure> {
         let budget = effort.budget() / ROUNDS as u32;
-        let Self { calls, mode, inputs, keeps, .. } = &mut *self;
+        let Self { calls, mode, inputs, keeps_results: keeps, .. } = &mut *self;
         let time = if *keeps {
             measure(budget, || calls.call_all(*mode))
         } else {
-            measure(budget, || inputs.clone().try_for_each(|k| calls.call(*mode, k)))
+            measure(budget, || inputs.clone().try_for_each(|k| calls.call_input(*mode, k)))
         };
         let time = time.map_err(|e| e.to_string())?;
         self.rounds.push(time.divided(self.inputs.len() as f64));
@@ -259,7 +259,7 @@ impl Timer {
     pub fn finish(self) -> Measured {
         let statistics = self.calls.statistics();
         Measured {
-            time: of_rounds(&self.rounds),
+            time: from_rounds(&self.rounds),
             error: self.error,
             iterations: statistics.iterations,
             dense: statistics.dense,
@@ -269,7 +269,7 @@ impl Timer {
 
 /// Passes over all inputs of a case side by side.
 struct BatchTimer {
-    calls: Box<dyn Together>,
+    calls: Box<dyn BatchCalls>,
     mode: Mode,
     count: usize,
     error: Option<f64>,
@@ -280,7 +280,7 @@ impl BatchTimer {
     fn new(case: &Case, mode: Mode) -> Result<Option<Self>, Failure> {
         let Some(mut calls) = open_batch(case, options(case, 1e-8, Start::Zero))? else { return Ok(None) };
         let values = calls.values(mode).map_err(|e| format!("{}, batch: {e}", case.name))?;
-        let error = case.reference.as_ref().and_then(|(_, reference)| values.error(reference, mode));
+        let error = case.reference.as_ref().and_then(|(_, reference)| values.relative_error(reference, mode));
         Ok(Some(Self { calls, mode, count: case.inputs.len(), error, rounds: Vec::new() }))
     }
 
@@ -291,28 +291,28 @@ impl BatchTimer {
     }
 
     fn finish(self) -> Measured {
-        Measured { time: of_rounds(&self.rounds), error: self.error, ..Default::default() }
+        Measured { time: from_rounds(&self.rounds), error: self.error, ..Default::default() }
     }
 }
 
 /// All in turn.
-pub fn in_turn(mut timers: Vec<Timer>, effort: Effort) -> Result<Vec<Measured>, Failure> {
+pub fn run_in_turn(mut timers: Vec<Timer>, effort: Effort) -> Result<Vec<Measured>, Failure> {
     for _ in 0..ROUNDS {
         timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
     }
     Ok(timers.into_iter().map(Timer::finish).collect())
 }
 
-/// Carries acados' times over where they were not measured; see [`Anchors`].
-pub fn carry(rows: &mut [Row], anchors: &Anchors) {
-    let general = anchors.general_scale(rows);
+/// Carries acados' times over where they were not measured; see [`ReferenceTimes`].
+pub fn carry_over(rows: &mut [Row], anchors: &ReferenceTimes) {
+    let general = anchors.median_machine_ratio(rows);
     let scales: Vec<_> =
-        rows.iter().map(|row| anchors.scale(rows, &row.case).map(|s| s.min(general))).collect();
+        rows.iter().map(|row| anchors.machine_ratio(rows, &row.case).map(|s| s.min(general))).collect();
     for (row, scale) in rows.iter_mut().zip(scales) {
         let scale = scale.unwrap_or(general);
         for (theirs, key) in row.acados.iter_mut().zip(["irk", "gnsf"]) {
             let carried = || anchors.seconds(&row.case, key, row.mode).map(|t| t * scale);
-            *theirs = theirs.or_else(|| carried().filter(|t| t.is_finite()).map(Theirs::Carried));
+            *theirs = theirs.or_else(|| carried().filter(|t| t.is_finite()).map(AcadosTime::CarriedOver));
         }
     }
 }

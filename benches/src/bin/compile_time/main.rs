@@ -13,8 +13,8 @@
 
 mod programs;
 
-use casados_benches::record::{insert, repository};
-use casados_benches::time::slope;
+use casados_benches::record::{insert_between_markers, repository_path};
+use casados_benches::time::log_log_slope;
 use programs::{Failure, Program};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,23 +43,23 @@ codegen-units = 1
 "#;
 
 /// A way to build the package.
-struct Build {
+struct BuildSettings {
     profile: &'static str,
     /// Whether it names the processor of this machine.
     native: bool,
 }
 
 /// As cargo does it, with one codegen unit, with the processor named, and for debugging.
-const BUILDS: [Build; 4] = [
-    Build { profile: "release", native: false },
-    Build { profile: "one", native: false },
-    Build { profile: "release", native: true },
-    Build { profile: "dev", native: false },
+const BUILDS: [BuildSettings; 4] = [
+    BuildSettings { profile: "release", native: false },
+    BuildSettings { profile: "one", native: false },
+    BuildSettings { profile: "release", native: true },
+    BuildSettings { profile: "dev", native: false },
 ];
-const RELEASE: &Build = &BUILDS[0];
-const ONE: &Build = &BUILDS[1];
-const NATIVE: &Build = &BUILDS[2];
-const DEBUG: &Build = &BUILDS[3];
+const RELEASE: &BuildSettings = &BUILDS[0];
+const ONE_CODEGEN_UNIT: &BuildSettings = &BUILDS[1];
+const NATIVE: &BuildSettings = &BUILDS[2];
+const DEBUG: &BuildSettings = &BUILDS[3];
 
 /// One compilation of the package.
 #[derive(Clone, Copy)]
@@ -72,9 +72,9 @@ struct Measured {
     size: f64,
 }
 
-impl Build {
+impl BuildSettings {
     /// Where it builds: what is native has dependencies of its own.
-    fn target(&self) -> &'static str {
+    fn target_directory(&self) -> &'static str {
         if self.native { "native" } else { "target" }
     }
 }
@@ -87,10 +87,10 @@ struct Package {
 impl Package {
     /// Writes it, and builds what it depends on in all profiles.
     fn new() -> Result<Self, Failure> {
-        let folder = repository("target/compile_time");
+        let folder = repository_path("target/compile_time");
         fs::create_dir_all(folder.join("src"))?;
         let folder = folder.canonicalize()?;
-        let casados = repository("").canonicalize()?;
+        let casados = repository_path("").canonicalize()?;
         fs::write(folder.join("Cargo.toml"), MANIFEST.replace("CASADOS", &casados.to_string_lossy()))?;
         let wrapper = folder.join("measure.sh");
         fs::write(&wrapper, WRAPPER)?;
@@ -108,10 +108,10 @@ impl Package {
         Ok(package)
     }
 
-    fn build(&self, build: &Build) -> Result<Measured, Failure> {
+    fn build(&self, build: &BuildSettings) -> Result<Measured, Failure> {
         let times = self.folder.join("measured");
         let output = Command::new(env!("CARGO"))
-            .args(["build", "--quiet", "--profile", build.profile, "--target-dir", build.target()])
+            .args(["build", "--quiet", "--profile", build.profile, "--target-dir", build.target_directory()])
             .env("RUSTFLAGS", if build.native { "-C target-cpu=native" } else { "" })
             .env("RUSTC_WORKSPACE_WRAPPER", self.folder.join("measure.sh"))
             .env("CASADOS_MEASURED", &times)
@@ -128,16 +128,16 @@ impl Package {
         Ok(Measured { seconds, memory: kilobytes / 1e3, size })
     }
 
-    fn binary(&self, build: &Build) -> PathBuf {
+    fn binary(&self, build: &BuildSettings) -> PathBuf {
         let folder = if build.profile == "dev" { "debug" } else { build.profile };
-        self.folder.join(build.target()).join(folder).join("compile-time")
+        self.folder.join(build.target_directory()).join(folder).join("compile-time")
     }
 
     /// Builds a program three times; the medians.
-    fn measure(&self, program: &Program, build: &Build) -> Result<Measured, Failure> {
+    fn measure(&self, program: &Program, build: &BuildSettings) -> Result<Measured, Failure> {
         let mut all = Vec::new();
         for edit in 0..3 {
-            fs::write(self.folder.join("src/main.rs"), program.edited(edit))?;
+            fs::write(self.folder.join("src/main.rs"), program.edited_source(edit))?;
             all.push(self.build(build)?);
         }
         let median = |of: fn(&Measured) -> f64| {
@@ -154,15 +154,15 @@ impl Package {
 }
 
 /// The table of programs.
-fn uses(package: &Package) -> Result<String, Failure> {
+fn table_of_programs(package: &Package) -> Result<String, Failure> {
     let mut table = String::from(
         "| program | s | MB | KB | one unit: s | MB | KB | native: s | MB | KB |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ",
     );
-    for program in programs::uses()? {
+    for program in programs::programs_by_use()? {
         let mut line = format!("| {} |", program.name);
-        for build in [RELEASE, ONE, NATIVE] {
+        for build in [RELEASE, ONE_CODEGEN_UNIT, NATIVE] {
             let m = package.measure(&program, build)?;
             line += &format!(" {:.1} | {:.0} | {:.0} |", m.seconds, m.memory, m.size);
         }
@@ -179,12 +179,12 @@ fn uses(package: &Package) -> Result<String, Failure> {
 }
 
 /// The table of models that grow.
-fn growth(package: &Package) -> Result<String, Failure> {
+fn table_of_growing_models(package: &Package) -> Result<String, Failure> {
     let mut table = String::from(
         "| all modes | operations | seconds | microseconds per operation |\n| --- | --- | --- | --- |\n",
     );
     let mut points = Vec::new();
-    for program in programs::growing()? {
+    for program in programs::programs_of_growing_models()? {
         let seconds = package.measure(&program, RELEASE)?.seconds;
         let output = Command::new(package.binary(RELEASE)).output()?;
         let operations: f64 = String::from_utf8(output.stdout)?.trim().parse()?;
@@ -194,23 +194,26 @@ fn growth(package: &Package) -> Result<String, Failure> {
         eprint!("{line}");
         table += &line;
     }
-    table += &format!("\nOver the chains the time grows like operations^{:.2}.\n", slope(points.into_iter()));
+    table += &format!(
+        "\nOver the chains the time grows like operations^{:.2}.\n",
+        log_log_slope(points.into_iter())
+    );
     Ok(table)
 }
 
-fn run(target: Option<&Path>) -> Result<(), Failure> {
+fn measure_all(target: Option<&Path>) -> Result<(), Failure> {
     let package = Package::new()?;
-    let table = format!("{}\n{}", uses(&package)?, growth(&package)?);
+    let table = format!("{}\n{}", table_of_programs(&package)?, table_of_growing_models(&package)?);
     println!("{table}");
     if let Some(file) = target {
-        insert(file, "compile time", &table)?;
+        insert_between_markers(file, "compile time", &table)?;
     }
     Ok(())
 }
 
 fn main() -> ExitCode {
     let target: Option<PathBuf> = std::env::args_os().nth(1).map(Into::into);
-    match run(target.as_deref()) {
+    match measure_all(target.as_deref()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("compile_time: {error}");

@@ -28,8 +28,8 @@ use casados::ocp::{
 use casados::prelude::*;
 use casados_benches::models::Chain;
 use casados_benches::peer::Peer;
-use casados_benches::record::{insert, load, numbers};
-use casados_benches::time::pin;
+use casados_benches::record::{insert_between_markers, load, numbers};
+use casados_benches::time::pin_to_last_core;
 use cpu_time::ThreadTime;
 use reference_data::Record;
 use serde_json::{Value, json};
@@ -51,7 +51,7 @@ struct Run {
     milliseconds: f64,
 }
 
-fn timed(call: impl FnOnce() -> Result<Outcome, Failure>) -> Result<Run, Failure> {
+fn time_run(call: impl FnOnce() -> Result<Outcome, Failure>) -> Result<Run, Failure> {
     let start = ThreadTime::now();
     let outcome = call()?;
     Ok(Run { outcome, milliseconds: 1e3 * start.elapsed().as_secs_f64() })
@@ -69,8 +69,8 @@ fn runner<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
 ) -> Result<impl FnMut(&Guess) -> Result<Run, Failure>, Failure> {
     let mut ipm = HeapIpm::new(&ocp)?;
     Ok(move |guess: &Guess| {
-        problem::begin(&mut ocp, guess)?;
-        timed(|| Ok(ipm.solve(&mut ocp)?))
+        problem::set_iterate(&mut ocp, guess)?;
+        time_run(|| Ok(ipm.solve(&mut ocp)?))
     })
 }
 
@@ -81,8 +81,8 @@ fn sequential<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
     sqp.options.tolerance = 1e-8;
     Ok(move |guess: &Guess| {
-        problem::begin(&mut ocp, guess)?;
-        timed(|| Ok(sqp.solve(&mut ocp)?))
+        problem::set_iterate(&mut ocp, guess)?;
+        time_run(|| Ok(sqp.solve(&mut ocp)?))
     })
 }
 
@@ -185,15 +185,16 @@ fn chain_request(masses: usize, record: &Value) -> Value {
         "x0": numbers(&record["x0"]), "iterations": 200 })
 }
 
-fn times(table: &mut String, orbit: &Record, ipopt: &mut Option<Peer>) -> Result<(), Failure> {
+fn measure_times(table: &mut String, orbit: &Record, ipopt: &mut Option<Peer>) -> Result<(), Failure> {
     let h = orbit.number("T")?;
     writeln!(
         table,
         "| | iterations | objective | ms | ms an iteration | functions | IPOPT's time over this |\n| --- | --- | --- | --- | --- | --- | --- |"
     )?;
-    let mut shooting = runner(problem::orbit(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
+    let mut shooting =
+        runner(problem::orbit_problem(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
     let mut collocation =
-        runner(problem::orbit(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
+        runner(problem::orbit_problem(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
     let request = json!({ "problem": "orbit", "h": h, "iterations": 200 });
     for name in ["guess_dc", "guess_pow", "guess_init"] {
         let guess = guess::guess(&orbit.record(name)?)?;
@@ -239,7 +240,7 @@ fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
 
 /// The time of an iteration over the number of intervals of a second, and that of a recursion with
 /// periodic states and without.
-fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
+fn measure_scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
     use casados::ocp::{GeneralCost, Horizon, Problem};
     writeln!(
         table,
@@ -269,14 +270,15 @@ fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
     let h = orbit.number("T")?;
     let guess = guess::guess(&orbit.record("guess_dc")?)?;
     let shooting = || Ok::<_, Failure>(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?));
-    let (mut periodic, mut plain) = (problem::orbit(shooting()?, h)?, problem::flight(shooting()?, h)?);
+    let (mut periodic, mut plain) =
+        (problem::orbit_problem(shooting()?, h)?, problem::flight_problem(shooting()?, h)?);
     plain.fix_initial_state(&guess[0][0])?;
     let mut times = [Vec::new(), Vec::new()];
     for _ in 0..ROUNDS {
-        problem::begin(&mut periodic, &guess)?;
-        problem::begin(&mut plain, &guess)?;
-        times[0].extend(directions(&mut periodic)?);
-        times[1].extend(directions(&mut plain)?);
+        problem::set_iterate(&mut periodic, &guess)?;
+        problem::set_iterate(&mut plain, &guess)?;
+        times[0].extend(measure_directions(&mut periodic)?);
+        times[1].extend(measure_directions(&mut plain)?);
     }
     let [periodic, plain] = times.map(|times| median(times.into_iter()));
     writeln!(
@@ -289,7 +291,7 @@ fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
 
 /// Milliseconds of search directions that needed one factorisation, without corrections: a
 /// recursion for one right-hand side.
-fn directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+fn measure_directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
 ) -> Result<Vec<f64>, Failure> {
     let mut ipm = HeapIpm::new(ocp)?;
@@ -300,12 +302,12 @@ fn directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
 }
 
 /// A part of the tables, where it is asked for, to its place.
-fn part(
+fn run_selected_part(
     arguments: &[String],
     name: &str,
     write: impl FnOnce(&mut String) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let value = |name: &str| value(arguments, name);
+    let value = |name: &str| argument_value(arguments, name);
     if value("--only").is_some_and(|only| only != name) {
         return Ok(());
     }
@@ -313,13 +315,15 @@ fn part(
     write(&mut table)?;
     println!("{table}");
     match value("--write") {
-        Some(file) => Ok(insert(Path::new(file), &format!("interior point, {name}"), &table)?),
+        Some(file) => {
+            Ok(insert_between_markers(Path::new(file), &format!("interior point, {name}"), &table)?)
+        }
         None => Ok(()),
     }
 }
 
 /// What follows an argument.
-fn value<'a>(arguments: &'a [String], name: &str) -> Option<&'a str> {
+fn argument_value<'a>(arguments: &'a [String], name: &str) -> Option<&'a str> {
     let at = arguments.iter().position(|argument| argument == name)?;
     arguments.get(at + 1).map(String::as_str)
 }
@@ -327,14 +331,14 @@ fn value<'a>(arguments: &'a [String], name: &str) -> Option<&'a str> {
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().collect();
     const PARTS: [&str; 3] = ["times", "horizons", "starts"];
-    if let Some(only) = value(&arguments, "--only").filter(|only| !PARTS.contains(only)) {
+    if let Some(only) = argument_value(&arguments, "--only").filter(|only| !PARTS.contains(only)) {
         return Err(format!("no part {only:?}: there are {PARTS:?}").into());
     }
-    let count = value(&arguments, "--starts").map_or(Ok(100), str::parse)?;
-    eprintln!("pinned: {}", pin());
+    let count = argument_value(&arguments, "--starts").map_or(Ok(100), str::parse)?;
+    eprintln!("pinned: {}", pin_to_last_core());
     let mut ipopt = Peer::start("casadi_starts.py", |command| command).ok();
     let orbit = Record::from(load("tests/data/awe/orbit.json")?);
-    part(&arguments, "times", |table| times(table, &orbit, &mut ipopt))?;
-    part(&arguments, "horizons", |table| scaling(table, &orbit))?;
-    part(&arguments, "starts", |table| starts::random(table, &orbit, &mut ipopt, count))
+    run_selected_part(&arguments, "times", |table| measure_times(table, &orbit, &mut ipopt))?;
+    run_selected_part(&arguments, "horizons", |table| measure_scaling(table, &orbit))?;
+    run_selected_part(&arguments, "starts", |table| starts::random_starts(table, &orbit, &mut ipopt, count))
 }

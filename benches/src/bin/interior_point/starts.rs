@@ -26,7 +26,7 @@ impl SplitMix {
 }
 
 /// A start beside another one: every state and control of every node by a random part of `size`.
-fn beside([x, u]: &Guess, seed: u64, size: [&[f64]; 2]) -> Guess {
+fn perturbed_start([x, u]: &Guess, seed: u64, size: [&[f64]; 2]) -> Guess {
     let mut random = SplitMix(seed);
     let mut moved = |rows: &Vec<Vec<f64>>, size: &[f64]| {
         let row = |row: &Vec<f64>| row.iter().zip(size).map(|(v, s)| v + s * random.next()).collect();
@@ -65,7 +65,7 @@ impl Tally {
     }
 }
 
-fn starts(
+fn compare_starts(
     table: &mut String,
     name: &str,
     guesses: &[Guess],
@@ -123,7 +123,7 @@ fn starts(
     Ok(())
 }
 
-pub fn random(
+pub fn random_starts(
     table: &mut String,
     orbit: &Record,
     ipopt: &mut Option<Peer>,
@@ -136,23 +136,25 @@ pub fn random(
     )?;
     let circle = guess::guess(&orbit.record("guess_init")?)?;
     let size = ranges(&circle[0]).into_iter().map(|range| 0.2 * range).collect::<Vec<_>>();
-    let guesses: Vec<Guess> =
-        (0..count as u64).map(|seed| beside(&circle, seed, [&size, &[0.1, 0.1, 0.1, 1.0]])).collect();
-    let mut shooting = runner(problem::orbit(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
+    let guesses: Vec<Guess> = (0..count as u64)
+        .map(|seed| perturbed_start(&circle, seed, [&size, &[0.1, 0.1, 0.1, 1.0]]))
+        .collect();
+    let mut shooting =
+        runner(problem::orbit_problem(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
     let mut collocation =
-        runner(problem::orbit(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
+        runner(problem::orbit_problem(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
     let mut methods: [(&str, Runner<'_>); 2] =
         [("shooting", &mut shooting), ("collocation", &mut collocation)];
     let request = json!({ "problem": "orbit", "h": h, "iterations": 200 });
-    starts(table, "orbit", &guesses, &mut methods, ipopt, &request)?;
+    compare_starts(table, "orbit", &guesses, &mut methods, ipopt, &request)?;
 
     let record = load("tests/data/ocp/chain_5.json")?;
     let size: Vec<f64> = (0..21).map(|i| if i < 12 { 0.1 } else { 0.5 }).collect();
     let guesses: Vec<Guess> =
-        (0..count as u64).map(|seed| beside(&rest(&record), seed, [&size, &[1.0; 3]])).collect();
+        (0..count as u64).map(|seed| perturbed_start(&rest(&record), seed, [&size, &[1.0; 3]])).collect();
     let mut shooting = runner(chain!(21, record, chain_batch!(21)))?;
     let mut collocation = runner(chain!(21, record, chain_collocation!(21)))?;
     let mut methods: [(&str, Runner<'_>); 2] =
         [("shooting", &mut shooting), ("collocation", &mut collocation)];
-    starts(table, "chain of 5 masses", &guesses, &mut methods, ipopt, &chain_request(5, &record))
+    compare_starts(table, "chain of 5 masses", &guesses, &mut methods, ipopt, &chain_request(5, &record))
 }

@@ -16,24 +16,24 @@ use casados_benches::peer::Peer;
 use ocps::{Failure, Grid};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use variations::{GIVEN, VARIATIONS, Variation};
+use variations::{ORIGINAL, VARIATIONS, Variation};
 
 /// What solves the problems.
 const SOLVERS: [&str; 3] = ["SQP", "interior point", "IPOPT"];
 /// An objective that is larger by this is that of another minimum.
-const APART: f64 = 1e-4;
+const OTHER_MINIMUM_DISTANCE: f64 = 1e-4;
 
 /// What a solver made of a problem.
 #[derive(Clone, Debug)]
-struct Made {
+struct SolverResult {
     solved: bool,
     iterations: u64,
     objective: f64,
     status: String,
 }
 
-impl Made {
-    fn of<E: std::fmt::Display>(outcome: Result<Outcome, E>) -> Self {
+impl SolverResult {
+    fn from_run<E: std::fmt::Display>(outcome: Result<Outcome, E>) -> Self {
         match outcome {
             Ok(outcome) => Self {
                 solved: outcome.is_converged(),
@@ -68,10 +68,10 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     variation: &Variation,
     make: impl Fn(Grid) -> Result<HeapOcp<P>, Failure>,
     ipopt: &mut Option<Peer>,
-) -> Result<Vec<Made>, Failure> {
+) -> Result<Vec<SolverResult>, Failure> {
     let begin = || -> Result<HeapOcp<P>, Failure> {
         let mut ocp = make(variation.grid)?;
-        variation.apply(&mut ocp)?;
+        variation.apply_variation(&mut ocp)?;
         Ok(ocp)
     };
     let mut ocp = begin()?;
@@ -82,11 +82,11 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
         "x": ocp.iterate().stages().map(|stage| stage.x.to_vec()).collect::<Vec<_>>(),
         "u": ocp.iterate().stages().take(ocp.intervals()).map(|stage| stage.u.to_vec()).collect::<Vec<_>>(),
     });
-    let mut made = vec![Made::of(HeapSqp::new(&ocp)?.solve(&mut ocp))];
+    let mut made = vec![SolverResult::from_run(HeapSqp::new(&ocp)?.solve(&mut ocp))];
     ocp = begin()?;
-    made.push(Made::of(HeapIpm::new(&ocp)?.solve(&mut ocp)));
+    made.push(SolverResult::from_run(HeapIpm::new(&ocp)?.solve(&mut ocp)));
     if let Some(ipopt) = ipopt {
-        made.push(Made::of_peer(ipopt.ask(&request)));
+        made.push(SolverResult::of_peer(ipopt.ask(&request)));
     }
     Ok(made)
 }
@@ -101,7 +101,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn count(&mut self, made: &[Made]) {
+    fn count(&mut self, made: &[SolverResult]) {
         self.problems += 1;
         let compared = made.iter().all(|made| made.solved);
         for (i, made) in made.iter().enumerate() {
@@ -120,12 +120,12 @@ impl Summary {
 }
 
 /// A row of the table: iterations, or how it ended.
-fn print(name: &str, made: &[Made]) {
+fn print(name: &str, made: &[SolverResult]) {
     let best =
         made.iter().filter(|made| made.solved).map(|made| made.objective).fold(f64::INFINITY, f64::min);
     print!("| {name} |");
-    for Made { solved, iterations, objective, status } in made {
-        let worse = objective - best > APART * (1.0 + best.abs());
+    for SolverResult { solved, iterations, objective, status } in made {
+        let worse = objective - best > OTHER_MINIMUM_DISTANCE * (1.0 + best.abs());
         match (solved, worse) {
             (true, false) => print!(" {iterations} |"),
             (true, true) => print!(" {iterations} (at {objective:.4}, not {best:.4}) |"),
@@ -143,7 +143,7 @@ fn main() -> Result<(), Failure> {
     let mut summary = Summary::default();
     println!("| problem | {} |", SOLVERS.join(" | "));
     println!("| --- |{}", " --- |".repeat(SOLVERS.len()));
-    let variations = if varied { &VARIATIONS[..] } else { &[GIVEN] };
+    let variations = if varied { &VARIATIONS[..] } else { &[ORIGINAL] };
     macro_rules! rows {
         ($($theme:ident::$name:ident),* $(,)?) => {$(
             for variation in variations.iter().filter(|_| stringify!($name).contains(part)) {
@@ -159,9 +159,9 @@ fn main() -> Result<(), Failure> {
     if !varied && part.is_empty() {
         println!("\nWithout a solution:\n");
         let made =
-            solve("car_without_time", &GIVEN, |grid| ocps::vehicles::car_within(1.0, grid), &mut ipopt)?;
+            solve("car_without_time", &ORIGINAL, |grid| ocps::vehicles::car_within(1.0, grid), &mut ipopt)?;
         print("car_without_time", &made);
-        print("walls", &solve("walls", &GIVEN, ocps::vehicles::walls, &mut ipopt)?);
+        print("walls", &solve("walls", &ORIGINAL, ocps::vehicles::walls, &mut ipopt)?);
     }
     Ok(())
 }

@@ -24,19 +24,19 @@ pub struct Variation {
 }
 
 /// None.
-pub const GIVEN: Variation = Variation { name: "", grid: ocps::GIVEN, bounds: 1.0, guess: Guess::Given };
+pub const ORIGINAL: Variation = Variation { name: "", grid: ocps::GIVEN, bounds: 1.0, guess: Guess::Given };
 
 const fn intervals(name: &'static str, intervals: f64) -> Variation {
-    Variation { name, grid: Grid { intervals, ..ocps::GIVEN }, ..GIVEN }
+    Variation { name, grid: Grid { intervals, ..ocps::GIVEN }, ..ORIGINAL }
 }
 const fn length(name: &'static str, length: f64) -> Variation {
-    Variation { name, grid: Grid { length, ..ocps::GIVEN }, ..GIVEN }
+    Variation { name, grid: Grid { length, ..ocps::GIVEN }, ..ORIGINAL }
 }
 const fn bounds(name: &'static str, bounds: f64) -> Variation {
-    Variation { name, bounds, ..GIVEN }
+    Variation { name, bounds, ..ORIGINAL }
 }
 const fn guess(name: &'static str, guess: Guess) -> Variation {
-    Variation { name, guess, ..GIVEN }
+    Variation { name, guess, ..ORIGINAL }
 }
 
 /// All of them.
@@ -59,7 +59,7 @@ pub const VARIATIONS: [Variation; 14] = [
 
 impl Variation {
     /// Bounds and guess of a problem that has the grid already.
-    pub fn apply<P: Formulation<f64>>(&self, ocp: &mut HeapOcp<P>) -> Result<(), Failure> {
+    pub fn apply_variation<P: Formulation<f64>>(&self, ocp: &mut HeapOcp<P>) -> Result<(), Failure> {
         let n = ocp.intervals();
         if self.bounds != 1.0 {
             let of_controls = |stage: casados::qp::Stage<'_, f64>| {
@@ -81,7 +81,7 @@ impl Variation {
                 let u = ocp.stage(at.min(n - 1))?.u.to_vec();
                 ocp.guess(&x, &u)?;
             }
-            Guess::Disturbed { part, seed } => disturb(ocp, part, seed)?,
+            Guess::Disturbed { part, seed } => disturb_guess(ocp, part, seed)?,
         }
         Ok(())
     }
@@ -94,7 +94,7 @@ fn noise(seed: f64, stage: usize, state: usize) -> f64 {
     2.0 * (value - value.floor()) - 1.0
 }
 
-fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, part: f64, seed: f64) -> Result<(), Failure> {
+fn disturb_guess<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, part: f64, seed: f64) -> Result<(), Failure> {
     let last = ocp.intervals();
     let ends = (ocp.stage(0)?.x.to_vec(), ocp.stage(last)?.x.to_vec());
     for k in 0..=last {

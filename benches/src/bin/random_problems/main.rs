@@ -27,7 +27,7 @@ use vibrations::SpringPendulum;
 
 const TOLERANCES: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 /// A reference counts where steps a half and a third as long differ by no more than this.
-const TRUSTED: f64 = 1e-12;
+const MAX_REFERENCE_ERROR: f64 = 1e-12;
 
 /// What a run made of a problem.
 struct Made {
@@ -56,7 +56,7 @@ macro_rules! family {
                     irk.set_parameters(&p)?;
                 }
                 adaptive.solve(&x, &SVector::zeros(), problem.t)?;
-                let mut times: Vec<f64> = adaptive.times().chain(problem.breaks()).collect();
+                let mut times: Vec<f64> = adaptive.times().chain(problem.discontinuity_times()).collect();
                 times.sort_by(f64::total_cmp);
                 times.dedup_by(|next, last| *next - *last < 1e-13 * *next);
                 for ends in times.windows(2) {
@@ -138,14 +138,14 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// Errors in tolerances and evaluations of all runs of a method at a tolerance.
 #[derive(Default)]
-struct Runs {
+struct RunStatistics {
     errors: Vec<f64>,
     evaluations: Vec<f64>,
     failed: usize,
 }
 
-impl Runs {
-    fn cell(&mut self) -> String {
+impl RunStatistics {
+    fn table_cell(&mut self) -> String {
         let Self { errors, evaluations, failed } = self;
         for numbers in [&mut *errors, &mut *evaluations] {
             numbers.sort_by(f64::total_cmp);
@@ -173,18 +173,18 @@ fn main() {
         println!("| problems | method | 1e-4 | 1e-6 | 1e-8 | 1e-10 |\n| --- | --- | --- | --- | --- | --- |");
     }
     for name in FAMILIES.into_iter().filter(|name| name.contains(&part)) {
-        measure(name, problems, each);
+        measure_family(name, problems, each);
     }
 }
 
 /// All problems of a family.
-fn measure(name: &'static str, problems: u64, each: bool) {
+fn measure_family(name: &'static str, problems: u64, each: bool) {
     let Family { methods, reference, run } = family(name);
-    let mut runs: BTreeMap<(usize, usize), Runs> = BTreeMap::new();
+    let mut runs: BTreeMap<(usize, usize), RunStatistics> = BTreeMap::new();
     for seed in 0..problems {
         let problem = problem(name, seed);
         let (Ok(other), Ok(exact)) = (reference(&problem, 2), reference(&problem, 3)) else { continue };
-        if difference(&other, &exact).is_nan() || difference(&other, &exact) > TRUSTED {
+        if difference(&other, &exact).is_nan() || difference(&other, &exact) > MAX_REFERENCE_ERROR {
             eprintln!("{name} {seed} has no reference");
             continue;
         }
@@ -206,7 +206,8 @@ fn measure(name: &'static str, problems: u64, each: bool) {
         }
     }
     for (method, label) in methods.iter().enumerate().filter(|_| !each) {
-        let cells = (0..TOLERANCES.len()).map(|column| runs.entry((method, column)).or_default().cell());
+        let cells =
+            (0..TOLERANCES.len()).map(|column| runs.entry((method, column)).or_default().table_cell());
         println!("| {name} | {label} | {} |", cells.collect::<Vec<_>>().join(" | "));
     }
 }

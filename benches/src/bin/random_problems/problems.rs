@@ -33,13 +33,13 @@ impl Random {
     }
 
     /// Between two numbers,
-    fn between(&mut self, a: f64, b: f64) -> f64 {
+    fn uniform(&mut self, a: f64, b: f64) -> f64 {
         a + (b - a) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// and so that the logarithm is.
-    fn power(&mut self, a: f64, b: f64) -> f64 {
-        10f64.powf(self.between(a, b))
+    fn log_uniform(&mut self, a: f64, b: f64) -> f64 {
+        10f64.powf(self.uniform(a, b))
     }
 
     fn one_of(&mut self, list: &[f64]) -> f64 {
@@ -77,69 +77,69 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
         "linear" => linear(r, false),
         "imaginary" => linear(r, true),
         "orbit" => {
-            let e = r.between(0.0, 0.9);
-            let t = std::f64::consts::TAU * r.between(0.5, 8.0);
+            let e = r.uniform(0.0, 0.9);
+            let t = std::f64::consts::TAU * r.uniform(0.5, 8.0);
             (vec![1.0 - e, 0.0, 0.0, ((1.0 + e) / (1.0 - e)).sqrt()], vec![], t)
         }
         "rods" => {
-            let (a, b) = (r.between(-1.2, 1.2), r.between(-1.2, 1.2));
-            let (l, m) = (r.between(0.5, 2.0), r.power(-1.0, 1.0));
+            let (a, b) = (r.uniform(-1.2, 1.2), r.uniform(-1.2, 1.2));
+            let (l, m) = (r.uniform(0.5, 2.0), r.log_uniform(-1.0, 1.0));
             let x1 = [a.sin(), -a.cos()];
             let x2 = [x1[0] + l * b.sin(), x1[1] - l * b.cos()];
-            (vec![x1[0], x1[1], x2[0], x2[1], 0.0, 0.0, 0.0, 0.0], vec![1.0, m], r.between(1.0, 6.0))
+            (vec![x1[0], x1[1], x2[0], x2[1], 0.0, 0.0, 0.0, 0.0], vec![1.0, m], r.uniform(1.0, 6.0))
         }
         "kinetics" => {
-            let p = (0..8).map(|_| r.power(-2.0, 4.0)).collect();
-            (vec![1.0, 0.0, 0.0, r.between(0.0, 1.0), 0.0], p, r.power(-1.0, 3.0))
+            let p = (0..8).map(|_| r.log_uniform(-2.0, 4.0)).collect();
+            (vec![1.0, 0.0, 0.0, r.uniform(0.0, 1.0), 0.0], p, r.log_uniform(-1.0, 3.0))
         }
         "relaxation" => {
-            let mu = r.power(-0.5, 3.5);
-            (vec![2.0, 0.0], vec![mu], (1.6 * mu + 6.0) * r.between(0.5, 2.0))
+            let mu = r.log_uniform(-0.5, 3.5);
+            (vec![2.0, 0.0], vec![mu], (1.6 * mu + 6.0) * r.uniform(0.5, 2.0))
         }
         "forced" => {
             let p = vec![
                 r.one_of(&[0.0, 0.01, 0.1]),
                 r.one_of(&[-1.0, 0.0, 1.0, 10.0]),
-                r.power(-1.0, 1.0),
-                r.between(0.0, 2.0),
-                r.power(-1.0, 1.0),
+                r.log_uniform(-1.0, 1.0),
+                r.uniform(0.0, 2.0),
+                r.log_uniform(-1.0, 1.0),
             ];
-            (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(5.0, 25.0))
+            (vec![r.uniform(-1.0, 1.0), r.uniform(-1.0, 1.0)], p, r.uniform(5.0, 25.0))
         }
         "prey" => {
-            let rates = vec![r.power(-0.7, 0.7), r.power(-0.7, 0.7)];
-            (vec![r.power(-0.7, 0.7), r.power(-0.7, 0.7)], rates, r.between(5.0, 50.0))
+            let rates = vec![r.log_uniform(-0.7, 0.7), r.log_uniform(-0.7, 0.7)];
+            (vec![r.log_uniform(-0.7, 0.7), r.log_uniform(-0.7, 0.7)], rates, r.uniform(5.0, 50.0))
         }
         "body" => {
-            let (a, b) = (r.between(0.1, 3.0), r.between(0.1, 3.0));
+            let (a, b) = (r.uniform(0.1, 3.0), r.uniform(0.1, 3.0));
             (
-                vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0), r.between(-1.0, 1.0)],
+                vec![r.uniform(-1.0, 1.0), r.uniform(-1.0, 1.0), r.uniform(-1.0, 1.0)],
                 vec![a, -b, (b - a) / (1.0 - a * b * 0.1).max(0.2)],
-                r.between(10.0, 100.0),
+                r.uniform(10.0, 100.0),
             )
         }
         "pushed" => {
-            let t = r.between(4.0, 12.0);
+            let t = r.uniform(4.0, 12.0);
             let p = vec![
-                r.power(-0.5, 2.0),
+                r.log_uniform(-0.5, 2.0),
                 r.one_of(&[0.0, 0.01, 0.3]),
-                r.power(-1.0, 1.0),
-                r.between(0.3, 0.9) * t,
+                r.log_uniform(-1.0, 1.0),
+                r.uniform(0.3, 0.9) * t,
             ];
             (vec![r.one_of(&[0.0, 1.0]), 0.0], p, t)
         }
         "kinked" => kinked(r),
         "contact" => {
-            let p = vec![r.between(1.0, 10.0), r.power(1.0, 4.0), r.one_of(&[0.0, 1.0, 10.0])];
-            (vec![r.between(0.1, 1.0), 0.0], p, r.between(0.5, 4.0))
+            let p = vec![r.uniform(1.0, 10.0), r.log_uniform(1.0, 4.0), r.one_of(&[0.0, 1.0, 10.0])];
+            (vec![r.uniform(0.1, 1.0), 0.0], p, r.uniform(0.5, 4.0))
         }
         _ => {
-            let a = r.between(0.3, 1.6);
+            let a = r.uniform(0.3, 1.6);
             let stretch = 1.0 + r.one_of(&[0.0, 1e-3, 1e-2]);
             (
                 vec![stretch * a.sin(), -stretch * a.cos(), 0.0, 0.0],
-                vec![r.power(2.0, 6.0)],
-                r.between(1.0, 5.0),
+                vec![r.log_uniform(2.0, 6.0)],
+                r.uniform(1.0, 5.0),
             )
         }
     };
@@ -148,28 +148,32 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
 
 /// One of `max(0, sin)`, its square and its cube.
 fn kinked(r: &mut Random) -> (Vec<f64>, Vec<f64>, f64) {
-    let mut p =
-        vec![r.power(-1.0, 2.0), r.one_of(&[0.0, 0.01, 0.4]), r.power(-0.3, 0.7), r.between(0.0, 6.0)];
+    let mut p = vec![
+        r.log_uniform(-1.0, 2.0),
+        r.one_of(&[0.0, 0.01, 0.4]),
+        r.log_uniform(-0.3, 0.7),
+        r.uniform(0.0, 6.0),
+    ];
     let kind = r.one_of(&[0.0, 1.0, 2.0]);
     p.extend((0..3).map(|k| if f64::from(k) == kind { 1.0 } else { 0.0 }));
-    (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(3.0, 25.0))
+    (vec![r.uniform(-1.0, 1.0), r.uniform(-1.0, 1.0)], p, r.uniform(3.0, 25.0))
 }
 
 fn springs(r: &mut Random, rough: f64) -> (Vec<f64>, Vec<f64>, f64) {
-    let stiff = r.between(0.5, 4.0);
-    let mut p: Vec<f64> = (0..10).map(|_| r.power(-0.5, 0.5)).collect();
-    p.extend((0..10).map(|_| r.power(0.0, stiff)));
+    let stiff = r.uniform(0.5, 4.0);
+    let mut p: Vec<f64> = (0..10).map(|_| r.log_uniform(-0.5, 0.5)).collect();
+    p.extend((0..10).map(|_| r.log_uniform(0.0, stiff)));
     p.push(r.one_of(&[0.0, 0.0, 1e-4, 1e-3]));
     p.push(r.one_of(&[0.0, 0.0, 1.0]));
-    let t = r.between(2.0, 15.0);
-    let size = r.power(-1.0, 0.3);
+    let t = r.uniform(2.0, 15.0);
+    let size = r.log_uniform(-1.0, 0.3);
     let mut x0 = vec![0.0; 20];
     // Under a force on the last mass, and pushed.
     let soft: f64 = p[10..20].iter().map(|k| 1.0 / k).sum();
     let mut at = 0.0;
     for i in 0..10 {
         at += size / p[10 + i] / soft;
-        x0[i] = at + rough * size * r.between(-0.5, 0.5);
+        x0[i] = at + rough * size * r.uniform(-0.5, 0.5);
     }
     (x0, p, t)
 }
@@ -178,8 +182,8 @@ fn springs(r: &mut Random, rough: f64) -> (Vec<f64>, Vec<f64>, f64) {
 fn linear(r: &mut Random, imaginary: bool) -> (Vec<f64>, Vec<f64>, f64) {
     let mut a = [[0.0; 6]; 6];
     for pair in 0..3 {
-        let size = r.power(0.0, 4.0);
-        let angle = if imaginary { r.one_of(&[0.0, 0.0, 1e-3, 1e-2]) } else { r.between(0.0, 1.57) };
+        let size = r.log_uniform(0.0, 4.0);
+        let angle = if imaginary { r.one_of(&[0.0, 0.0, 1e-3, 1e-2]) } else { r.uniform(0.0, 1.57) };
         let (re, im) = (-size * angle.sin(), size * angle.cos());
         let i = 2 * pair;
         a[i][i] = re;
@@ -189,7 +193,7 @@ fn linear(r: &mut Random, imaginary: bool) -> (Vec<f64>, Vec<f64>, f64) {
     }
     // By two reflections on each side.
     for _ in 0..2 {
-        let mut v: Vec<f64> = (0..6).map(|_| r.between(-1.0, 1.0)).collect();
+        let mut v: Vec<f64> = (0..6).map(|_| r.uniform(-1.0, 1.0)).collect();
         let n = v.iter().map(|v| v * v).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v /= n);
         for row in &mut a {
@@ -205,16 +209,16 @@ fn linear(r: &mut Random, imaginary: bool) -> (Vec<f64>, Vec<f64>, f64) {
         }
     }
     let mut p: Vec<f64> = a.concat();
-    p.extend((0..6).map(|_| r.between(-1.0, 1.0)));
+    p.extend((0..6).map(|_| r.uniform(-1.0, 1.0)));
     // On the smooth solution, or beside it.
     let off = r.one_of(&[0.0, 0.0, 1e-3, 1.0]);
-    let x0 = (0..6).map(|_| off * r.between(-1.0, 1.0)).collect();
-    (x0, p, r.between(1.0, 10.0))
+    let x0 = (0..6).map(|_| off * r.uniform(-1.0, 1.0)).collect();
+    (x0, p, r.uniform(1.0, 10.0))
 }
 
 impl Problem {
     /// Where its force is not smooth.
-    pub fn breaks(&self) -> Vec<f64> {
+    pub fn discontinuity_times(&self) -> Vec<f64> {
         let p = &self.p;
         match self.family {
             "pushed" => vec![p[3]],

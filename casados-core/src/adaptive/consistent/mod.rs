@@ -5,7 +5,7 @@
 
 mod rates;
 
-use crate::adaptive::point::At;
+use crate::adaptive::point::ModelPoint;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
@@ -18,36 +18,40 @@ use crate::shape::Shape;
 use crate::tableau::{Custom, Euler, Method};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use rates::Rates;
+use rates::ExplicitRates;
 
 /// One stage at the start of a step.
 type EulerStep<M, T> = Integrator<M, Custom<1>, 1, T, Heap<OneStep>>;
 
 /// Solves for `(ẋ, z)`.
 pub struct Consistent<M: Dae, T: Real> {
-    euler: Option<EulerStep<M, T>>,
-    rates: Option<Box<Rates<M, T>>>,
+    euler_step: Option<EulerStep<M, T>>,
+    rates: Option<Box<ExplicitRates<M, T>>>,
 }
 
 impl<M: Dae, T: Real> Default for Consistent<M, T> {
     fn default() -> Self {
-        Self { euler: None, rates: None }
+        Self { euler_step: None, rates: None }
     }
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
     /// Nothing has to be iterated for.
-    const EXPLICIT: bool = M::STRUCTURE.is_explicit();
+    const IS_EXPLICIT: bool = M::STRUCTURE.is_explicit();
 
-    fn rates(&mut self) -> Result<&mut Rates<M, T>, Error> {
+    fn explicit_rates(&mut self) -> Result<&mut ExplicitRates<M, T>, Error> {
         Ok(match &mut self.rates {
             Some(rates) => rates,
-            none => none.insert(Rates::new()?),
+            none => none.insert(ExplicitRates::new()?),
         })
     }
 
-    fn euler(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&mut EulerStep<M, T>, Error> {
-        let euler = match &mut self.euler {
+    fn euler_step_at(
+        &mut self,
+        at: &ModelPoint<'_, M, T>,
+        y: &ArrayK<M, T>,
+    ) -> Result<&mut EulerStep<M, T>, Error> {
+        let euler = match &mut self.euler_step {
             Some(euler) => euler,
             none => {
                 let options = Options { start: Start::Warm, ..Options::default() };
@@ -67,14 +71,14 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     ///
     /// # Errors
     /// [`Error::InconsistentStart`]; the others of Newton's method.
-    pub fn solve(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
-        if const { Self::EXPLICIT } {
-            self.rates()?.evaluate(at, y)?;
+    pub fn solve(&mut self, at: &ModelPoint<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
+        if const { Self::IS_EXPLICIT } {
+            self.explicit_rates()?.evaluate(at, y)?;
             return Ok(1);
         }
-        let euler = self.euler(at, y)?;
+        let euler = self.euler_step_at(at, y)?;
         if let Err(error) = euler.solve(at.x, at.u, T::ZERO) {
-            return Err(explain(euler, error, at.t));
+            return Err(inconsistency_error(euler, error, at.t));
         }
         y.as_mut().copy_from_slice(euler.stages()?);
         let statistics = euler.statistics();
@@ -86,14 +90,18 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     ///
     /// # Errors
     /// As [`Consistent::solve`]; [`Error::NonFiniteStart`].
-    pub fn solve_from_afar(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
-        if const { Self::EXPLICIT } {
+    pub fn solve_with_diagnosis(
+        &mut self,
+        at: &ModelPoint<'_, M, T>,
+        y: &mut ArrayK<M, T>,
+    ) -> Result<usize, Error> {
+        if const { Self::IS_EXPLICIT } {
             return self.solve(at, y);
         }
         let start = *y;
         let solved = self.solve(at, y);
-        match (&mut self.euler, solved) {
-            (Some(euler), Err(error)) => Err(euler.run.explain_from(error, start.as_ref())),
+        match (&mut self.euler_step, solved) {
+            (Some(euler), Err(error)) => Err(euler.run.explain_with_start(error, start.as_ref())),
             (_, solved) => solved,
         }
     }
@@ -102,8 +110,8 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     ///
     /// # Errors
     /// As [`Consistent::solve`].
-    pub fn forward(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&Forward<M, T>, Error> {
-        self.euler(at, y)?.forward(at.x, at.u, T::ZERO)
+    pub fn forward(&mut self, at: &ModelPoint<'_, M, T>, y: &ArrayK<M, T>) -> Result<&Forward<M, T>, Error> {
+        self.euler_step_at(at, y)?.forward(at.x, at.u, T::ZERO)
     }
 }
 
@@ -112,23 +120,23 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     ///
     /// # Errors
     /// As [`Consistent::solve`].
-    pub fn slopes(
+    pub fn rate_derivatives(
         &mut self,
-        at: &At<'_, M, T>,
+        at: &ModelPoint<'_, M, T>,
         y: &ArrayK<M, T>,
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        if const { Self::EXPLICIT } {
-            return self.rates()?.differentiate(at, to);
+        if const { Self::IS_EXPLICIT } {
+            return self.explicit_rates()?.differentiate(at, to);
         }
         self.forward(at, y)?;
         // The slope of the only stage.
-        self.euler.as_mut().ok_or(Error::NoResult)?.slopes(&[1.0], to)
+        self.euler_step.as_mut().ok_or(Error::NoResult)?.slope_derivatives(&[1.0], to)
     }
 }
 
 /// What is inconsistent where Newton's method ended.
-fn explain<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> Error {
+fn inconsistency_error<M: Dae, T: Real>(euler: &mut EulerStep<M, T>, error: Error, t: T) -> Error {
     let (unknown, worst) = match error {
         Error::Singular { unknown, .. } => (unknown, None),
         Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),

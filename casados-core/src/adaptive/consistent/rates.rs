@@ -1,7 +1,7 @@
 //! Rates of an explicit model: each equation has one derivative, `c ẋ_j + g(x, u, p, t) = 0`, and
 //! is solved for it by hand. No integrator is compiled for that.
 
-use crate::adaptive::point::{At, place_inputs};
+use crate::adaptive::point::{ModelPoint, write_inputs};
 use crate::error::{Error, Place, Quantity};
 use crate::memory::allocate;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae};
@@ -13,14 +13,14 @@ use bytemuck::Zeroable;
 /// Memory of an evaluation.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub struct Rates<M: Dae, T: Plain> {
-    v: ArrayV<M, T>,
-    f: ArrayK<M, T>,
+pub struct ExplicitRates<M: Dae, T: Plain> {
+    variables: ArrayV<M, T>,
+    residual: ArrayK<M, T>,
     /// The first entries are the coefficients `c`, equation by equation.
     jacobian: M::Jacobian<T>,
 }
 
-impl<M: Dae, T: Real> Rates<M, T> {
+impl<M: Dae, T: Real> ExplicitRates<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Box<Self>, Error> {
@@ -33,14 +33,14 @@ impl<M: Dae, T: Real> Rates<M, T> {
     ///
     /// # Errors
     /// [`Error::NonFiniteModel`]
-    pub fn evaluate(&mut self, at: &At<'_, M, T>, rates: &mut ArrayK<M, T>) -> Result<(), Error> {
-        self.place(at);
-        M::residual::<T>(&self.v, &mut self.f);
-        let equations = self.f.as_ref().iter().zip(self.jacobian.as_ref());
+    pub fn evaluate(&mut self, at: &ModelPoint<'_, M, T>, rates: &mut ArrayK<M, T>) -> Result<(), Error> {
+        self.write_point(at);
+        M::residual::<T>(&self.variables, &mut self.residual);
+        let equations = self.residual.as_ref().iter().zip(self.jacobian.as_ref());
         for (equation, (f, c)) in equations.enumerate() {
             let rate = -*f / *c;
             if !rate.is_finite() {
-                return Err(no_value(Quantity::Residual, equation, rate));
+                return Err(non_finite_rate(Quantity::Residual, equation, rate));
             }
             if let Some(to) = rates.as_mut().get_mut(M::STRUCTURE.jacobian.at(equation).1) {
                 *to = rate;
@@ -55,11 +55,11 @@ impl<M: Dae, T: Real> Rates<M, T> {
     /// [`Error::NonFiniteModel`]
     pub fn differentiate(
         &mut self,
-        at: &At<'_, M, T>,
+        at: &ModelPoint<'_, M, T>,
         to: &mut ArrayW<M, ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        self.place(at);
-        M::residual_jacobian::<T>(&self.v, &mut self.f, &mut self.jacobian);
+        self.write_point(at);
+        M::residual_jacobian::<T>(&self.variables, &mut self.residual, &mut self.jacobian);
         *to = Zeroable::zeroed();
         let (coefficients, others) = self.jacobian.as_ref().split_at(M::Shape::NX);
         for (entry, value) in others.iter().enumerate() {
@@ -67,7 +67,7 @@ impl<M: Dae, T: Real> Rates<M, T> {
             let Some(c) = coefficients.get(equation) else { continue };
             let derivative = -*value / *c;
             if !derivative.is_finite() {
-                return Err(no_value(Quantity::Jacobian, equation, derivative));
+                return Err(non_finite_rate(Quantity::Jacobian, equation, derivative));
             }
             let row = to.as_mut().get_mut(variable.wrapping_sub(M::Shape::NX));
             let state = M::STRUCTURE.jacobian.at(equation).1;
@@ -78,19 +78,19 @@ impl<M: Dae, T: Real> Rates<M, T> {
         Ok(())
     }
 
-    fn place(&mut self, at: &At<'_, M, T>) {
-        let (nx, v) = (M::Shape::NX, self.v.as_mut());
+    fn write_point(&mut self, at: &ModelPoint<'_, M, T>) {
+        let (nx, v) = (M::Shape::NX, self.variables.as_mut());
         for (to, from) in v.iter_mut().skip(nx).zip(at.x.as_slice()) {
             *to = *from;
         }
-        place_inputs::<M, T>(v, at.u, at.p);
+        write_inputs::<M, T>(v, at.u, at.p);
         if let Some(last) = v.last_mut() {
             *last = at.t;
         }
     }
 }
 
-fn no_value<T: Real>(quantity: Quantity, equation: usize, value: T) -> Error {
+fn non_finite_rate<T: Real>(quantity: Quantity, equation: usize, value: T) -> Error {
     let at = Place { step: 0, stage: 0, iteration: 0 };
     Error::NonFiniteModel { quantity, equation, value: value.to_f64(), at }
 }

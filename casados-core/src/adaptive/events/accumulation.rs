@@ -16,31 +16,31 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
     /// [`Error::AccumulatingEvents`] where the time does not resolve what is left.
     pub(super) fn check_accumulation(&self, event: usize) -> Result<(), Error> {
-        let Some((t, end)) = self.accumulation(event) else { return Ok(()) };
+        let Some((t, end)) = self.accumulation_time(event) else { return Ok(()) };
         if (end - t).abs() > UNRESOLVED_ROUNDOFFS * T::EPSILON * end.abs().max(t.abs()) {
             return Ok(());
         }
-        Err(self.accumulating(event, end))
+        Err(self.accumulating_events_error(event, end))
     }
 
     /// More events than are allowed, or those that accumulate.
-    pub(super) fn too_many(&self, t: T) -> Error {
+    pub(super) fn too_many_events_error(&self, t: T) -> Error {
         let events = self.solution.occurrences.len();
         let last = self.solution.occurrences.last().map_or(0, |at| at.event);
-        match self.accumulation(last) {
-            Some((_, end)) => self.accumulating(last, end),
+        match self.accumulation_time(last) {
+            Some((_, end)) => self.accumulating_events_error(last, end),
             None => Error::TooManyEvents { t: t.to_f64(), events },
         }
     }
 
-    fn accumulating(&self, event: usize, t: f64) -> Error {
+    fn accumulating_events_error(&self, event: usize, t: f64) -> Error {
         let function = self.events.get(event).map_or("", |event| event.guard.name);
         Error::AccumulatingEvents { t, function, event, events: self.solution.occurrences.len() }
     }
 
     /// The time of the last event of a kind, and where a geometric series through the last four
     /// ends.
-    fn accumulation(&self, event: usize) -> Option<(f64, f64)> {
+    fn accumulation_time(&self, event: usize) -> Option<(f64, f64)> {
         let of_kind = self.solution.occurrences.iter().rev().filter(|at| at.event == event);
         let mut times = of_kind.map(|at| at.t.to_f64());
         let [t, second, third, fourth] = [times.next()?, times.next()?, times.next()?, times.next()?];

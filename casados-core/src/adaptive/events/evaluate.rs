@@ -10,7 +10,7 @@ use crate::shape::{Matrix, Shape};
 
 /// The state, the algebraic states that are given, and the time to where they lie among the
 /// variables.
-pub(super) fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, z: &[T], t: T) {
+pub(super) fn write_point<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, z: &[T], t: T) {
     let nx = M::Shape::NX;
     let v = v.as_mut();
     v[nx..2 * nx].copy_from_slice(x.as_slice());
@@ -23,21 +23,25 @@ pub(super) fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, z:
 }
 
 /// The function of an event at a point of the polynomial of a step.
-pub(super) fn evaluate<M: Dae, T: Real>(
+pub(super) fn evaluate_event_function<M: Dae, T: Real>(
     event: &Event<M, T>,
     v: &mut ArrayV<M, T>,
     at: &Dense<M, T>,
     t: T,
     k: usize,
 ) -> Result<f64, Error> {
-    place::<M, T>(v, &at.x, at.z.as_slice(), t);
-    let value = event.guard.first(v);
-    finite(event.guard.name, &[value], k)?;
+    write_point::<M, T>(v, &at.x, at.z.as_slice(), t);
+    let value = event.guard.first_output(v);
+    check_finite(event.guard.name, &[value], k)?;
     Ok(value.to_f64())
 }
 
 /// `ġ = ∂g/∂t + g_x ẋ`, with the gradient over all variables.
-pub(super) fn slope<M: Dae, T: Real>(gradient: &ArrayV<M, T>, by_t: T, xdot: &ArrayK<M, T>) -> T {
+pub(super) fn event_function_rate<M: Dae, T: Real>(
+    gradient: &ArrayV<M, T>,
+    by_t: T,
+    xdot: &ArrayK<M, T>,
+) -> T {
     let nx = M::Shape::NX;
     let products = gradient.as_ref()[nx..2 * nx].iter().zip(xdot.as_ref());
     products.fold(by_t, |sum, (g, f)| sum + *g * *f)
@@ -49,7 +53,7 @@ pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 
 /// # Errors
 /// [`Error::NonFiniteFunction`]
-pub(super) fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
+pub(super) fn check_finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
     let at = Place { step, stage: 0, iteration: 0 };
     match find_non_finite(values) {
         None => Ok(()),

@@ -75,8 +75,8 @@ impl Crossing {
 /// ```
 pub struct Event<M: Dae, T: Real = f64> {
     pub(super) crossing: Crossing,
-    pub(super) guard: Map<M, T>,
-    pub(super) jump: Option<Map<M, T>>,
+    pub(super) guard: EventFunction<M, T>,
+    pub(super) jump: Option<EventFunction<M, T>>,
 }
 
 impl<M: Dae, T: Real> Event<M, T> {
@@ -86,7 +86,7 @@ impl<M: Dae, T: Real> Event<M, T> {
     #[must_use]
     pub fn terminal<G: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(G::Outputs::NY == 1, "the function of an event has one output") };
-        Self { crossing, guard: Map::of::<G>(), jump: None }
+        Self { crossing, guard: EventFunction::of::<G>(), jump: None }
     }
 
     /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state
@@ -97,7 +97,7 @@ impl<M: Dae, T: Real> Event<M, T> {
     #[must_use]
     pub fn jump<G: Function<Shape = M::Shape>, J: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(J::Outputs::NY == <M::Shape as Shape>::NX, "a jump has one output for each state") };
-        Self { jump: Some(Map::of_states::<J>()), ..Self::terminal::<G>(crossing) }
+        Self { jump: Some(EventFunction::of_states_only::<J>()), ..Self::terminal::<G>(crossing) }
     }
 }
 
@@ -112,26 +112,26 @@ impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
 }
 
 /// Variables and multipliers to the gradient.
-type Adjoint<M, T> = fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>);
+type GradientFn<M, T> = fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>);
 
 /// Variables and multipliers to the entries of the lower triangle of the Hessian.
-type Curvature<M, T> = fn(&ArrayV<M, T>, &[T], &mut dyn FnMut(usize, usize, T));
+type HessianFn<M, T> = fn(&ArrayV<M, T>, &[T], &mut dyn FnMut(usize, usize, T));
 
 /// A function with at most as many outputs as there are states.
-pub(super) struct Map<M: Dae, T: Real> {
+pub(super) struct EventFunction<M: Dae, T: Real> {
     pub name: &'static str,
     /// Whether it looks at algebraic states.
-    pub algebraic: bool,
+    pub reads_algebraic_states: bool,
     value: fn(&ArrayV<M, T>, &mut [T]),
-    adjoint: Adjoint<M, T>,
-    rate: fn(&ArrayV<M, T>, &mut [T]),
-    hessian: Curvature<M, T>,
+    gradient_fn: GradientFn<M, T>,
+    time_derivative: fn(&ArrayV<M, T>, &mut [T]),
+    hessian: HessianFn<M, T>,
 }
 
-copy!([M: Dae, T: Real] Map<M, T>);
+copy!([M: Dae, T: Real] EventFunction<M, T>);
 
 /// `y` of a function, from one that writes it.
-fn outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F, T>)) {
+fn write_outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F, T>)) {
     let mut y = ArrayY::<F, T>::zeroed();
     write(&mut y);
     for (to, from) in to.iter_mut().zip(y.as_ref()) {
@@ -140,7 +140,7 @@ fn outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F,
 }
 
 /// One for each output.
-fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
+fn multiplier_array<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
     let mut all = ArrayY::<F, T>::zeroed();
     for (to, from) in all.as_mut().iter_mut().zip(mu) {
         *to = *from;
@@ -148,9 +148,9 @@ fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
     all
 }
 
-impl<M: Dae, T: Real> Map<M, T> {
+impl<M: Dae, T: Real> EventFunction<M, T> {
     /// Of a function that does not look at algebraic states.
-    fn of_states<F: Function<Shape = M::Shape>>() -> Self {
+    fn of_states_only<F: Function<Shape = M::Shape>>() -> Self {
         const {
             assert!(
                 F::STRUCTURE.blocks[2] == F::STRUCTURE.blocks[3],
@@ -163,13 +163,13 @@ impl<M: Dae, T: Real> Map<M, T> {
     fn of<F: Function<Shape = M::Shape>>() -> Self {
         Self {
             name: F::STRUCTURE.name,
-            algebraic: F::STRUCTURE.blocks[2] != F::STRUCTURE.blocks[3],
-            value: |v, y| outputs::<F, T>(y, |y| F::value::<T>(v, y)),
-            adjoint: |v, mu, gradient| F::adjoint::<T>(v, &multipliers::<F, T>(mu), gradient),
-            rate: |v, y| outputs::<F, T>(y, |y| F::time_derivative::<T>(v, y)),
+            reads_algebraic_states: F::STRUCTURE.blocks[2] != F::STRUCTURE.blocks[3],
+            value: |v, y| write_outputs::<F, T>(y, |y| F::value::<T>(v, y)),
+            gradient_fn: |v, mu, gradient| F::adjoint::<T>(v, &multiplier_array::<F, T>(mu), gradient),
+            time_derivative: |v, y| write_outputs::<F, T>(y, |y| F::time_derivative::<T>(v, y)),
             hessian: |v, mu, each| {
                 let mut entries = F::Hessian::<T>::zeroed();
-                F::hessian::<T>(v, &multipliers::<F, T>(mu), &mut entries);
+                F::hessian::<T>(v, &multiplier_array::<F, T>(mu), &mut entries);
                 for (entry, value) in entries.as_ref().iter().enumerate() {
                     let (row, column) = F::STRUCTURE.hessian.at(entry);
                     each(row, column, *value);
@@ -179,14 +179,14 @@ impl<M: Dae, T: Real> Map<M, T> {
     }
 
     /// The first output.
-    pub fn first(&self, v: &ArrayV<M, T>) -> T {
+    pub fn first_output(&self, v: &ArrayV<M, T>) -> T {
         let mut y = [T::ZERO];
         (self.value)(v, &mut y);
         y[0]
     }
 
     /// All outputs.
-    pub fn all(&self, v: &ArrayV<M, T>) -> ArrayX<M, T> {
+    pub fn all_outputs(&self, v: &ArrayV<M, T>) -> ArrayX<M, T> {
         let mut y = ArrayX::<M, T>::zeroed();
         (self.value)(v, y.as_mut());
         y
@@ -200,11 +200,11 @@ impl<M: Dae, T: Real> Map<M, T> {
     /// `∇(μᵀy)` and `μᵀ ∂y/∂t`.
     pub fn gradient(&self, v: &ArrayV<M, T>, mu: &[T]) -> (ArrayV<M, T>, T) {
         let mut gradient = ArrayV::<M, T>::zeroed();
-        (self.adjoint)(v, mu, &mut gradient);
+        (self.gradient_fn)(v, mu, &mut gradient);
         let mut rate = ArrayX::<M, T>::zeroed();
         let rate = rate.as_mut();
         // A model without states has no event that depends on the time alone.
-        (self.rate)(v, rate);
+        (self.time_derivative)(v, rate);
         (gradient, mu.iter().zip(rate).fold(T::ZERO, |sum, (mu, rate)| sum + *mu * *rate))
     }
 }

@@ -1,7 +1,7 @@
 //! Derivatives over the parts between events, forwards.
 
 use super::*;
-use crate::integrator::chain_rule::{chain_states, fill, identity};
+use crate::integrator::chain_rule::{chain_states, fill_matrix, set_identity};
 use crate::memory::allocate;
 use crate::result::Forward;
 
@@ -9,33 +9,39 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// Derivatives of all steps and over all events, and what is known about the moments of these;
     /// for `second` derivatives, what these need.
     #[allow(clippy::type_complexity)]
-    pub(super) fn sweep(
+    pub(super) fn forward_sweep(
         &mut self,
         x0: &VectorX<M, T>,
         second: bool,
         mut along: OptionalIntegrand<'_, '_, M, T>,
-    ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
+    ) -> Result<(HybridForward<M, T>, LinearisedEvents<M, T>), Error> {
         reset_integrand(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
         let [mut v, mut next] = match self.sensitivities.take() {
             Some(there) => there,
             None => [allocate()?, allocate()?],
         };
-        identity::<M, T>(&mut v);
-        let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
+        set_identity::<M, T>(&mut v);
+        let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.linearised_events));
         moments.clear();
         let mut x = *x0;
-        for k in 0..self.count {
+        for k in 0..self.segment_count {
             let Self { integrator, segments, solution, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
-            let mut history = core::mem::take(&mut segment.history);
-            let mut own = core::mem::take(&mut segment.v);
+            let mut history = core::mem::take(&mut segment.step_sensitivities);
+            let mut own = core::mem::take(&mut segment.start_sensitivities);
             history.clear();
-            let (mut frozen, state, memory, _) = segment.open(integrator)?;
+            let (mut frozen, state, memory, _) = segment.load(integrator)?;
             // Its derivatives by where a segment begins are multiplied by those of that.
-            let mut part = chain(&mut along, Some(&*v), false);
-            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
+            let mut part = chain_rule_integrand(&mut along, Some(&*v), false);
+            frozen.forward::<B>(
+                state,
+                &x,
+                memory,
+                second.then_some(&mut history),
+                dyn_integrand(&mut part),
+            )?;
             let local = &memory.hessian.first.forward;
             if k == 0 {
                 solution.nominal.z0 = local.nominal.z0;
@@ -43,22 +49,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             chain_states(local, &v, &mut next);
             core::mem::swap(&mut v, &mut next);
             if second {
-                rows_of(local, &mut own)?;
+                segment_derivative_rows(local, &mut own)?;
             }
-            (segment.history, segment.v) = (history, own);
-            let Some((event, moment)) = self.moment(k)? else { break };
+            (segment.step_sensitivities, segment.start_sensitivities) = (history, own);
+            let Some((event, moment)) = self.linearise_event(k)? else { break };
             let [v, next] = [&mut v, &mut next].map(|v| ArrayW::<M, T>::flat_mut(v.as_mut().as_mut()));
-            let time = self.forward_jump(event, &moment, v, next)?;
+            let time = self.forward_over_jump(event, &moment, v, next)?;
             if let Some(integrand) = &mut along {
-                self.beside(k, &event, &moment, &mut **integrand, |integrand, sign, at| {
-                    integrand.prolong(sign, &time, at)
+                self.integrand_at_jump(k, &event, &moment, &mut **integrand, |integrand, sign, at| {
+                    integrand.add_end_time_gradient(sign, &time, at)
                 })?;
             }
             push(&mut times, time_gradient(time.as_ref()))?;
             push(&mut moments, (event, moment))?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
-        self.collect();
+        self.collect_solution();
         finish_integrand(&mut along)?;
         let [v, _] = self.sensitivities.insert([v, next]);
         let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
@@ -72,9 +78,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             dx_dp: Zeroable::zeroed(),
             times,
         };
-        fill(&mut result.dx_dx0, |r, c| v[r * nw + c]);
-        fill(&mut result.dx_du, |r, c| v[r * nw + nx + c]);
-        fill(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
+        fill_matrix(&mut result.dx_dx0, |r, c| v[r * nw + c]);
+        fill_matrix(&mut result.dx_du, |r, c| v[r * nw + nx + c]);
+        fill_matrix(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
         Ok((result, moments))
     }
 }
@@ -94,9 +100,9 @@ fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
 ///
 /// # Errors
 /// [`Error::OutOfMemory`]
-fn rows_of<M: Dae, T: Real>(local: &Forward<M, T>, own: &mut Vec<T>) -> Result<(), Error> {
+fn segment_derivative_rows<M: Dae, T: Real>(local: &Forward<M, T>, own: &mut Vec<T>) -> Result<(), Error> {
     let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-    refill(own, nx * nw, T::ZERO)?;
+    refill_vec(own, nx * nw, T::ZERO)?;
     for (index, element) in own.iter_mut().enumerate() {
         let (r, w) = (index / nw, index % nw);
         *element = if w < nx {

@@ -1,13 +1,13 @@
 //! Steps and events that are kept: each part between two events has the same steps, relative to its
 //! length, and ends where its event happens now.
 
-use super::evaluate::finite;
-use super::trace::ITERATIONS;
+use super::detection::MAX_NEWTON_ITERATIONS;
+use super::evaluate::check_finite;
 use super::{Event, Hybrid};
 use crate::adaptive::engine::Engine;
 use crate::adaptive::step::Span;
 use crate::error::{Argument, Error, Refusal};
-use crate::finite::check_named;
+use crate::finite::check_model_input;
 use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -28,53 +28,53 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// calls [`Error::OutsideInterval`], if they ask for another interval, and
     /// [`Error::StepSizeUnderflow`], if an event cannot be found anymore.
     pub fn freeze(&mut self) -> Result<(), Error> {
-        let asked = self.asked.ok_or(Error::NoResult)?;
-        if self.count == 0 {
+        let asked = self.requested_span.ok_or(Error::NoResult)?;
+        if self.segment_count == 0 {
             return Err(Error::NoResult);
         }
-        for segment in self.segments.iter_mut().take(self.count) {
-            (segment.kept, segment.chosen) = (segment.span, false);
-            segment.tape.keep()?;
+        for segment in self.segments.iter_mut().take(self.segment_count) {
+            (segment.frozen_span, segment.steps_were_chosen) = (segment.span, false);
+            segment.tape.freeze()?;
         }
-        self.frozen = Some(asked);
+        self.frozen_span = Some(asked);
         Ok(())
     }
 
     /// Following calls choose steps and look for events again.
     pub fn thaw(&mut self) {
-        self.frozen = None;
+        self.frozen_span = None;
     }
 
     /// All parts, with the events that are kept.
     ///
     /// # Errors
     /// See [`Hybrid::freeze`]; those of Newton's method.
-    pub(super) fn repeat(
+    pub(super) fn solve_frozen_events(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
         frozen: Span<T>,
     ) -> Result<(), Error> {
-        check_named::<M, T>(Argument::U, u.as_slice())?;
-        frozen.check_is(self.integrator.start, t_end)?;
+        check_model_input::<M, T>(Argument::U, u.as_slice())?;
+        frozen.check_same(self.integrator.start_time, t_end)?;
         let (mut x, mut start) = (*x0, frozen.start);
-        for k in 0..self.count {
+        for k in 0..self.segment_count {
             let Some(segment) = self.segments.get_mut(k) else { break };
             (segment.x, segment.u) = (x, *u);
             if k > 0 {
-                segment.given = self.integrator.base.given;
+                segment.start_guess = self.integrator.workspace.start_guess;
             }
             let event = self.solution.occurrences.get(k).and_then(|at| self.events.get(at.event)).copied();
             let Some(event) = event else {
-                self.stretched(k, start, t_end)?;
+                self.solve_stretched_segment(k, start, t_end)?;
                 (self.solution.nominal.x, self.solution.nominal.z) =
-                    (self.integrator.base.result.x, self.integrator.base.result.z);
+                    (self.integrator.workspace.result.x, self.integrator.workspace.result.z);
                 break;
             };
-            let t = self.arrive(k, &event, start)?;
-            let before = self.integrator.base.result.x;
-            let y = self.slope(&before, u, t)?;
+            let t = self.solve_event_time(k, &event, start)?;
+            let before = self.integrator.workspace.result.x;
+            let y = self.consistent_derivatives(&before, u, t)?;
             if let Some(at) = self.solution.occurrences.get_mut(k) {
                 (at.t, at.before, at.after) = (t, before, before);
             }
@@ -84,47 +84,47 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 self.solution.t = t;
                 break;
             };
-            self.go(k);
-            x.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
-            finite(jump.name, x.as_slice(), k)?;
+            self.move_to_event(k);
+            x.as_mut_slice().copy_from_slice(jump.all_outputs(&self.variables).as_ref());
+            check_finite(jump.name, x.as_slice(), k)?;
             if let Some(at) = self.solution.occurrences.get_mut(k) {
                 at.after = x;
             }
-            self.integrator.base.given = self.slope(&x, u, t)?;
+            self.integrator.workspace.start_guess = self.consistent_derivatives(&x, u, t)?;
             start = t;
         }
         Ok(())
     }
 
     /// The steps of a part between other times, solved.
-    fn stretched(&mut self, k: usize, start: T, end: T) -> Result<(), Error> {
+    fn solve_stretched_segment(&mut self, k: usize, start: T, end: T) -> Result<(), Error> {
         let Self { integrator, segments, solution, .. } = self;
         let Some(segment) = segments.get_mut(k) else { return Ok(()) };
         segment.tape.stretch(start, end);
         segment.span = Span { start, end };
         let x = segment.x;
-        let (mut frozen, state, ..) = segment.open(integrator)?;
+        let (mut frozen, state, ..) = segment.load(integrator)?;
         frozen.solve::<B>(state, &x, None)?;
         if k == 0 {
-            solution.nominal.z0 = integrator.base.result.z0;
+            solution.nominal.z0 = integrator.workspace.result.z0;
         }
         Ok(())
     }
 
     /// The time of the event that ends a part: by Newton's method for its length, from the one that
     /// is kept.
-    fn arrive(&mut self, k: usize, event: &Event<M, T>, start: T) -> Result<T, Error> {
-        let Some((kept, u)) = self.segments.get(k).map(|segment| (segment.kept, segment.u)) else {
+    fn solve_event_time(&mut self, k: usize, event: &Event<M, T>, start: T) -> Result<T, Error> {
+        let Some((kept, u)) = self.segments.get(k).map(|segment| (segment.frozen_span, segment.u)) else {
             return Err(Error::NoResult);
         };
         let whole = kept.end - kept.start;
         let (mut length, mut last) = (whole, T::ZERO);
-        for iteration in 0..ITERATIONS {
+        for iteration in 0..MAX_NEWTON_ITERATIONS {
             let t = start + length;
-            self.stretched(k, start, t)?;
-            let x = self.integrator.base.result.x;
-            let y = self.slope(&x, &u, t)?;
-            let guard = self.guard(k, event, (&x, &u, t), &y)?;
+            self.solve_stretched_segment(k, start, t)?;
+            let x = self.integrator.workspace.result.x;
+            let y = self.consistent_derivatives(&x, &u, t)?;
+            let guard = self.event_function_at(k, event, (&x, &u, t), &y)?;
             if whole == T::ZERO {
                 // It happened at the time of the event before it, and does so still.
                 if guard.is_zero(t) {

@@ -14,29 +14,29 @@
 //! step's derivative by its length is `ẋ`, but for the error of the step.
 
 mod accumulation;
+mod detection;
 mod evaluate;
 mod event;
+mod event_function;
 mod forward;
 mod frozen;
-mod guard;
 mod jump;
 mod results;
-mod second;
+mod second_order;
 mod simultaneous;
-mod trace;
 
 pub use event::{Crossing, Event};
 pub use results::{HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
-pub use second::HybridHessian;
+pub use second_order::HybridHessian;
 
 use crate::adaptive::engine::Engine;
 use crate::adaptive::integrator::Integrator;
-use crate::adaptive::segment::{Segment, dense, refill};
-use crate::adaptive::sensitivities::{chain, dynamic};
+use crate::adaptive::segment::{Segment, dense_at, refill_vec};
+use crate::adaptive::sensitivities::{chain_rule_integrand, dyn_integrand};
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
 use crate::error::{Argument, Error, Place};
-use crate::finite::{check_named, find_non_finite};
+use crate::finite::{check_model_input, find_non_finite};
 use crate::integrator::chain_rule::StateSensitivities;
 use crate::linalg::axpy;
 use crate::memory::{allocate, push};
@@ -102,42 +102,42 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     events: Box<[Event<M, T>]>,
     /// More events than these are an error.
-    most: usize,
+    max_events: usize,
     segments: Vec<Segment<M, T>>,
     /// How many of them belong to the last successful call.
-    count: usize,
+    segment_count: usize,
     /// The interval that the last call was asked for, if it succeeded, and that of steps and events
     /// that are kept.
-    asked: Option<Span<T>>,
-    frozen: Option<Span<T>>,
+    requested_span: Option<Span<T>>,
+    frozen_span: Option<Span<T>>,
     statistics: AdaptiveStatistics,
     solution: Solution<M, T>,
     /// Where a function is evaluated.
-    v: Box<ArrayV<M, T>>,
+    variables: Box<ArrayV<M, T>>,
     /// On which side of zero each function was, and its value behind that.
-    signs: Vec<f64>,
-    values: Vec<f64>,
+    function_signs: Vec<f64>,
+    function_values: Vec<f64>,
     /// The events that happen where the last segment ended, in the order of the list.
-    pending: Vec<usize>,
+    pending_events: Vec<usize>,
     /// What is known about the moments of the events of a call.
-    moments: Moments<M, T>,
+    linearised_events: LinearisedEvents<M, T>,
     /// Derivatives over the parts up to now, and memory for the next ones.
     sensitivities: Option<[Box<StateSensitivities<M, T>>; 2]>,
     /// Memory of second derivatives.
-    second: Option<Box<second::Second<M, T>>>,
+    second_order: Option<Box<second_order::SecondOrderMemory<M, T>>>,
 }
 
 /// The events of a call that happened, in order.
-type Moments<M, T> = Vec<(Event<M, T>, Moment<M, T>)>;
+type LinearisedEvents<M, T> = Vec<(Event<M, T>, EventLinearisation<M, T>)>;
 
 /// What is known about the moment of an event.
-struct Moment<M: Dae, T: Real> {
+struct EventLinearisation<M: Dae, T: Real> {
     /// `g_v`, and `ġ`.
-    guard: ArrayV<M, T>,
-    rate: T,
+    function_gradient: ArrayV<M, T>,
+    function_rate: T,
     /// `(ẋ, z)` on both sides.
-    before: ArrayK<M, T>,
-    after: ArrayK<M, T>,
+    derivatives_before: ArrayK<M, T>,
+    derivatives_after: ArrayK<M, T>,
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -152,20 +152,20 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(Self {
             integrator,
             events: events.into(),
-            most: 1000,
+            max_events: 1000,
             segments: Vec::new(),
-            count: 0,
-            asked: None,
-            frozen: None,
+            segment_count: 0,
+            requested_span: None,
+            frozen_span: None,
             statistics: AdaptiveStatistics::default(),
             solution,
-            v: allocate()?,
-            signs: Vec::new(),
-            values: Vec::new(),
-            pending: Vec::new(),
-            moments: Vec::new(),
+            variables: allocate()?,
+            function_signs: Vec::new(),
+            function_values: Vec::new(),
+            pending_events: Vec::new(),
+            linearised_events: Vec::new(),
             sensitivities: None,
-            second: None,
+            second_order: None,
         })
     }
 
@@ -176,7 +176,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 
     /// More events in one call are the error `TooManyEvents`.
     pub fn set_most_events(&mut self, most: usize) {
-        self.most = most;
+        self.max_events = most;
     }
 
     /// What the last call did to choose its steps, between all events.
@@ -190,7 +190,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// # Errors
     /// See [`Hybrid`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Solution<M, T>, Error> {
-        self.asked = Some(self.trace(x0, u, h)?);
+        self.requested_span = Some(self.integrate_with_events(x0, u, h)?);
         Ok(&self.solution)
     }
 
@@ -201,9 +201,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`],
     /// [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        let Self { integrator, segments, count, solution, asked, .. } = self;
+        let Self { integrator, segments, segment_count: count, solution, requested_span: asked, .. } = self;
         asked.ok_or(Error::NoResult)?;
-        dense(integrator, segments.get_mut(..*count).unwrap_or_default(), &solution.nominal, t)
+        dense_at(integrator, segments.get_mut(..*count).unwrap_or_default(), &solution.nominal, t)
     }
 
     /// The solution at the end, and its derivatives and those of the times of the events.
@@ -225,11 +225,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridForward<M, T>, Error> {
-        let span = self.trace(x0, u, h)?;
-        let (result, moments) = self.sweep(x0, false, along)?;
-        (self.moments, self.asked) = (moments, Some(span));
+        let span = self.integrate_with_events(x0, u, h)?;
+        let (result, moments) = self.forward_sweep(x0, false, integrand)?;
+        (self.linearised_events, self.requested_span) = (moments, Some(span));
         Ok(result)
     }
 
@@ -253,40 +253,40 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Solution<M, T>, Error> {
-        let span = self.trace(x0, u, h)?;
-        self.moments = self.replay(x0, along)?;
-        self.asked = Some(span);
+        let span = self.integrate_with_events(x0, u, h)?;
+        self.linearised_events = self.replay_steps(x0, integrand)?;
+        self.requested_span = Some(span);
         Ok(&self.solution)
     }
 
     /// All steps again, to rounding, and what is known about the moments of the events.
-    fn replay(
+    fn replay_steps(
         &mut self,
         x0: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
-    ) -> Result<Moments<M, T>, Error> {
-        reset_integrand(&mut along);
-        let mut moments = core::mem::take(&mut self.moments);
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
+    ) -> Result<LinearisedEvents<M, T>, Error> {
+        reset_integrand(&mut integrand);
+        let mut moments = core::mem::take(&mut self.linearised_events);
         moments.clear();
         let mut x = *x0;
-        for k in 0..self.count {
+        for k in 0..self.segment_count {
             let Self { integrator, segments, solution, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
-            let (mut frozen, state, ..) = segment.open(integrator)?;
-            let mut part = chain(&mut along, None, false);
-            frozen.solve::<B>(state, &x, dynamic(&mut part))?;
+            let (mut frozen, state, ..) = segment.load(integrator)?;
+            let mut part = chain_rule_integrand(&mut integrand, None, false);
+            frozen.solve::<B>(state, &x, dyn_integrand(&mut part))?;
             if k == 0 {
-                solution.nominal.z0 = integrator.base.result.z0;
+                solution.nominal.z0 = integrator.workspace.result.z0;
             }
-            let Some(moment) = self.moment(k)? else { break };
+            let Some(moment) = self.linearise_event(k)? else { break };
             push(&mut moments, moment)?;
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
-        self.collect();
-        finish_integrand(&mut along)?;
+        self.collect_solution();
+        finish_integrand(&mut integrand)?;
         Ok(moments)
     }
 
@@ -299,30 +299,30 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         lambda: &VectorX<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        self.asked = None;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        let span = self.trace(x0, u, h)?;
-        let moments = self.replay(x0, reborrow(&mut along))?;
+        self.requested_span = None;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        let span = self.integrate_with_events(x0, u, h)?;
+        let moments = self.replay_steps(x0, reborrow(&mut along))?;
         let mut result = HybridAdjoint {
             solution: self.solution.clone(),
             grad_x0: *lambda,
             grad_u: Zeroable::zeroed(),
             grad_p: Zeroable::zeroed(),
         };
-        for k in (0..self.count).rev() {
+        for k in (0..self.segment_count).rev() {
             if let Some((event, moment)) = moments.get(k) {
                 let mut density = T::ZERO;
                 if let Some(integrand) = &mut along {
-                    self.beside(k, event, moment, &mut **integrand, |integrand, sign, at| {
-                        density = density + sign * integrand.density(at)?;
+                    self.integrand_at_jump(k, event, moment, &mut **integrand, |integrand, sign, at| {
+                        density = density + sign * integrand.integrand_value(at)?;
                         Ok(())
                     })?;
                 }
-                self.adjoint_jump(k, *event, moment, density, &mut result);
+                self.adjoint_over_jump(k, *event, moment, density, &mut result);
             }
             let Self { integrator, segments, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
-            let (mut frozen, state, memory, _) = segment.open(integrator)?;
+            let (mut frozen, state, memory, _) = segment.load(integrator)?;
             frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
             let gradient = &memory.adjoint;
             result.grad_x0.as_mut_slice().copy_from_slice(gradient.grad_x0.as_slice());
@@ -330,13 +330,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             axpy(T::ONE, gradient.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
         result.check()?;
-        (self.moments, self.asked) = (moments, Some(span));
+        (self.linearised_events, self.requested_span) = (moments, Some(span));
         Ok(result)
     }
 
     /// The solution at the end, from the segment that was integrated last.
-    fn collect(&mut self) {
-        let result = &self.integrator.base.result;
+    fn collect_solution(&mut self) {
+        let result = &self.integrator.workspace.result;
         let Solution { nominal, terminal, occurrences, .. } = &mut self.solution;
         (nominal.x, nominal.z) = (result.x, result.z);
         if let (true, Some(last)) = (*terminal, occurrences.last()) {

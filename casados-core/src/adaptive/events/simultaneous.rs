@@ -10,8 +10,8 @@
 
 use super::{Hybrid, Occurrence};
 use crate::adaptive::engine::Engine;
-use crate::adaptive::point::At;
-use crate::adaptive::segment::add;
+use crate::adaptive::point::ModelPoint;
+use crate::adaptive::segment::push_segment;
 use crate::adaptive::step::Span;
 use crate::error::Error;
 use crate::memory::push;
@@ -19,17 +19,23 @@ use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
-use super::evaluate::finite;
+use super::evaluate::check_finite;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// The last step of a segment ends where the earliest of the events is that cross zero in it,
     /// one of which was found near `t`. Notes all that are zero then; when that is.
-    pub(super) fn locate(&mut self, k: usize, found: usize, near: T, u: &VectorU<M, T>) -> Result<T, Error> {
+    pub(super) fn locate_earliest_event(
+        &mut self,
+        k: usize,
+        found: usize,
+        near: T,
+        u: &VectorU<M, T>,
+    ) -> Result<T, Error> {
         let (mut index, mut t) = (found, near);
         for _ in 0..self.events.len() {
             let Some(event) = self.events.get(index).copied() else { return Err(Error::NoResult) };
-            t = self.shorten(k, &event, t)?;
-            match self.find_pending(k, index, t, u)? {
+            t = self.end_step_at_event(k, &event, t)?;
+            match self.find_simultaneous_events(k, index, t, u)? {
                 Some(earlier) => index = earlier,
                 None => break,
             }
@@ -39,27 +45,27 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 
     /// Notes the events that happen where a segment ends, `index` among them; one that has happened
     /// before, if there is one.
-    fn find_pending(
+    fn find_simultaneous_events(
         &mut self,
         k: usize,
         index: usize,
         t: T,
         u: &VectorU<M, T>,
     ) -> Result<Option<usize>, Error> {
-        self.pending.clear();
-        let x = self.integrator.base.result.x;
-        let y = self.slope(&x, u, t)?;
-        let time = self.resolution(k, t);
+        self.pending_events.clear();
+        let x = self.integrator.workspace.result.x;
+        let y = self.consistent_derivatives(&x, u, t)?;
+        let time = self.time_magnitude(k, t);
         let forward =
             if self.segments.get(k).is_some_and(|at| at.span.end < at.span.start) { -1.0 } else { 1.0 };
         for other in 0..self.events.len() {
             let Some(event) = self.events.get(other).copied() else { break };
             if other == index {
-                push(&mut self.pending, other)?;
+                push(&mut self.pending_events, other)?;
                 continue;
             }
-            let sign = self.signs.get(other).copied().unwrap_or_default();
-            let guard = self.guard(k, &event, (&x, u, t), &y)?;
+            let sign = self.function_signs.get(other).copied().unwrap_or_default();
+            let guard = self.event_function_at(k, &event, (&x, u, t), &y)?;
             let has_crossed = event.crossing.matches(sign, guard.value.to_f64());
             if !guard.is_zero(time) {
                 if has_crossed {
@@ -69,39 +75,47 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             }
             let towards = guard.rate.to_f64() * forward * sign < 0.0;
             if has_crossed || towards && event.crossing.matches(sign, -sign) {
-                push(&mut self.pending, other)?;
+                push(&mut self.pending_events, other)?;
             }
         }
         Ok(None)
     }
 
     /// What the time is rounded relative to.
-    fn resolution(&self, k: usize, t: T) -> T {
+    fn time_magnitude(&self, k: usize, t: T) -> T {
         let last = self.segments.get(k).and_then(|segment| segment.tape.entries().last());
         t.abs() + last.map_or(T::ZERO, |entry| entry.h.abs())
     }
 
     /// The events that were noted happen at the end of the last segment: the state after them, or
     /// nothing if one of them ends the integration.
-    pub(super) fn happen(&mut self, t: T, u: &VectorU<M, T>) -> Result<Option<VectorX<M, T>>, Error> {
-        let (mut x, mut k) = (self.integrator.base.result.x, self.count - 1);
-        let time = self.resolution(k, t);
+    pub(super) fn apply_pending_events(
+        &mut self,
+        t: T,
+        u: &VectorU<M, T>,
+    ) -> Result<Option<VectorX<M, T>>, Error> {
+        let (mut x, mut k) = (self.integrator.workspace.result.x, self.segment_count - 1);
+        let time = self.time_magnitude(k, t);
         let mut is_first = true;
-        for place in 0..self.pending.len() {
-            let Some(index) = self.pending.get(place).copied() else { break };
+        for place in 0..self.pending_events.len() {
+            let Some(index) = self.pending_events.get(place).copied() else { break };
             let Some(event) = self.events.get(index).copied() else { return Err(Error::NoResult) };
-            let y = if is_first { self.slope(&x, u, t)? } else { self.integrator.base.given };
+            let y = if is_first {
+                self.consistent_derivatives(&x, u, t)?
+            } else {
+                self.integrator.workspace.start_guess
+            };
             if !is_first {
-                let guard = self.guard(k, &event, (&x, u, t), &y)?;
+                let guard = self.event_function_at(k, &event, (&x, u, t), &y)?;
                 if !guard.is_zero(time) {
                     continue;
                 }
-                k = self.segment_without_length(&x, u, t)?;
+                k = self.push_empty_segment(&x, u, t)?;
             }
             is_first = false;
             let occurrences = &mut self.solution.occurrences;
-            if occurrences.len() >= self.most {
-                return Err(self.too_many(t));
+            if occurrences.len() >= self.max_events {
+                return Err(self.too_many_events_error(t));
             }
             push(occurrences, Occurrence { event: index, t, before: x, after: x })?;
             self.check_accumulation(index)?;
@@ -112,33 +126,33 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 (self.solution.t, self.solution.terminal) = (t, true);
                 return Ok(None);
             };
-            self.go(k);
-            x.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
-            finite(jump.name, x.as_slice(), k)?;
+            self.move_to_event(k);
+            x.as_mut_slice().copy_from_slice(jump.all_outputs(&self.variables).as_ref());
+            check_finite(jump.name, x.as_slice(), k)?;
             if let Some(occurrence) = self.solution.occurrences.get_mut(k) {
                 occurrence.after = x;
             }
             // The side of the solution on which the next steps begin.
-            let parameters = self.integrator.base.parameters;
+            let parameters = self.integrator.workspace.parameters;
             let mut y = y;
-            self.integrator.consistent.solve(&At { x: &x, u, p: &parameters, t }, &mut y)?;
-            self.integrator.base.given = y;
+            self.integrator.consistent.solve(&ModelPoint { x: &x, u, p: &parameters, t }, &mut y)?;
+            self.integrator.workspace.start_guess = y;
         }
         Ok(Some(x))
     }
 
     /// A segment between two events at one time.
-    fn segment_without_length(&mut self, x: &VectorX<M, T>, u: &VectorU<M, T>, t: T) -> Result<usize, Error> {
-        let k = self.count;
+    fn push_empty_segment(&mut self, x: &VectorX<M, T>, u: &VectorU<M, T>, t: T) -> Result<usize, Error> {
+        let k = self.segment_count;
         if self.segments.len() <= k {
-            add(&mut self.segments)?;
+            push_segment(&mut self.segments)?;
         }
-        self.count += 1;
+        self.segment_count += 1;
         if let Some(segment) = self.segments.get_mut(k) {
             segment.tape.clear();
             segment.span = Span { start: t, end: t };
-            (segment.x, segment.u, segment.given) = (*x, *u, self.integrator.base.given);
-            segment.chosen = true;
+            (segment.x, segment.u, segment.start_guess) = (*x, *u, self.integrator.workspace.start_guess);
+            segment.steps_were_chosen = true;
         }
         Ok(k)
     }

@@ -31,13 +31,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, ..) = self.parts(span)?;
-        frozen.solve::<B>(state, x0, along)?;
-        self.last = Some(span);
-        Ok(&self.base.result)
+        let span = self.prepare_steps(x0, u, h)?;
+        let (mut frozen, state, ..) = self.differentiation_parts(span)?;
+        frozen.solve::<B>(state, x0, integrand)?;
+        self.last_span = Some(span);
+        Ok(&self.workspace.result)
     }
 
     fn forward_with_quadrature(
@@ -45,12 +45,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, _) = self.parts(span)?;
-        frozen.forward::<B>(state, x0, memory, None, along)?;
-        Ok(&self.done(span)?.hessian.first.forward)
+        let span = self.prepare_steps(x0, u, h)?;
+        let (mut frozen, state, memory, _) = self.differentiation_parts(span)?;
+        frozen.forward::<B>(state, x0, memory, None, integrand)?;
+        Ok(&self.finish_derivatives(span)?.hessian.first.forward)
     }
 
     fn adjoint_with_quadrature(
@@ -59,15 +59,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.last = None;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, _) = self.parts(span)?;
-        frozen.solve::<B>(state, x0, reborrow(&mut along))?;
-        frozen.adjoint::<B>(state, lambda, memory, along)?;
-        Ok(&self.done(span)?.adjoint)
+        self.last_span = None;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        let span = self.prepare_steps(x0, u, h)?;
+        let (mut frozen, state, memory, _) = self.differentiation_parts(span)?;
+        frozen.solve::<B>(state, x0, reborrow(&mut integrand))?;
+        frozen.adjoint::<B>(state, lambda, memory, integrand)?;
+        Ok(&self.finish_derivatives(span)?.adjoint)
     }
 
     fn hessian_with_quadrature(
@@ -76,15 +76,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.last = None;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, history) = self.parts(span)?;
+        self.last_span = None;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        let span = self.prepare_steps(x0, u, h)?;
+        let (mut frozen, state, memory, history) = self.differentiation_parts(span)?;
         history.clear();
-        frozen.forward::<B>(state, x0, memory, Some(history), reborrow(&mut along))?;
-        frozen.hessian::<B>(state, lambda, memory, history, along)?;
-        Ok(&self.done(span)?.hessian)
+        frozen.forward::<B>(state, x0, memory, Some(history), reborrow(&mut integrand))?;
+        frozen.hessian::<B>(state, lambda, memory, history, integrand)?;
+        Ok(&self.finish_derivatives(span)?.hessian)
     }
 }

@@ -5,16 +5,16 @@ mod derivatives;
 mod settings;
 
 use crate::adaptive::consistent::Consistent;
-use crate::adaptive::engine::{Engine, Kind, Replays};
-use crate::adaptive::options::{AdaptiveOptions, check_absolute, check_relative};
-use crate::adaptive::point::place_inputs;
-use crate::adaptive::sensitivities::{Frozen, Memory};
+use crate::adaptive::engine::{Engine, Kind, MethodStepDifferentiator};
+use crate::adaptive::options::{AdaptiveOptions, check_atol, check_rtol};
+use crate::adaptive::point::write_inputs;
+use crate::adaptive::sensitivities::{RecordedSteps, SensitivityMemory};
 use crate::adaptive::statistics::AdaptiveStatistics;
-use crate::adaptive::step::{Accepted, Run, Span, Workspace};
+use crate::adaptive::step::{AcceptedStepOutput, Run, Span, Workspace};
 use crate::adaptive::tape::Tape;
 use crate::adaptive::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
-use crate::finite::{check_input, check_named};
+use crate::finite::{check_input, check_model_input};
 use crate::integrator::{self, Integrator as _};
 use crate::memory::allocate;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
@@ -57,33 +57,33 @@ use core::marker::PhantomData;
 /// ```
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
-    pub(super) base: Box<Workspace<M, T>>,
+    pub(super) workspace: Box<Workspace<M, T>>,
     pub(super) consistent: Consistent<M, T>,
-    pub(super) state: B::State,
+    pub(super) method_state: B::State,
     /// Derivatives, if they take part in the choice of the steps.
     sensitivities: Option<Box<Variational<M, T>>>,
     pub(super) tape: Tape<T>,
     pub(super) statistics: AdaptiveStatistics,
-    parameters: bool,
-    pub(super) start: T,
+    has_parameters: bool,
+    pub(super) start_time: T,
     /// The interval of the last successful call.
-    last: Option<Span<T>>,
-    frozen: Option<Kept<M, B, T>>,
-    pub(super) memory: Option<Box<Memory<M, T>>>,
+    last_span: Option<Span<T>>,
+    frozen: Option<FrozenSteps<M, B, T>>,
+    pub(super) derivative_memory: Option<Box<SensitivityMemory<M, T>>>,
     /// Derivatives at the start of each step.
-    history: Vec<T>,
+    step_sensitivities: Vec<T>,
     method: PhantomData<fn() -> B>,
 }
 
 /// Steps that are kept for following calls.
-struct Kept<M: Dae, B: Kind<M, T>, T: Real> {
+struct FrozenSteps<M: Dae, B: Kind<M, T>, T: Real> {
     /// Their interval.
     span: Span<T>,
     /// Takes them without derivatives. Programs that keep no steps have no integrator for that.
-    solve: Solve<M, B, T>,
+    solve_frozen: SolveFrozen<M, B, T>,
 }
 
-type Solve<M, B, T> =
+type SolveFrozen<M, B, T> =
     fn(&mut Integrator<M, B, T>, &VectorX<M, T>, &VectorU<M, T>, T) -> Result<Span<T>, Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
@@ -96,23 +96,23 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let mut base: Box<Workspace<M, T>> = allocate()?;
         base.tolerances.rtol.as_mut().fill(T::from_f64(options.rtol));
         base.tolerances.atol.as_mut().fill(T::from_f64(options.atol));
-        for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
+        for (given, start) in base.start_guess.as_mut().iter_mut().zip(M::START) {
             *given = T::from_f64(*start);
         }
         Ok(Self {
             options,
-            base,
+            workspace: base,
             consistent: Consistent::default(),
-            state: Default::default(),
+            method_state: Default::default(),
             sensitivities: None,
             tape: Tape::default(),
             statistics: AdaptiveStatistics::default(),
-            parameters: M::Shape::NP == 0,
-            start: T::ZERO,
-            last: None,
+            has_parameters: M::Shape::NP == 0,
+            start_time: T::ZERO,
+            last_span: None,
             frozen: None,
-            memory: None,
-            history: Vec::new(),
+            derivative_memory: None,
+            step_sensitivities: Vec::new(),
             method: PhantomData,
         })
     }
@@ -132,7 +132,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// The times between the accepted steps of the last call, the start first, if steps are
     /// remembered.
     pub fn times(&self) -> impl Iterator<Item = T> {
-        let end = self.last.map(|span| span.end);
+        let end = self.last_span.map(|span| span.end);
         self.tape.entries().iter().map(|entry| entry.t).chain(end)
     }
 
@@ -152,15 +152,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # }
     /// ```
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
-        self.last = None;
-        let span = if let Some(Kept { solve, .. }) = self.frozen {
+        self.last_span = None;
+        let span = if let Some(FrozenSteps { solve_frozen: solve, .. }) = self.frozen {
             solve(self, x0, u, h)?
         } else {
-            let (t_end, record) = (self.end(h)?, self.options.keep_steps);
-            self.run(x0, u, t_end, record, |_, _| Ok(()))?
+            let (t_end, record) = (self.interval_end(h)?, self.options.keep_steps);
+            self.run_to(x0, u, t_end, record, |_, _| Ok(()))?
         };
-        self.last = Some(span);
-        Ok(&self.base.result)
+        self.last_span = Some(span);
+        Ok(&self.workspace.result)
     }
 
     /// As [`Integrator::solve`], and `output` is called with the solution at each of these times,
@@ -178,12 +178,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         times: &[T],
         mut output: impl FnMut(T, &Dense<M, T>),
     ) -> Result<&Nominal<M, T>, Error> {
-        self.last = None;
+        self.last_span = None;
         check_input(Argument::T, times)?;
-        let (start, end) = (self.start, self.end(h)?);
+        let (start, end) = (self.start_time, self.interval_end(h)?);
         let mut before = start;
         for (index, t) in times.iter().enumerate() {
-            if !inside(*t, before, end) {
+            if !is_inside_interval(*t, before, end) {
                 let (t, before, end) = (t.to_f64(), before.to_f64(), end.to_f64());
                 return Err(Error::Unordered { index, t, before, end });
             }
@@ -194,25 +194,25 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             for t in times {
                 output(*t, self.dense(*t)?);
             }
-            return Ok(&self.base.result);
+            return Ok(&self.workspace.result);
         }
         let mut times = times.iter().copied().peekable();
         let record = self.options.keep_steps;
-        let span = self.run(x0, u, end, record, |step, dense| {
-            while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
-                (step.evaluate)(t, dense)?;
+        let span = self.run_to(x0, u, end, record, |step, dense| {
+            while let Some(t) = times.next_if(|t| is_inside_interval(*t, start, step.end)) {
+                (step.evaluate_dense)(t, dense)?;
                 output(t, dense);
             }
             Ok(())
         })?;
         // Of an interval without length.
-        let Workspace { result, dense, .. } = &mut *self.base;
+        let Workspace { result, dense, .. } = &mut *self.workspace;
         (dense.x, dense.z) = (result.x, result.z);
         for t in times {
             output(t, dense);
         }
-        self.last = Some(span);
-        Ok(&self.base.result)
+        self.last_span = Some(span);
+        Ok(&self.workspace.result)
     }
 
     /// The solution at the time `t`, as the model sees it: inside the interval of the last call.
@@ -222,22 +222,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check_input(Argument::T, &[t])?;
-        let span = self.last.ok_or(Error::NoResult)?;
+        let span = self.last_span.ok_or(Error::NoResult)?;
         self.dense_in(span, t)
     }
 
     /// The solution at a time inside the interval whose steps are on the tape.
     pub(super) fn dense_in(&mut self, span: Span<T>, t: T) -> Result<&Dense<M, T>, Error> {
-        if !inside(t, span.start, span.end) {
+        if !is_inside_interval(t, span.start, span.end) {
             let (t, start, end) = (t.to_f64(), span.start.to_f64(), span.end.to_f64());
             return Err(Error::OutsideInterval { t, start, end });
         }
-        let step = self.tape.find(t);
-        let Workspace { point, result, dense, .. } = &mut *self.base;
+        let step = self.tape.find_step(t);
+        let Workspace { point, result, dense, .. } = &mut *self.workspace;
         match self.tape.entries().get(step) {
             Some(entry) => {
-                let numbers = self.tape.numbers(step, M::Shape::NX);
-                B::interpolate(&mut self.state, point.as_ref(), entry, numbers, t, dense)?;
+                let numbers = self.tape.step_numbers(step, M::Shape::NX);
+                B::interpolate(&mut self.method_state, point.as_ref(), entry, numbers, t, dense)?;
             }
             None if span.start == span.end => (dense.x, dense.z) = (result.x, result.z),
             None => return Err(Error::NoResult),
@@ -252,20 +252,28 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NoResult`], also if steps were not remembered.
     pub fn freeze(&mut self) -> Result<(), Error> {
-        let span = self.last.ok_or(Error::NoResult)?;
+        let span = self.last_span.ok_or(Error::NoResult)?;
         if self.tape.entries().is_empty() && span.start != span.end {
             return Err(Error::NoResult);
         }
-        self.frozen = Some(Kept { span, solve: Self::solve_frozen });
+        self.frozen = Some(FrozenSteps { span, solve_frozen: Self::solve_frozen });
         Ok(())
     }
 
     /// The steps that are kept, without derivatives.
     fn solve_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
-        let span = self.begin_frozen(x0, u, h)?;
-        let Self { base, consistent, tape, state, .. } = self;
-        let given = base.given;
-        Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
+        let span = self.begin_frozen_call(x0, u, h)?;
+        let Self { workspace: base, consistent, tape, method_state: state, .. } = self;
+        let given = base.start_guess;
+        RecordedSteps {
+            workspace: base,
+            consistent,
+            tape,
+            span,
+            start_guess: given,
+            steps_were_chosen: false,
+        }
+        .solve::<B>(state, x0, None)?;
         Ok(span)
     }
 
@@ -279,110 +287,151 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
     /// resolve.
-    pub(super) fn end(&self, h: T) -> Result<T, Error> {
+    pub(super) fn interval_end(&self, h: T) -> Result<T, Error> {
         check_input(Argument::H, &[h])?;
-        let end = self.start + h;
-        if end == self.start && h != T::ZERO {
-            let (t, h) = (self.start.to_f64(), h.to_f64());
+        let end = self.start_time + h;
+        if end == self.start_time && h != T::ZERO {
+            let (t, h) = (self.start_time.to_f64(), h.to_f64());
             return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution, unsettled: None });
         }
         Ok(end)
     }
 
     /// What every call begins with.
-    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
+    fn begin_call(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
-        check_named::<M, T>(Argument::X0, x0.as_slice())?;
-        check_named::<M, T>(Argument::U, u.as_slice())?;
-        check_input(Argument::T, &[t_end, t_end - self.start])?;
-        if !self.parameters {
+        check_model_input::<M, T>(Argument::X0, x0.as_slice())?;
+        check_model_input::<M, T>(Argument::U, u.as_slice())?;
+        check_input(Argument::T, &[t_end, t_end - self.start_time])?;
+        if !self.has_parameters {
             return Err(Error::ParametersNotSet);
         }
-        self.base.u = *u;
-        Ok(Span { start: self.start, end: t_end })
+        self.workspace.u = *u;
+        Ok(Span { start: self.start_time, end: t_end })
     }
 
     /// Memory of derivatives.
-    pub(super) fn reserve(&mut self) -> Result<(), Error> {
-        if self.memory.is_none() {
-            self.memory = Some(allocate()?);
+    pub(super) fn allocate_derivatives(&mut self) -> Result<(), Error> {
+        if self.derivative_memory.is_none() {
+            self.derivative_memory = Some(allocate()?);
         }
         Ok(())
     }
 
     /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there
     /// is no result.
-    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
-        self.last = None;
-        self.reserve()?;
+    fn prepare_steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        self.last_span = None;
+        self.allocate_derivatives()?;
         if self.frozen.is_some() {
-            return self.begin_frozen(x0, u, h);
+            return self.begin_frozen_call(x0, u, h);
         }
-        let t_end = self.end(h)?;
-        self.run(x0, u, t_end, true, |_, _| Ok(()))
+        let t_end = self.interval_end(h)?;
+        self.run_to(x0, u, t_end, true, |_, _| Ok(()))
     }
 
     /// What a call with frozen steps begins with.
     ///
     /// # Errors
     /// [`Error::OutsideInterval`] if the interval is not that of the frozen steps.
-    fn begin_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
-        let t_end = self.end(h)?;
-        let span = self.begin(x0, u, t_end)?;
-        let Some(Kept { span: frozen, .. }) = self.frozen else { return Ok(span) };
-        frozen.check_is(span.start, span.end)?;
+    fn begin_frozen_call(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        let t_end = self.interval_end(h)?;
+        let span = self.begin_call(x0, u, t_end)?;
+        let Some(FrozenSteps { span: frozen, .. }) = self.frozen else { return Ok(span) };
+        frozen.check_same(span.start, span.end)?;
         // Dense output of explicit methods takes steps again.
-        let Workspace { point, u, parameters, .. } = &mut *self.base;
-        place_inputs::<M, T>(point.as_mut(), u, parameters);
+        let Workspace { point, u, parameters, .. } = &mut *self.workspace;
+        write_inputs::<M, T>(point.as_mut(), u, parameters);
         Ok(span)
     }
 
     #[allow(clippy::type_complexity)]
-    fn parts(
+    fn differentiation_parts(
         &mut self,
         span: Span<T>,
-    ) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
-        let Self { base, consistent, tape, state, memory, history, frozen, .. } = self;
-        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+    ) -> Result<(RecordedSteps<'_, M, T>, &mut B::State, &mut SensitivityMemory<M, T>, &mut Vec<T>), Error>
+    {
+        let Self {
+            workspace: base,
+            consistent,
+            tape,
+            method_state: state,
+            derivative_memory: memory,
+            step_sensitivities: history,
+            frozen,
+            ..
+        } = self;
+        let missing = Error::OutOfMemory { bytes: size_of::<SensitivityMemory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        let given = base.given;
+        let given = base.start_guess;
         let chosen = frozen.is_none();
-        Ok((Frozen { base, consistent, tape, span, given, chosen }, state, memory, history))
+        Ok((
+            RecordedSteps {
+                workspace: base,
+                consistent,
+                tape,
+                span,
+                start_guess: given,
+                steps_were_chosen: chosen,
+            },
+            state,
+            memory,
+            history,
+        ))
     }
 
     /// There is a result, with derivatives.
-    fn done(&mut self, span: Span<T>) -> Result<&Memory<M, T>, Error> {
-        self.last = Some(span);
-        self.memory.as_deref().ok_or(Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() })
+    fn finish_derivatives(&mut self, span: Span<T>) -> Result<&SensitivityMemory<M, T>, Error> {
+        self.last_span = Some(span);
+        self.derivative_memory
+            .as_deref()
+            .ok_or(Error::OutOfMemory { bytes: size_of::<SensitivityMemory<M, T>>() })
     }
 
     /// Integrates to a time; there is a result as soon as the caller says so.
-    pub(super) fn run(
+    pub(super) fn run_to(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
         record: bool,
-        mut after: impl FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+        mut after: impl FnMut(&mut AcceptedStepOutput<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
     ) -> Result<Span<T>, Error> {
-        self.last = None;
-        let span = self.begin(x0, u, t_end)?;
-        let Self { options, base, consistent, state, tape, statistics, sensitivities, .. } = self;
+        self.last_span = None;
+        let span = self.begin_call(x0, u, t_end)?;
+        let Self {
+            options,
+            workspace: base,
+            consistent,
+            method_state: state,
+            tape,
+            statistics,
+            sensitivities,
+            ..
+        } = self;
         tape.clear();
         let sensitivities = sensitivities.as_deref_mut();
-        let mut run = Run { options, base, consistent, tape, record, sensitivities, statistics };
+        let mut run = Run {
+            options,
+            workspace: base,
+            consistent,
+            tape,
+            record_steps: record,
+            sensitivities,
+            statistics,
+        };
         B::integrate(state, &mut run, x0, span, &mut after)?;
         Ok(span)
     }
 }
 
 /// Whether a time lies in an interval of any direction.
-pub(super) fn inside<T: Real>(t: T, start: T, end: T) -> bool {
+pub(super) fn is_inside_interval<T: Real>(t: T, start: T, end: T) -> bool {
     if start <= end { start <= t && t <= end } else { end <= t && t <= start }
 }
 
 /// `(x, z)` as one array.
-fn stack<M: Dae, T: Real>(to: &mut ArrayK<M, T>, x: &VectorX<M, T>, z: &VectorZ<M, T>) {
+fn stack_states<M: Dae, T: Real>(to: &mut ArrayK<M, T>, x: &VectorX<M, T>, z: &VectorZ<M, T>) {
     for (to, from) in to.as_mut().iter_mut().zip(x.as_slice().iter().chain(z.as_slice())) {
         *to = *from;
     }

@@ -8,9 +8,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last parameters stay.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        check_named::<M, T>(Argument::P, p.as_slice())?;
-        self.base.parameters = *p;
-        self.parameters = true;
+        check_model_input::<M, T>(Argument::P, p.as_slice())?;
+        self.workspace.parameters = *p;
+        self.has_parameters = true;
         Ok(())
     }
 
@@ -20,7 +20,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::NonFiniteInput`]: then the last time stays.
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
         check_input(Argument::T, &[t])?;
-        self.start = t;
+        self.start_time = t;
         Ok(())
     }
 
@@ -30,9 +30,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
-        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
-        stack::<M, T>(&mut self.base.given, xdot, z);
+        check_model_input::<M, T>(Argument::StartXdot, xdot.as_slice())?;
+        check_model_input::<M, T>(Argument::StartZ, z.as_slice())?;
+        stack_states::<M, T>(&mut self.workspace.start_guess, xdot, z);
         Ok(())
     }
 
@@ -42,9 +42,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`]: then the last ones stay.
     pub fn set_relative_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for rtol in x.as_slice().iter().chain(z.as_slice()) {
-            check_relative::<T>(rtol.to_f64())?;
+            check_rtol::<T>(rtol.to_f64())?;
         }
-        stack::<M, T>(&mut self.base.tolerances.rtol, x, z);
+        stack_states::<M, T>(&mut self.workspace.tolerances.rtol, x, z);
         Ok(())
     }
 
@@ -54,9 +54,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`Error::InvalidOption`]: then the last ones stay.
     pub fn set_absolute_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
         for atol in x.as_slice().iter().chain(z.as_slice()) {
-            check_absolute::<T>(atol.to_f64())?;
+            check_atol::<T>(atol.to_f64())?;
         }
-        stack::<M, T>(&mut self.base.tolerances.atol, x, z);
+        stack_states::<M, T>(&mut self.workspace.tolerances.atol, x, z);
         Ok(())
     }
 
@@ -78,7 +78,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.sensitivities = match self.sensitivities.take() {
             _ if !controlled => None,
             Some(there) => Some(there),
-            None => Some(Box::new(Variational::new(Box::new(Replays::<M, B, T>::default()))?)),
+            None => {
+                Some(Box::new(Variational::new(Box::new(MethodStepDifferentiator::<M, B, T>::default()))?))
+            }
         };
         Ok(())
     }
@@ -104,7 +106,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
                 reason: "a magnitude is finite and not below 0",
             });
         }
-        for (to, from) in self.base.magnitudes.as_mut().iter_mut().zip(scales()) {
+        for (to, from) in self.workspace.magnitudes.as_mut().iter_mut().zip(scales()) {
             *to = *from;
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! A family of implicit methods as one engine.
 
 use crate::adaptive::engine::{Engine, Kind};
-use crate::adaptive::order::{Family, Orders, interpolate};
+use crate::adaptive::order::{Family, Orders, interpolate_step};
 use crate::adaptive::step::{After, Run, Span};
 use crate::adaptive::tape::Entry;
 use crate::error::Error;
@@ -10,19 +10,19 @@ use crate::result::Dense;
 use crate::scalar::Real;
 
 /// What a family remembers: the steps that it takes, and those that it takes again.
-pub struct Implicit<M: Dae, B: Family, T: Real> {
-    levels: Orders<M, T>,
-    replays: B::Replays<M, T>,
+pub struct ImplicitState<M: Dae, B: Family, T: Real> {
+    orders: Orders<M, T>,
+    differentiator: B::Replays<M, T>,
 }
 
-impl<M: Dae, B: Family, T: Real> Default for Implicit<M, B, T> {
+impl<M: Dae, B: Family, T: Real> Default for ImplicitState<M, B, T> {
     fn default() -> Self {
-        Self { levels: Orders::default(), replays: Default::default() }
+        Self { orders: Orders::default(), differentiator: Default::default() }
     }
 }
 
 impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
-    type State = Implicit<M, B, T>;
+    type State = ImplicitState<M, B, T>;
 }
 
 impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
@@ -36,7 +36,7 @@ impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
         span: Span<T>,
         after: After<'_, M, T>,
     ) -> Result<(), Error> {
-        run.integrate::<B>(&mut state.levels, x0, span, after)
+        run.integrate::<B>(&mut state.orders, x0, span, after)
     }
 
     fn interpolate(
@@ -47,11 +47,11 @@ impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
         t: T,
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error> {
-        let stages = state.levels.get::<B>(entry.level)?;
-        interpolate(stages, x, y, t - entry.t, entry.h, dense)
+        let stages = state.orders.get::<B>(entry.order_index)?;
+        interpolate_step(stages, x, y, t - entry.t, entry.h, dense)
     }
 
     fn replays(state: &mut Self::State) -> &mut Self::Replays {
-        &mut state.replays
+        &mut state.differentiator
     }
 }

@@ -1,46 +1,46 @@
 //! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of
 //! four.
 
-use crate::linalg::{Arithmetic, Complex, Kernel, PARTS, slot};
+use crate::linalg::{Arithmetic, COMPLEX_PARTS, Complex, Kernel, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Real, SideBySide};
 use core::marker::PhantomData;
 
 /// How many stages lie side by side.
-pub const GROUP: usize = 4;
+pub const STAGES_PER_GROUP: usize = 4;
 
 /// The stages of an unknown.
-pub type Groups<T, const G: usize> = [[T; GROUP]; G];
+pub type StageGroups<T, const G: usize> = [[T; STAGES_PER_GROUP]; G];
 
 /// The residual at four stages in one call.
-pub struct Residual<'a, M: Dae, T: Real> {
-    pub points: &'a ArrayV<M, [T; GROUP]>,
-    pub f: &'a mut ArrayK<M, [T; GROUP]>,
+pub struct EvaluateResiduals<'a, M: Dae, T: Real> {
+    pub points: &'a ArrayV<M, [T; STAGES_PER_GROUP]>,
+    pub f: &'a mut ArrayK<M, [T; STAGES_PER_GROUP]>,
 }
 
-impl<M: Dae, T: Real> SideBySide<T, GROUP> for Residual<'_, M, T> {
+impl<M: Dae, T: Real> SideBySide<T, STAGES_PER_GROUP> for EvaluateResiduals<'_, M, T> {
     #[inline(always)]
-    fn call<R: Lanes<Cell = [T; GROUP]>>(self) {
+    fn call<R: Lanes<Cell = [T; STAGES_PER_GROUP]>>(self) {
         M::residual::<R>(self.points, self.f);
     }
 }
 
 /// `V⁻¹ f` in the slots of the equations.
-pub struct Split<'a, M: Dae, T, const S: usize, const G: usize> {
-    pub left: &'a [Complex<T, PARTS>; S],
-    pub f: [&'a [[T; GROUP]]; G],
-    pub rows: &'a mut [[[Complex<T, PARTS>; 1]; 1]],
+pub struct TransformResiduals<'a, M: Dae, T, const S: usize, const G: usize> {
+    pub left_eigenvectors: &'a [Complex<T, COMPLEX_PARTS>; S],
+    pub f: [&'a [[T; STAGES_PER_GROUP]]; G],
+    pub rows: &'a mut [[[Complex<T, COMPLEX_PARTS>; 1]; 1]],
     pub model: PhantomData<M>,
 }
 
-impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for Split<'_, M, T, S, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for TransformResiduals<'_, M, T, S, G> {
     type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { left, f, rows, .. } = self;
+        let Self { left_eigenvectors: left, f, rows, .. } = self;
         for equation in 0..rows.len() {
-            let mut values = [[T::ZERO; GROUP]; G];
+            let mut values = [[T::ZERO; STAGES_PER_GROUP]; G];
             for (values, f) in values.iter_mut().zip(&f) {
                 if let Some(f) = f.get(equation) {
                     *values = *f;
@@ -48,7 +48,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for Split<'_, M, T,
             }
             let mut sum = Complex::zero();
             for (left, value) in left.iter().zip(values.as_flattened()) {
-                for l in 0..PARTS {
+                for l in 0..COMPLEX_PARTS {
                     sum.parts[l] = A::subtract(sum.parts[l], -left.parts[l], *value);
                 }
             }
@@ -60,33 +60,33 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for Split<'_, M, T,
 }
 
 /// See [`Collocation::advance`].
-pub struct Advance<'a, 'b, T, const S: usize, const G: usize> {
+pub struct ApplyIncrement<'a, 'b, T, const S: usize, const G: usize> {
     /// Columns of `−h A`.
-    pub minus_ha: &'a [Groups<T, G>; S],
+    pub minus_ha: &'a [StageGroups<T, G>; S],
     /// Columns of the basis for real parts, and for imaginary ones.
-    pub right: [&'a [Groups<T, G>]; 2],
+    pub right_eigenvectors: [&'a [StageGroups<T, G>]; 2],
     /// The states at the start of the step.
     pub x: &'a [T],
     pub scale: &'a [T],
-    pub rows: &'a [[[Complex<T, PARTS>; 1]; 1]],
-    pub y: &'a mut [Groups<T, G>],
-    pub points: &'a mut [&'b mut [[T; GROUP]]; G],
+    pub rows: &'a [[[Complex<T, COMPLEX_PARTS>; 1]; 1]],
+    pub y: &'a mut [StageGroups<T, G>],
+    pub points: &'a mut [&'b mut [[T; STAGES_PER_GROUP]]; G],
 }
 
-impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G> {
+impl<T: Real, const S: usize, const G: usize> Kernel for ApplyIncrement<'_, '_, T, S, G> {
     type Number = T;
-    type Output = Groups<T, G>;
+    type Output = StageGroups<T, G>;
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> Groups<T, G> {
-        let Self { minus_ha, right, x, scale, rows, y, points } = self;
+    fn run<A: Arithmetic>(self) -> StageGroups<T, G> {
+        let Self { minus_ha, right_eigenvectors: right, x, scale, rows, y, points } = self;
         let nx = x.len();
-        let mut sums = [[T::ZERO; GROUP]; G];
+        let mut sums = [[T::ZERO; STAGES_PER_GROUP]; G];
         for (index, (unknown, &scale)) in y.iter_mut().zip(scale).enumerate() {
             // In registers until it is finished.
             let before = *unknown;
             let mut y = before;
             if let Some([[row]]) = rows.get(index) {
-                let (re, im) = row.parts.split_at(const { PARTS / 2 });
+                let (re, im) = row.parts.split_at(const { COMPLEX_PARTS / 2 });
                 for (((re, im), right_re), right_im) in re.iter().zip(im).zip(right[0]).zip(right[1]) {
                     for ((y, right_re), right_im) in y.iter_mut().zip(right_re).zip(right_im) {
                         for ((y, right_re), right_im) in y.iter_mut().zip(right_re).zip(right_im) {
@@ -97,7 +97,7 @@ impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G
                 *unknown = y;
             }
             if let Some(&x) = x.get(index) {
-                let mut xi = [[x; GROUP]; G];
+                let mut xi = [[x; STAGES_PER_GROUP]; G];
                 for (a, &k) in minus_ha.iter().zip(y.as_flattened()) {
                     for (xi, a) in xi.iter_mut().zip(a) {
                         for (xi, a) in xi.iter_mut().zip(a) {
@@ -110,7 +110,7 @@ impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G
                         *k = y[g];
                     }
                     let Some(state) = points[g].get_mut(nx + index) else { continue };
-                    for i in 0..GROUP {
+                    for i in 0..STAGES_PER_GROUP {
                         let relative = (xi[g][i] - state[i]) * scale;
                         sums[g][i] = A::subtract(sums[g][i], -relative, relative);
                     }
@@ -118,7 +118,7 @@ impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G
                 }
             } else {
                 for g in 0..G {
-                    for i in 0..GROUP {
+                    for i in 0..STAGES_PER_GROUP {
                         let relative = (y[g][i] - before[g][i]) * scale;
                         sums[g][i] = A::subtract(sums[g][i], -relative, relative);
                     }
@@ -133,23 +133,23 @@ impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G
 }
 
 /// The polynomial of the last step at the stages of this one.
-pub struct Continue<'a, T, const S: usize, const G: usize> {
+pub struct ExtrapolateStages<'a, T, const S: usize, const G: usize> {
     /// Columns of its weights.
-    pub weights: [Groups<T, G>; S],
+    pub weights: [StageGroups<T, G>; S],
     pub from: &'a [[T; S]],
-    pub to: &'a mut [Groups<T, G>],
+    pub to: &'a mut [StageGroups<T, G>],
 }
 
-impl<T: Real, const S: usize, const G: usize> Kernel for Continue<'_, T, S, G> {
+impl<T: Real, const S: usize, const G: usize> Kernel for ExtrapolateStages<'_, T, S, G> {
     type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         for (to, from) in self.to.iter_mut().zip(self.from) {
-            let mut sum = [[T::ZERO; GROUP]; G];
+            let mut sum = [[T::ZERO; STAGES_PER_GROUP]; G];
             for (weights, &value) in self.weights.iter().zip(from) {
                 for g in 0..G {
-                    for i in 0..GROUP {
+                    for i in 0..STAGES_PER_GROUP {
                         sum[g][i] = A::subtract(sum[g][i], -weights[g][i], value);
                     }
                 }

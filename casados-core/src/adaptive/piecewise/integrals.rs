@@ -7,11 +7,11 @@
 //! dq/dW = Σ_k dq_k/d(x_k, u_k, p) D_k        H = Σ_k D_kᵀ H_k D_k        D_k = d(x_k, u_k, p)/dW
 //! ```
 
-use super::columns::Columns;
-use crate::adaptive::segment::filled;
+use super::direction_layout::DirectionLayout;
+use crate::adaptive::segment::filled_vec;
 use crate::error::Error;
 use crate::function::{Function, MatrixYP, MatrixYU, MatrixYX};
-use crate::integrator::chain_rule::fill;
+use crate::integrator::chain_rule::fill_matrix;
 use crate::model::{
     ArrayW, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
 };
@@ -127,23 +127,23 @@ pub trait Spanning<M: Dae, T: Real>: Integrand<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
-    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error>;
+    fn derivatives(sums: &QuadratureSums<M, T>) -> Result<Self::Derivatives, Error>;
 }
 
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for Quadrature<F, T> {
     type Derivatives = PiecewiseQuadrature<F, T>;
-    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error> {
-        let (at, width) = (&sums.at, sums.at.all());
+    fn derivatives(sums: &QuadratureSums<M, T>) -> Result<Self::Derivatives, Error> {
+        let (at, width) = (&sums.layout, sums.layout.column_count());
         let q = |r: usize, c: usize| sums.gradients[r * width + c];
         let mut all = PiecewiseQuadrature {
             dq_dx0: Zeroable::zeroed(),
-            dq_du: filled(at.intervals, MatrixYU::<F, T>::zeroed())?,
+            dq_du: filled_vec(at.intervals, MatrixYU::<F, T>::zeroed())?,
             dq_dp: Zeroable::zeroed(),
         };
-        fill(&mut all.dq_dx0, q);
-        fill(&mut all.dq_dp, |r, c| q(r, at.p() + c));
+        fill_matrix(&mut all.dq_dx0, q);
+        fill_matrix(&mut all.dq_dp, |r, c| q(r, at.parameter_column() + c));
         for (k, du) in all.dq_du.iter_mut().enumerate() {
-            fill(du, |r, c| q(r, at.u(k) + c));
+            fill_matrix(du, |r, c| q(r, at.control_column(k) + c));
         }
         Ok(all)
     }
@@ -151,25 +151,26 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for Quadratu
 
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Spanning<M, T> for LeastSquares<F, T> {
     type Derivatives = PiecewiseLeastSquares<M, T>;
-    fn derivatives(sums: &Sums<M, T>) -> Result<Self::Derivatives, Error> {
-        let at = &sums.at;
+    fn derivatives(sums: &QuadratureSums<M, T>) -> Result<Self::Derivatives, Error> {
+        let at = &sums.layout;
         let (mut grad_x0, mut grad_p) = (VectorX::<M, T>::zeroed(), VectorP::<M, T>::zeroed());
-        let mut grad_u = filled(at.intervals, VectorU::<M, T>::zeroed())?;
+        let mut grad_u = filled_vec(at.intervals, VectorU::<M, T>::zeroed())?;
         let gradient = |from: usize, to: &mut [T]| {
             to.copy_from_slice(sums.gradients.get(from..from + to.len()).unwrap_or_default())
         };
         gradient(0, grad_x0.as_mut_slice());
-        gradient(at.p(), grad_p.as_mut_slice());
+        gradient(at.parameter_column(), grad_p.as_mut_slice());
         for (k, grad_u) in grad_u.iter_mut().enumerate() {
-            gradient(at.u(k), grad_u.as_mut_slice());
+            gradient(at.control_column(k), grad_u.as_mut_slice());
         }
-        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(&sums.matrix)?;
+        let HessianBlocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } =
+            at.hessian_blocks(&sums.gauss_newton_matrix)?;
         Ok(PiecewiseLeastSquares { grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp })
     }
 }
 
 /// A symmetric matrix over all directions.
-pub(super) struct Blocks<M: Dae, T: Real> {
+pub(super) struct HessianBlocks<M: Dae, T: Real> {
     pub h_xx: MatrixXX<M, T>,
     pub h_xu: Vec<MatrixXU<M, T>>,
     pub h_uu: Vec<MatrixUU<M, T>>,
@@ -178,49 +179,51 @@ pub(super) struct Blocks<M: Dae, T: Real> {
     pub h_pp: MatrixPP<M, T>,
 }
 
-impl<M: Dae> Columns<M> {
+impl<M: Dae> DirectionLayout<M> {
     /// The blocks of a matrix, of whose elements that differ by rounding the lower ones count.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(super) fn blocks<T: Real>(&self, sum: &[T]) -> Result<Blocks<M, T>, Error> {
-        let h = |r: usize, c: usize| sum[r.max(c) * self.all() + r.min(c)];
+    pub(super) fn hessian_blocks<T: Real>(&self, sum: &[T]) -> Result<HessianBlocks<M, T>, Error> {
+        let h = |r: usize, c: usize| sum[r.max(c) * self.column_count() + r.min(c)];
         let count = self.intervals;
-        let mut blocks = Blocks {
+        let mut blocks = HessianBlocks {
             h_xx: Zeroable::zeroed(),
-            h_xu: filled(count, MatrixXU::<M, T>::zeroed())?,
-            h_uu: filled(count * count, MatrixUU::<M, T>::zeroed())?,
+            h_xu: filled_vec(count, MatrixXU::<M, T>::zeroed())?,
+            h_uu: filled_vec(count * count, MatrixUU::<M, T>::zeroed())?,
             h_xp: Zeroable::zeroed(),
-            h_up: filled(count, MatrixUP::<M, T>::zeroed())?,
+            h_up: filled_vec(count, MatrixUP::<M, T>::zeroed())?,
             h_pp: Zeroable::zeroed(),
         };
-        fill(&mut blocks.h_xx, h);
-        fill(&mut blocks.h_xp, |r, c| h(r, self.p() + c));
-        fill(&mut blocks.h_pp, |r, c| h(self.p() + r, self.p() + c));
+        fill_matrix(&mut blocks.h_xx, h);
+        fill_matrix(&mut blocks.h_xp, |r, c| h(r, self.parameter_column() + c));
+        fill_matrix(&mut blocks.h_pp, |r, c| h(self.parameter_column() + r, self.parameter_column() + c));
         for (k, (xu, up)) in blocks.h_xu.iter_mut().zip(&mut blocks.h_up).enumerate() {
-            fill(xu, |r, c| h(r, self.u(k) + c));
-            fill(up, |r, c| h(self.u(k) + r, self.p() + c));
+            fill_matrix(xu, |r, c| h(r, self.control_column(k) + c));
+            fill_matrix(up, |r, c| h(self.control_column(k) + r, self.parameter_column() + c));
         }
         for (index, uu) in blocks.h_uu.iter_mut().enumerate() {
-            fill(uu, |r, c| h(self.u(index / count) + r, self.u(index % count) + c));
+            fill_matrix(uu, |r, c| {
+                h(self.control_column(index / count) + r, self.control_column(index % count) + c)
+            });
         }
         Ok(blocks)
     }
 }
 
 /// What an integrand adds up over all directions.
-pub struct Sums<M: Dae, T: Real> {
-    pub(super) at: Columns<M>,
+pub struct QuadratureSums<M: Dae, T: Real> {
+    pub(super) layout: DirectionLayout<M>,
     /// A row for each output.
     gradients: Vec<T>,
     /// Of Gauss and Newton.
-    matrix: Vec<T>,
+    gauss_newton_matrix: Vec<T>,
     /// The second derivatives, as far as they are of the integrand itself.
-    pub(super) second: Vec<T>,
+    pub(super) second_derivatives: Vec<T>,
     product: Vec<T>,
 }
 
-impl<M: Dae, T: Real> Sums<M, T> {
+impl<M: Dae, T: Real> QuadratureSums<M, T> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub(super) fn new(
@@ -228,45 +231,48 @@ impl<M: Dae, T: Real> Sums<M, T> {
         integrand: &dyn Integrand<M, T>,
         second: bool,
     ) -> Result<Self, Error> {
-        let at = Columns { intervals, model: core::marker::PhantomData };
-        let width = at.all();
-        let square = |wanted: bool| filled(if wanted { width * width } else { 0 }, T::ZERO);
-        let matrix = square(integrand.matrix().is_some())?;
+        let at = DirectionLayout { intervals, model: core::marker::PhantomData };
+        let width = at.column_count();
+        let square = |wanted: bool| filled_vec(if wanted { width * width } else { 0 }, T::ZERO);
+        let matrix = square(integrand.gauss_newton_sum().is_some())?;
         let second = square(second)?;
         let product =
-            filled(if matrix.len() + second.len() > 0 { M::Shape::NW * width } else { 0 }, T::ZERO)?;
-        let gradients = filled(integrand.gradients().len() * width, T::ZERO)?;
-        Ok(Self { at, gradients, matrix, second, product })
+            filled_vec(if matrix.len() + second.len() > 0 { M::Shape::NW * width } else { 0 }, T::ZERO)?;
+        let gradients = filled_vec(integrand.gradients().len() * width, T::ZERO)?;
+        Ok(Self { layout: at, gradients, gauss_newton_matrix: matrix, second_derivatives: second, product })
     }
 
     /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets
     /// it.
-    pub(super) fn add(&mut self, k: usize, integrand: &mut dyn Integrand<M, T>, v: &[T]) {
-        let Self { at, gradients, matrix, second, product } = self;
-        for (row, sum) in integrand.gradients().iter().zip(gradients.chunks_exact_mut(at.all().max(1))) {
-            at.add(k, row.as_ref(), v, sum);
+    pub(super) fn add_interval(&mut self, k: usize, integrand: &mut dyn Integrand<M, T>, v: &[T]) {
+        let Self { layout: at, gradients, gauss_newton_matrix: matrix, second_derivatives: second, product } =
+            self;
+        for (row, sum) in
+            integrand.gradients().iter().zip(gradients.chunks_exact_mut(at.column_count().max(1)))
+        {
+            at.add_gradient(k, row.as_ref(), v, sum);
         }
         let mut project = |lower: &[ArrayW<M, T>], sums: [&mut [T]; 2]| {
             for sum in sums {
                 if !sum.is_empty() {
-                    at.project(k, |r, c| lower[r.max(c)][r.min(c)], v, product, sum);
+                    at.add_projected_hessian(k, |r, c| lower[r.max(c)][r.min(c)], v, product, sum);
                 }
             }
         };
         // The exact second derivatives have the matrix of Gauss and Newton too.
-        if let Some(lower) = integrand.matrix() {
+        if let Some(lower) = integrand.gauss_newton_sum() {
             project(lower, [matrix, second]);
         }
-        if let Some(lower) = integrand.second() {
+        if let Some(lower) = integrand.hessian_sum() {
             project(lower, [&mut [], second]);
         }
-        integrand.next();
+        integrand.reset_derivatives();
     }
 
     /// # Errors
     /// [`Error::Overflow`]
     pub(super) fn check(&self) -> Result<(), Error> {
-        let mut all = self.gradients.iter().chain(&self.matrix).chain(&self.second);
+        let mut all = self.gradients.iter().chain(&self.gauss_newton_matrix).chain(&self.second_derivatives);
         match all.position(|value| !value.is_finite()) {
             Some(index) => Err(Error::Overflow { step: 0, index }),
             None => Ok(()),

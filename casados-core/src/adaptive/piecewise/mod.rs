@@ -8,7 +8,7 @@
 //! d²(λᵀ x_N)/dW² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ Φ_k) D_k        D_k = d(x_k, u_k, p)/dW
 //! ```
 
-mod columns;
+mod direction_layout;
 mod integrals;
 mod results;
 mod steps;
@@ -16,14 +16,14 @@ mod steps;
 pub use results::{PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
 
 use crate::adaptive::engine::Engine;
-use crate::adaptive::integrator::{Integrator, inside};
-use crate::adaptive::segment::{Segment, add, dense, filled, refill};
-use crate::adaptive::sensitivities::{chain, dynamic};
+use crate::adaptive::integrator::{Integrator, is_inside_interval};
+use crate::adaptive::segment::{Segment, dense_at, filled_vec, push_segment, refill_vec};
+use crate::adaptive::sensitivities::{chain_rule_integrand, dyn_integrand};
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::step::Span;
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, check_named, check_output};
-use crate::integrator::chain_rule::{element, fill};
+use crate::finite::{check_input, check_model_input, check_output};
+use crate::integrator::chain_rule::{fill_matrix, hessian_element};
 use crate::linalg::axpy;
 use crate::model::{Dae, MatrixXU, MatrixZU, VectorP, VectorU, VectorX};
 use crate::quadrature::{
@@ -34,8 +34,8 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use columns::Columns;
-use integrals::{Blocks, Sums};
+use direction_layout::DirectionLayout;
+use integrals::{HessianBlocks, QuadratureSums};
 
 pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 
@@ -68,19 +68,19 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     segments: Vec<Segment<M, T>>,
     /// How many of them there are, and whether the last call succeeded with them.
-    count: usize,
+    interval_count: usize,
     solved: bool,
     /// Steps that are kept are taken by this. Programs that keep none have no integrator for that.
-    frozen: Option<Again<M, B, T>>,
+    frozen: Option<FrozenReplay<M, B, T>>,
     statistics: AdaptiveStatistics,
     nominal: Nominal<M, T>,
     /// `V_k` and `V_{k+1}`.
-    v: [Vec<T>; 2],
+    sensitivities: [Vec<T>; 2],
     /// Second derivatives of all columns, and a product on the way there.
-    second: [Vec<T>; 2],
+    second_derivatives: [Vec<T>; 2],
 }
 
-type Again<M, B, T> = fn(&mut Piecewise<M, B, T>, &VectorX<M, T>) -> Result<(), Error>;
+type FrozenReplay<M, B, T> = fn(&mut Piecewise<M, B, T>, &VectorX<M, T>) -> Result<(), Error>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     /// Of an integrator, which keeps its options, tolerances, parameters and start time.
@@ -91,13 +91,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Self {
             integrator,
             segments: Vec::new(),
-            count: 0,
+            interval_count: 0,
             solved: false,
             frozen: None,
             statistics,
             nominal,
-            v: Default::default(),
-            second: Default::default(),
+            sensitivities: Default::default(),
+            second_derivatives: Default::default(),
         }
     }
 
@@ -122,7 +122,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         controls: &[VectorU<M, T>],
         ends: &[T],
     ) -> Result<&Nominal<M, T>, Error> {
-        self.steps(x0, controls, ends)?;
+        self.prepare_steps(x0, controls, ends)?;
         if let Some(again) = self.frozen {
             again(self, x0)?;
         }
@@ -136,10 +136,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         x0: &VectorX<M, T>,
         controls: &[VectorU<M, T>],
         ends: &[T],
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.steps(x0, controls, ends)?;
-        self.replay(x0, along)?;
+        self.prepare_steps(x0, controls, ends)?;
+        self.replay_steps(x0, integrand)?;
         self.solved = true;
         Ok(&self.nominal)
     }
@@ -154,8 +154,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         if !self.solved {
             return Err(Error::NoResult);
         }
-        let Self { integrator, segments, count, nominal, .. } = self;
-        dense(integrator, segments.get_mut(..*count).unwrap_or_default(), nominal, t)
+        let Self { integrator, segments, interval_count: count, nominal, .. } = self;
+        dense_at(integrator, segments.get_mut(..*count).unwrap_or_default(), nominal, t)
     }
 
     /// The solution at the end, and its derivatives with respect to `x₀`, all controls and `p`.
@@ -168,8 +168,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         controls: &[VectorU<M, T>],
         ends: &[T],
     ) -> Result<PiecewiseForward<M, T>, Error> {
-        self.steps(x0, controls, ends)?;
-        let forward = self.sweep(x0, false, None, None)?;
+        self.prepare_steps(x0, controls, ends)?;
+        let forward = self.forward_sweep(x0, false, None, None)?;
         self.solved = true;
         Ok(forward)
     }
@@ -182,9 +182,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
         integrand: &mut Q,
     ) -> Result<(PiecewiseForward<M, T>, Q::Derivatives), Error> {
-        self.steps(x0, controls, ends)?;
-        let mut sums = Sums::new(self.count, integrand, false)?;
-        let forward = self.sweep(x0, false, Some(integrand), Some(&mut sums))?;
+        self.prepare_steps(x0, controls, ends)?;
+        let mut sums = QuadratureSums::new(self.interval_count, integrand, false)?;
+        let forward = self.forward_sweep(x0, false, Some(integrand), Some(&mut sums))?;
         let derivatives = Q::derivatives(&sums)?;
         self.solved = true;
         Ok((forward, derivatives))
@@ -200,12 +200,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         integrand: &mut Q,
     ) -> Result<(PiecewiseHessian<M, T>, Q::Derivatives), Error> {
         self.solved = false;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        self.steps(x0, controls, ends)?;
-        let mut sums = Sums::new(self.count, integrand, true)?;
-        let forward = self.sweep(x0, true, Some(&mut *integrand), Some(&mut sums))?;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        self.prepare_steps(x0, controls, ends)?;
+        let mut sums = QuadratureSums::new(self.interval_count, integrand, true)?;
+        let forward = self.forward_sweep(x0, true, Some(&mut *integrand), Some(&mut sums))?;
         let derivatives = Q::derivatives(&sums)?;
-        Ok((self.backwards(forward, lambda, &mut sums.second, Some(integrand))?, derivatives))
+        Ok((self.adjoint_sweep(forward, lambda, &mut sums.second_derivatives, Some(integrand))?, derivatives))
     }
 
     /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and
@@ -230,22 +230,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         controls: &[VectorU<M, T>],
         ends: &[T],
         lambda: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         self.solved = false;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        self.steps(x0, controls, ends)?;
-        self.replay(x0, reborrow(&mut along))?;
-        let Self { integrator, segments, count, nominal, .. } = self;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        self.prepare_steps(x0, controls, ends)?;
+        self.replay_steps(x0, reborrow(&mut integrand))?;
+        let Self { integrator, segments, interval_count: count, nominal, .. } = self;
         let mut result = PiecewiseAdjoint {
             nominal: *nominal,
             grad_x0: *lambda,
-            grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
+            grad_u: filled_vec(*count, VectorU::<M, T>::zeroed())?,
             grad_p: VectorP::<M, T>::zeroed(),
         };
         for (segment, grad_u) in segments.iter_mut().zip(&mut result.grad_u).rev() {
-            let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
+            let (mut frozen, state, memory, _) = segment.load(integrator)?;
+            frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut integrand))?;
             result.grad_x0.as_mut_slice().copy_from_slice(memory.adjoint.grad_x0.as_slice());
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
             axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
@@ -268,52 +268,59 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
         self.solved = false;
-        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
-        self.steps(x0, controls, ends)?;
-        let forward = self.sweep(x0, true, None, None)?;
-        let at = Columns::<M> { intervals: self.count, model: core::marker::PhantomData };
-        let mut sum = core::mem::take(&mut self.second[0]);
-        refill(&mut sum, at.all() * at.all(), T::ZERO)?;
-        let result = self.backwards(forward, lambda, &mut sum, None);
-        self.second[0] = sum;
+        check_model_input::<M, T>(Argument::Lambda, lambda.as_slice())?;
+        self.prepare_steps(x0, controls, ends)?;
+        let forward = self.forward_sweep(x0, true, None, None)?;
+        let at = DirectionLayout::<M> { intervals: self.interval_count, model: core::marker::PhantomData };
+        let mut sum = core::mem::take(&mut self.second_derivatives[0]);
+        refill_vec(&mut sum, at.column_count() * at.column_count(), T::ZERO)?;
+        let result = self.adjoint_sweep(forward, lambda, &mut sum, None);
+        self.second_derivatives[0] = sum;
         result
     }
 
     /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to
     /// `sum`.
-    fn backwards(
+    fn adjoint_sweep(
         &mut self,
         forward: PiecewiseForward<M, T>,
         lambda: &VectorX<M, T>,
         sum: &mut [T],
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
-        let Self { integrator, segments, count, nominal, second: [_, product], .. } = self;
-        let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
+        let Self {
+            integrator,
+            segments,
+            interval_count: count,
+            nominal,
+            second_derivatives: [_, product],
+            ..
+        } = self;
+        let at = DirectionLayout::<M> { intervals: *count, model: core::marker::PhantomData };
         let mut adjoint = PiecewiseAdjoint {
             nominal: *nominal,
             grad_x0: *lambda,
-            grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
+            grad_u: filled_vec(*count, VectorU::<M, T>::zeroed())?,
             grad_p: VectorP::<M, T>::zeroed(),
         };
-        refill(product, M::Shape::NW * at.all(), T::ZERO)?;
+        refill_vec(product, M::Shape::NW * at.column_count(), T::ZERO)?;
         for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
-            let history = core::mem::take(&mut segment.history);
-            let (mut frozen, state, memory, v) = segment.open(integrator)?;
+            let history = core::mem::take(&mut segment.step_sensitivities);
+            let (mut frozen, state, memory, v) = segment.load(integrator)?;
             let mut part = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
+            frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dyn_integrand(&mut part))?;
             let hessian = &memory.hessian;
             adjoint.grad_x0 = hessian.first.grad_x0;
             if let Some(grad_u) = adjoint.grad_u.get_mut(k) {
                 *grad_u = hessian.first.grad_u;
             }
             axpy(T::ONE, hessian.first.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
-            at.project(k, |r, c| element(hessian, r, c), v, product, sum);
-            segment.history = history;
+            at.add_projected_hessian(k, |r, c| hessian_element(hessian, r, c), v, product, sum);
+            segment.step_sensitivities = history;
         }
         check_output(adjoint.grad_p.as_slice(), 0)?;
         check_output(sum, 0)?;
-        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(sum)?;
+        let HessianBlocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.hessian_blocks(sum)?;
         let result = PiecewiseHessian { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp };
         self.solved = true;
         Ok(result)
@@ -329,9 +336,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             return Err(Error::NoResult);
         }
         for segment in &mut self.segments {
-            segment.chosen = false;
+            segment.steps_were_chosen = false;
         }
-        self.frozen = Some(|piecewise, x0| piecewise.replay(x0, None));
+        self.frozen = Some(|piecewise, x0| piecewise.replay_steps(x0, None));
         Ok(())
     }
 
@@ -342,7 +349,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
 }
 
 /// The result at the end of interval `k`.
-fn collect<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T>, k: usize) {
+fn collect_end<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T>, k: usize) {
     if k == 0 {
         nominal.z0 = interval.z0;
     }

@@ -9,21 +9,21 @@
 //! An integrand takes part step by step: forwards with the derivatives of its stages by
 //! `(x₀, u, p)`, backwards in `λ_n`.
 
-mod blocks;
+mod step_errors;
 
-use blocks::in_step;
+use step_errors::with_step_number;
 
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::engine::Engine;
-use crate::adaptive::point::At;
+use crate::adaptive::point::ModelPoint;
 use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
 use crate::adaptive::step::{Span, Workspace};
 use crate::adaptive::tape::Tape;
 use crate::error::Error;
 use crate::finite::{check_forward, check_output};
 use crate::integrator::chain_rule::{
-    FullHessian, StateSensitivities, add, chain_states, element, identity, write_algebraic, write_blocks,
-    write_states,
+    FullHessian, StateSensitivities, add_congruence, chain_states, hessian_element, set_identity,
+    write_algebraic, write_blocks, write_states,
 };
 use crate::linalg::axpy;
 use crate::memory::extend;
@@ -40,36 +40,36 @@ use bytemuck::Zeroable;
 /// Memory of derivatives.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub struct Memory<M: Dae, T: Plain> {
+pub struct SensitivityMemory<M: Dae, T: Plain> {
     pub hessian: Hessian<M, T>,
     pub adjoint: Adjoint<M, T>,
     /// `V_n`, and `V_{n+1}`.
-    v: [StateSensitivities<M, T>; 2],
+    step_sensitivities: [StateSensitivities<M, T>; 2],
     lambda: VectorX<M, T>,
     /// The gradient of all steps.
-    gradient: ArrayW<M, T>,
+    gradient_sum: ArrayW<M, T>,
     /// The Hessian of one step times `D`, and the sum of all.
-    product: FullHessian<M, T>,
-    sum: FullHessian<M, T>,
+    hessian_product: FullHessian<M, T>,
+    hessian_sum: FullHessian<M, T>,
 }
 
 /// What derivatives are taken of.
-pub struct Frozen<'a, M: Dae, T: Real> {
-    pub base: &'a mut Workspace<M, T>,
+pub struct RecordedSteps<'a, M: Dae, T: Real> {
+    pub workspace: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     pub span: Span<T>,
     /// Start values of `(ẋ, z)`.
-    pub given: ArrayK<M, T>,
+    pub start_guess: ArrayK<M, T>,
     /// Whether the steps were chosen for these inputs: then each is taken from where the run took
     /// it. Steps that are solved to rounding one after the other lead elsewhere than those that
     /// were solved to a coarse tolerance, where errors grow by much, and do not fit there.
-    pub chosen: bool,
+    pub steps_were_chosen: bool,
 }
 
-impl<M: Dae, T: Real> Frozen<'_, M, T> {
+impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
     /// Takes all steps again, to rounding; `each` is called to take one, and returns what it gave.
-    fn steps<B: Engine<M, T>>(
+    fn replay_steps<B: Engine<M, T>>(
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
@@ -80,52 +80,58 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
         let mut x = *x0;
-        let Workspace { u, parameters, result, start, .. } = &mut *self.base;
-        *start = self.given;
-        let at = At { x: x0, u, p: parameters, t: self.span.start };
+        let Workspace { u, parameters, result, start, .. } = &mut *self.workspace;
+        *start = self.start_guess;
+        let at = ModelPoint { x: x0, u, p: parameters, t: self.span.start };
         if M::Shape::NZ > 0 {
-            self.consistent.solve_from_afar(&at, start)?;
+            self.consistent.solve_with_diagnosis(&at, start)?;
         }
         result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[M::Shape::NX..]);
         (result.x, result.z) = (*x0, result.z0);
-        self.tape.rewrite();
+        self.tape.begin_replay();
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
             let replays = B::replays(state);
-            let (start, y) = self.tape.numbers(step, M::Shape::NX);
-            if self.chosen {
+            let (start, y) = self.tape.step_numbers(step, M::Shape::NX);
+            if self.steps_were_chosen {
                 for (x, start) in x.as_mut_slice().iter_mut().zip(start) {
                     *x = *start;
                 }
             }
-            let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: self.chosen };
-            let (end, z) = each(replays, &taken, step).map_err(|error| in_step(error, step))?;
-            self.tape.write(x.as_slice(), replays.stages(entry.level)?)?;
+            let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
+            let taken = AcceptedStep {
+                start: at,
+                h: entry.h,
+                stage_unknowns: y,
+                order_index: entry.order_index,
+                stages_are_solved: self.steps_were_chosen,
+            };
+            let (end, z) = each(replays, &taken, step).map_err(|error| with_step_number(error, step))?;
+            self.tape.write_replayed_step(x.as_slice(), replays.stages(entry.order_index)?)?;
             (x, result.z) = (end, z);
             result.x = x;
         }
-        self.tape.commit();
+        self.tape.commit_replay();
         if !B::ENDS_ON_STAGE && M::Shape::NZ > 0 {
-            let y = self.end()?;
-            self.base.result.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
+            let y = self.consistent_end()?;
+            self.workspace.result.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
         }
         Ok(())
     }
 
     /// Consistent `(ẋ, z)` at the end, from the last stage and the `z` that is there.
-    fn end(&mut self) -> Result<ArrayK<M, T>, Error> {
-        let (nx, Workspace { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.base);
+    fn consistent_end(&mut self) -> Result<ArrayK<M, T>, Error> {
+        let (nx, Workspace { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.workspace);
         let mut guess = ArrayK::<M, T>::zeroed();
         let (states, algebraic) = guess.as_mut().split_at_mut(nx);
-        let (_, y) = self.tape.numbers(self.tape.entries().len().saturating_sub(1), nx);
+        let (_, y) = self.tape.step_numbers(self.tape.entries().len().saturating_sub(1), nx);
         let stages = (y.len() / M::Shape::NK.max(1)).max(1);
         for (to, k) in states.iter_mut().zip(y.chunks_exact(stages)) {
             *to = k.last().copied().unwrap_or(T::ZERO);
         }
         algebraic.copy_from_slice(result.z.as_slice());
         let x = result.x;
-        self.consistent.solve(&At { x: &x, u, p: parameters, t: self.span.end }, &mut guess)?;
+        self.consistent.solve(&ModelPoint { x: &x, u, p: parameters, t: self.span.end }, &mut guess)?;
         Ok(guess)
     }
 
@@ -137,15 +143,15 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        reset_integrand(&mut along);
-        self.steps::<B>(state, x0, |replays, taken, _| {
-            let mut chained = chain(&mut along, None, false);
-            let nominal = replays.solve(taken, dynamic(&mut chained))?;
+        reset_integrand(&mut integrand);
+        self.replay_steps::<B>(state, x0, |replays, taken, _| {
+            let mut chained = chain_rule_integrand(&mut integrand, None, false);
+            let nominal = replays.solve(taken, dyn_integrand(&mut chained))?;
             Ok((nominal.x, nominal.z))
         })?;
-        finish_integrand(&mut along)
+        finish_integrand(&mut integrand)
     }
 
     /// The solution and its derivatives; `history` takes `V_n` of each step, if it is wanted.
@@ -156,22 +162,22 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         x0: &VectorX<M, T>,
-        memory: &mut Memory<M, T>,
+        memory: &mut SensitivityMemory<M, T>,
         mut history: Option<&mut Vec<T>>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        reset_integrand(&mut along);
+        reset_integrand(&mut integrand);
         let second = history.is_some();
-        let Memory { v: [v, next], hessian, .. } = memory;
+        let SensitivityMemory { step_sensitivities: [v, next], hessian, .. } = memory;
         let result = &mut hessian.first.forward;
-        identity::<M, T>(v);
+        set_identity::<M, T>(v);
         let count = self.tape.entries().len();
-        self.steps::<B>(state, x0, |replays, taken, step| {
+        self.replay_steps::<B>(state, x0, |replays, taken, step| {
             if let Some(history) = &mut history {
                 extend(history, ArrayW::<M, T>::flat(v.as_ref()))?;
             }
-            let mut chained = chain(&mut along, Some(v), second);
-            let forward = replays.forward(taken, dynamic(&mut chained))?;
+            let mut chained = chain_rule_integrand(&mut integrand, Some(v), second);
+            let forward = replays.forward(taken, dyn_integrand(&mut chained))?;
             chain_states(forward, v, next);
             if step + 1 == count && B::ENDS_ON_STAGE {
                 write_algebraic(forward, v, result);
@@ -181,22 +187,22 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         })?;
         write_states(v, result);
         if const { !B::ENDS_ON_STAGE && M::Shape::NZ > 0 } {
-            let y = self.end()?;
-            let (x, Workspace { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
-            let at = At { x: &x, u, p: parameters, t: self.span.end };
+            let y = self.consistent_end()?;
+            let (x, Workspace { u, parameters, .. }) = (self.workspace.result.x, &mut *self.workspace);
+            let at = ModelPoint { x: &x, u, p: parameters, t: self.span.end };
             write_algebraic(self.consistent.forward(&at, &y)?, v, result);
         }
         if const { M::Shape::NZ > 0 } {
-            let Workspace { u, parameters, start, .. } = &mut *self.base;
-            let at = At { x: x0, u, p: parameters, t: self.span.start };
+            let Workspace { u, parameters, start, .. } = &mut *self.workspace;
+            let at = ModelPoint { x: x0, u, p: parameters, t: self.span.start };
             let forward = self.consistent.forward(&at, start)?;
             (result.dz0_dx0, result.dz0_du, result.dz0_dp) = (forward.dz_dx0, forward.dz_du, forward.dz_dp);
             if count == 0 {
                 (result.dz_dx0, result.dz_du, result.dz_dp) = (forward.dz_dx0, forward.dz_du, forward.dz_dp);
             }
         }
-        result.nominal = self.base.result;
-        finish_integrand(&mut along)?;
+        result.nominal = self.workspace.result;
+        finish_integrand(&mut integrand)?;
         check_forward(result, count)
     }
 
@@ -208,23 +214,29 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         lambda: &VectorX<M, T>,
-        memory: &mut Memory<M, T>,
+        memory: &mut SensitivityMemory<M, T>,
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-        let Memory { lambda: now, gradient, adjoint, .. } = memory;
+        let SensitivityMemory { lambda: now, gradient_sum: gradient, adjoint, .. } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
-        let Workspace { u, parameters, result, .. } = &mut *self.base;
+        let Workspace { u, parameters, result, .. } = &mut *self.workspace;
         for (step, entry) in self.tape.entries().iter().enumerate().rev() {
-            let (states, y) = self.tape.numbers(step, nx);
+            let (states, y) = self.tape.step_numbers(step, nx);
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
-            let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
+            let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
+            let taken = AcceptedStep {
+                start: at,
+                h: entry.h,
+                stage_unknowns: y,
+                order_index: entry.order_index,
+                stages_are_solved: true,
+            };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let local = B::replays(state).adjoint(&taken, now, dynamic(&mut backwards));
-            let local = local.map_err(|error| in_step(error, step))?;
+            let local = B::replays(state).adjoint(&taken, now, dyn_integrand(&mut backwards));
+            let local = local.map_err(|error| with_step_number(error, step))?;
             now.as_mut_slice().copy_from_slice(local.grad_x0.as_slice());
             let parts = local.grad_u.as_slice().iter().chain(local.grad_p.as_slice());
             for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
@@ -249,36 +261,49 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         &mut self,
         state: &mut B::State,
         lambda: &VectorX<M, T>,
-        memory: &mut Memory<M, T>,
+        memory: &mut SensitivityMemory<M, T>,
         history: &[T],
         mut along: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
-        let Memory { lambda: now, gradient, hessian, product, sum, .. } = memory;
+        let SensitivityMemory {
+            lambda: now,
+            gradient_sum: gradient,
+            hessian,
+            hessian_product: product,
+            hessian_sum: sum,
+            ..
+        } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
         for row in sum.as_mut() {
             row.as_mut().fill(T::ZERO);
         }
-        let Workspace { u, parameters, .. } = &mut *self.base;
+        let Workspace { u, parameters, .. } = &mut *self.workspace;
         for (step, entry) in self.tape.entries().iter().enumerate().rev() {
-            let (states, y) = self.tape.numbers(step, nx);
+            let (states, y) = self.tape.step_numbers(step, nx);
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
-            let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = AcceptedStep { at, h: entry.h, y, level: entry.level, near: true };
+            let at = ModelPoint { x: &x, u, p: parameters, t: entry.t };
+            let taken = AcceptedStep {
+                start: at,
+                h: entry.h,
+                stage_unknowns: y,
+                order_index: entry.order_index,
+                stages_are_solved: true,
+            };
             let mut backwards = along.as_mut().map(|integrand| AdjointOnlyIntegrand(&mut **integrand));
-            let second = B::replays(state).hessian(&taken, now, dynamic(&mut backwards));
-            let second = second.map_err(|error| in_step(error, step))?;
+            let second = B::replays(state).hessian(&taken, now, dyn_integrand(&mut backwards));
+            let second = second.map_err(|error| with_step_number(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());
             for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
                 *sum = *sum + *part;
             }
             let v = history.get(step * nx * nw..).unwrap_or_default();
-            add::<M, T>(|r, c| element(second, r, c), v, [product, sum]);
+            add_congruence::<M, T>(|r, c| hessian_element(second, r, c), v, [product, sum]);
         }
-        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
+        if let Some(second) = along.as_ref().and_then(|integrand| integrand.hessian_sum()) {
             for (sum, second) in sum.as_mut().iter_mut().zip(second) {
                 axpy(T::ONE, second.as_ref(), sum.as_mut());
             }
@@ -298,15 +323,15 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
 }
 
 /// The integrand of one step of an interval, or of one of several intervals.
-pub(super) fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+pub(super) fn chain_rule_integrand<'a, M: Dae, T: Real>(
+    integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a StateSensitivities<M, T>>,
     second: bool,
 ) -> Option<ChainRuleIntegrand<'a, M, T>> {
-    along.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, second })
+    integrand.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, with_hessian: second })
 }
 
-pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
+pub(super) fn dyn_integrand<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
 ) -> OptionalIntegrand<'a, 'a, M, T> {
     match integrand {

@@ -2,19 +2,19 @@
 
 use super::*;
 use crate::adaptive::discontinuity::{BranchChange, Branches};
-use crate::adaptive::newton_monitor::Convergence;
+use crate::adaptive::newton_monitor::NewtonMonitor;
 
 /// The estimate of a step in which the highest derivative of a spline jumps is about so many times
 /// its error.
-const OVER_SPLINE_KNOT: f64 = 3.0;
+const SPLINE_KNOT_ERROR_FACTOR: f64 = 3.0;
 /// Where the model changes its branch the error is held below the tolerance that was asked for by
 /// this: there may be many such steps, and what follows makes more of them.
-const OVER_SWITCH: f64 = 6.0;
+const SWITCH_ERROR_FACTOR: f64 = 6.0;
 /// Rounding errors are like jumps: these are looked for where the least error that counts is so
 /// many times as large, of `f64` with relative tolerances of 3e-11 and more.
-const ABOVE_NOISE: f64 = 1e4;
+const MIN_ERROR_TO_NOISE: f64 = 1e4;
 /// What follows a rough step may be shorter by this and still be a step.
-const SHORTEST_AFTER_ROUGH: f64 = 0.01;
+const MIN_DISCONTINUITY_REDUCTION: f64 = 0.01;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
@@ -22,29 +22,29 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(super) fn choose_stages<B: Family>(
+    pub(super) fn choose_order<B: Family>(
         &mut self,
         levels: &mut Orders<M, T>,
         state: &mut StepState<T>,
     ) -> Result<(), Error> {
-        let ratio = state.accepted.map(|before| (state.h / before).to_f64());
-        if state.need >= Need::Factors {
-            let level = state.order.level;
-            let next = state.order.next(&state.convergence, ratio.unwrap_or(1.0), B::LEVELS);
+        let ratio = state.last_step_size.map(|before| (state.h / before).to_f64());
+        if state.matrix_update >= MatrixUpdate::Factors {
+            let level = state.order.order_index;
+            let next = state.order.select_order(&state.newton, ratio.unwrap_or(1.0), B::LEVELS);
             if next != level {
-                levels.change::<B>(level, next)?;
-                state.order.change(next);
-                state.controller.forget();
-                self.tighten::<B>(levels.get::<B>(next)?.count());
+                levels.transfer_last_step::<B>(level, next)?;
+                state.order.set_order(next);
+                state.controller.reset();
+                self.set_estimator_tolerances::<B>(levels.get::<B>(next)?.stage_count());
             }
         }
-        let stages = levels.get::<B>(state.order.level)?;
+        let stages = levels.get::<B>(state.order.order_index)?;
         match ratio {
             // The polynomial of the last step may be that of another branch.
             Some(ratio) if M::BRANCHES == 0 || !state.is_unsolved() => {
-                stages.continue_from_last(ratio);
+                stages.extrapolate_last_step(ratio);
             }
-            _ => stages.begin(&self.base.point),
+            _ => stages.begin_from_start(&self.workspace.point),
         }
         Ok(())
     }
@@ -54,73 +54,80 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// A Jacobian that is not finite; matrices that stay singular.
-    pub(super) fn factor<B: Family>(
+    pub(super) fn prepare_factors<B: Family>(
         &mut self,
         stages: &mut dyn Stages<M, T>,
         state: &mut StepState<T>,
     ) -> Result<bool, Error> {
-        if state.need == Need::Jacobian {
-            self.linearise(stages, state)?;
+        if state.matrix_update == MatrixUpdate::Jacobian {
+            self.evaluate_midpoint_jacobian(stages, state)?;
         }
-        if state.need < Need::Factors {
-            return Ok(!state.keeps_matrix(B::LEVELS));
+        if state.matrix_update < MatrixUpdate::Factors {
+            return Ok(!state.may_increase_order(B::LEVELS));
         }
-        let mut factored = self.factor_with(stages, state);
-        if state.verifies_pivots && !state.pivoted && !stages.factors_hold(&self.base.step(state)) {
-            state.pivoted = true;
-            factored = self.factor_with(stages, state);
+        let mut factored = self.factor_matrix(stages, state);
+        if state.verifies_pivots
+            && !state.uses_pivoting
+            && !stages.are_factors_accurate(&self.workspace.step_context(state))
+        {
+            state.uses_pivoting = true;
+            factored = self.factor_matrix(stages, state);
         }
         match factored {
             Ok(planned) => {
-                state.singular = 0;
+                state.singular_matrices = 0;
                 self.statistics.dense += usize::from(!planned);
                 Ok(true)
             }
             Err(unknown) => {
-                state.singular += 1;
-                if state.singular >= SINGULAR {
-                    let at = Place { step: state.tried, stage: 0, iteration: 0 };
+                state.singular_matrices += 1;
+                if state.singular_matrices >= MAX_SINGULAR_MATRICES {
+                    let at = Place { step: state.attempts, stage: 0, iteration: 0 };
                     return Err(Error::Singular { unknown: crate::irk::unknown_name::<M>(unknown), at });
                 }
                 self.statistics.failed += 1;
-                state.refusal = Refusal::Singular;
-                state.order.unexpected = true;
-                state.again(0.5);
-                self.check_step(state.t, state.h, state.refusal)?;
+                state.last_refusal = Refusal::Singular;
+                state.order.iteration_failed = true;
+                state.retry(0.5);
+                self.check_step_size(state.t, state.h, state.last_refusal)?;
                 Ok(false)
             }
         }
     }
 
     /// Factors by the plan, or with pivots.
-    fn factor_with(&mut self, stages: &mut dyn Stages<M, T>, state: &StepState<T>) -> Result<bool, usize> {
-        stages.set_pivoted(state.pivoted);
+    fn factor_matrix(&mut self, stages: &mut dyn Stages<M, T>, state: &StepState<T>) -> Result<bool, usize> {
+        stages.set_pivoted(state.uses_pivoting);
         self.statistics.factorizations += 1;
-        stages.factor(&self.base.jacobian, state.h)
+        stages.factor(&self.workspace.jacobian, state.h)
     }
 
     /// Whether an attempt failed because the planned elimination lost its digits: its pivots are
     /// judged before the program runs, and may vanish where it leads. Then the matrix is pivoted,
     /// and the same step is tried again; the factors of later steps are tested before they are
     /// used.
-    pub(super) fn blames_pivots(
+    pub(super) fn retry_with_pivoting(
         &mut self,
         stages: &dyn Stages<M, T>,
         state: &mut StepState<T>,
-        attempt: &Result<f64, Failure>,
+        attempt: &Result<f64, NewtonFailure>,
     ) -> bool {
         let may_be = match attempt {
             Ok(error) => *error >= 1.0,
-            Err(failure) => matches!(failure, Failure::Slow(_) | Failure::Diverges | Failure::NotFinite),
+            Err(failure) => matches!(
+                failure,
+                NewtonFailure::TooSlow(_) | NewtonFailure::Diverges | NewtonFailure::NotFinite
+            ),
         };
-        if !may_be || state.pivoted || stages.factors_hold(&self.base.step(state)) {
+        if !may_be || state.uses_pivoting || stages.are_factors_accurate(&self.workspace.step_context(state))
+        {
             return false;
         }
         self.statistics.failed += 1;
-        (state.pivoted, state.verifies_pivots) = (true, true);
-        state.need = Need::Factors;
+        (state.uses_pivoting, state.verifies_pivots) = (true, true);
+        state.matrix_update = MatrixUpdate::Factors;
         // The rate of this iteration says nothing of the next one.
-        (state.convergence.rate, state.convergence.factor) = (THET, Convergence::UNKNOWN);
+        (state.newton.contraction_rate, state.newton.eta) = (THET, NewtonMonitor::UNKNOWN_ETA);
         true
     }
 
@@ -129,20 +136,24 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// A value that is not finite.
-    fn linearise(&mut self, stages: &mut dyn Stages<M, T>, state: &mut StepState<T>) -> Result<(), Error> {
-        state.current = state.is_careful();
-        state.convergence.fresh = true;
-        if !state.current {
-            let mut middle = self.base.middle;
-            stages.predict(&self.base.step(state), &mut middle);
-            self.base.middle = middle;
-            state.current = self.evaluate_jacobian(true, state.tried).is_err();
+    fn evaluate_midpoint_jacobian(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        state: &mut StepState<T>,
+    ) -> Result<(), Error> {
+        state.jacobian_is_current = state.needs_second_estimate();
+        state.newton.jacobian_is_current = true;
+        if !state.jacobian_is_current {
+            let mut middle = self.workspace.midpoint;
+            stages.predict_midpoint(&self.workspace.step_context(state), &mut middle);
+            self.workspace.midpoint = middle;
+            state.jacobian_is_current = self.evaluate_jacobian(true, state.attempts).is_err();
         }
-        if state.current {
-            self.evaluate_jacobian(false, state.tried)?;
+        if state.jacobian_is_current {
+            self.evaluate_jacobian(false, state.attempts)?;
         }
-        let point = if state.current { &self.base.point } else { &self.base.middle };
-        state.convergence.branches = Branches::of::<M, T>(point);
+        let point = if state.jacobian_is_current { &self.workspace.point } else { &self.workspace.midpoint };
+        state.newton.jacobian_branches = Branches::at_point::<M, T>(point);
         Ok(())
     }
 
@@ -151,33 +162,34 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// [`Failure`]
-    pub(super) fn attempt(
+    pub(super) fn attempt_step(
         &mut self,
         stages: &mut dyn Stages<M, T>,
         state: &mut StepState<T>,
-    ) -> Result<f64, Failure> {
-        let Workspace { point, u, parameters, tolerances, .. } = &*self.base;
-        let start = self.base.step(state);
+    ) -> Result<f64, NewtonFailure> {
+        let Workspace { point, u, parameters, tolerances, .. } = &*self.workspace;
+        let start = self.workspace.step_context(state);
         let residuals = &mut self.statistics.residuals;
-        let solved = stages.solve(&start, tolerances.newton, &mut state.convergence, residuals);
-        self.statistics.iterations += state.convergence.iterations;
+        let solved = stages.solve(&start, tolerances.newton_tolerance, &mut state.newton, residuals);
+        self.statistics.iterations += state.newton.iterations;
         solved?;
-        let again = state.is_careful();
-        let error = stages.error(&start, again, residuals)?;
+        let again = state.needs_second_estimate();
+        let error = stages.estimate_error(&start, again, residuals)?;
         if !error.is_finite() {
-            return Err(Failure::Diverges);
+            return Err(NewtonFailure::Diverges);
         }
         let error = match &mut self.sensitivities {
             Some(sensitivities) if error < 1.0 => {
                 let mut x = VectorX::<M, T>::zeroed();
                 x.as_mut_slice().copy_from_slice(&point.as_ref()[M::Shape::NX..2 * M::Shape::NX]);
-                let (at, level) = (At { x: &x, u, p: parameters, t: state.t }, state.order.level);
-                error.max(sensitivities.implicit(stages, at, level, &start, tolerances, again)?)
+                let (at, level) =
+                    (ModelPoint { x: &x, u, p: parameters, t: state.t }, state.order.order_index);
+                error.max(sensitivities.implicit_error(stages, at, level, &start, tolerances, again)?)
             }
             _ => error,
         };
         if error < 1.0 {
-            self.refuse_over_branches(stages, state, error)?;
+            self.reject_across_branches(stages, state, error)?;
         }
         Ok(error)
     }
@@ -186,31 +198,31 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// tolerance that was asked for.
     ///
     /// # Errors
-    /// [`Failure::Rough`], and a value that is not finite.
-    fn refuse_over_branches(
+    /// [`Failure::Discontinuity`], and a value that is not finite.
+    fn reject_across_branches(
         &mut self,
         stages: &mut dyn Stages<M, T>,
         state: &StepState<T>,
         error: f64,
-    ) -> Result<(), Failure> {
-        let start = self.base.step(state);
-        let Tolerances { tolerance_ratio, noise, .. } = &self.base.tolerances;
-        let over_knot = *tolerance_ratio / OVER_SPLINE_KNOT;
-        let Some(change) = stages.change(&start) else { return Ok(()) };
-        if ABOVE_NOISE * *noise * over_knot > 1.0 {
+    ) -> Result<(), NewtonFailure> {
+        let start = self.workspace.step_context(state);
+        let Tolerances { tolerance_ratio, noise, .. } = &self.workspace.tolerances;
+        let over_knot = *tolerance_ratio / SPLINE_KNOT_ERROR_FACTOR;
+        let Some(change) = stages.branch_change(&start) else { return Ok(()) };
+        if MIN_ERROR_TO_NOISE * *noise * over_knot > 1.0 {
             return Ok(());
         }
         let factor = match change {
-            BranchChange::Switch => OVER_SWITCH * *tolerance_ratio,
+            BranchChange::Switch => SWITCH_ERROR_FACTOR * *tolerance_ratio,
             BranchChange::SplineKnot => over_knot,
         };
         let rough = factor * stages.largest_defect(&start, &mut self.statistics.residuals)?.max(error);
         // A derivative that jumps leaves an error like the fourth power of the step size, or a
         // lower one. Where times are no finer than that, the step is as good as can be.
         let factor = (0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9);
-        let shorter = state.h * T::from_f64(SHORTEST_AFTER_ROUGH * factor);
-        if rough >= 1.0 && self.check_step(state.t, shorter, Refusal::Error).is_ok() {
-            return Err(Failure::Rough(factor));
+        let shorter = state.h * T::from_f64(MIN_DISCONTINUITY_REDUCTION * factor);
+        if rough >= 1.0 && self.check_step_size(state.t, shorter, Refusal::Error).is_ok() {
+            return Err(NewtonFailure::Discontinuity(factor));
         }
         Ok(())
     }
@@ -219,7 +231,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// What `after` has; no consistent `(ẋ, z)` at the end.
-    pub(super) fn accept(
+    pub(super) fn accept_step(
         &mut self,
         stages: &mut dyn Stages<M, T>,
         state: &mut StepState<T>,
@@ -228,43 +240,43 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ) -> Result<bool, Error> {
         let (t, h, nx) = (state.t, state.h, M::Shape::NX);
         self.statistics.steps += 1;
-        state.pivoted = false;
-        stages.accept();
+        state.uses_pivoting = false;
+        stages.accept_step();
         if let Some(sensitivities) = &mut self.sensitivities {
-            sensitivities.accept();
+            sensitivities.accept_step();
         }
-        if self.record {
-            let x = &self.base.point.as_ref()[nx..2 * nx];
-            self.tape.push(t, h, state.order.level, x, stages.accepted())?;
+        if self.record_steps {
+            let x = &self.workspace.point.as_ref()[nx..2 * nx];
+            self.tape.push(t, h, state.order.order_index, x, stages.accepted_unknowns())?;
         }
-        let end = state.end();
-        let Workspace { point, dense, .. } = &mut *self.base;
+        let end = state.end_time();
+        let Workspace { point, dense, .. } = &mut *self.workspace;
         let x = &point.as_ref()[nx..2 * nx];
         let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
-            interpolate(&*stages, x, stages.accepted(), time - t, h, dense)
+            interpolate_step(&*stages, x, stages.accepted_unknowns(), time - t, h, dense)
         };
-        let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
+        let mut accepted = AcceptedStepOutput { evaluate_dense: &mut evaluate, end, stop: false };
         after(&mut accepted, dense)?;
         if accepted.stop {
             return Ok(true);
         }
-        let on_stage = stages.end(h, &mut self.base.point);
-        if let Some(time) = self.base.point.as_mut().last_mut() {
+        let on_stage = stages.end_point(h, &mut self.workspace.point);
+        if let Some(time) = self.workspace.point.as_mut().last_mut() {
             *time = end;
         }
         if !on_stage {
-            self.settle(end)?;
+            self.make_consistent(end)?;
         }
-        if state.starting {
+        if state.is_starting {
             // How fast a short step converged says nothing of one that is much longer.
-            state.convergence.factor = Convergence::UNKNOWN;
+            state.newton.eta = NewtonMonitor::UNKNOWN_ETA;
         }
-        if state.last {
-            self.finish();
+        if state.is_last {
+            self.write_result();
             return Ok(true);
         }
-        self.measure();
-        state.advance(end, factor, state.convergence.rate <= THET);
+        self.update_scales();
+        state.advance(end, factor, state.newton.contraction_rate <= THET);
         Ok(false)
     }
 }

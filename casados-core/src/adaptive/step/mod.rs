@@ -1,16 +1,16 @@
 //! The steps of an interval.
 
 mod attempt;
-mod checked;
-mod cross;
+mod checks;
+mod crossing;
 mod start;
 mod state;
 
 use crate::adaptive::consistent::Consistent;
-use crate::adaptive::newton_monitor::{Failure, THET};
+use crate::adaptive::newton_monitor::{NewtonFailure, THET};
 use crate::adaptive::options::AdaptiveOptions;
-use crate::adaptive::order::{Family, Orders, interpolate};
-use crate::adaptive::point::At;
+use crate::adaptive::order::{Family, Orders, interpolate_step};
+use crate::adaptive::point::ModelPoint;
 use crate::adaptive::stages::{Stages, StepContext};
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::tape::Tape;
@@ -23,10 +23,10 @@ use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
-use state::{Need, StepState};
+use state::{MatrixUpdate, StepState};
 
 /// After so many singular matrices in a row the problem is.
-const SINGULAR: usize = 5;
+const MAX_SINGULAR_MATRICES: usize = 5;
 
 /// Memory of a run.
 #[derive(Zeroable)]
@@ -35,13 +35,13 @@ pub struct Workspace<M: Dae, T: Plain> {
     /// The variables at the time that was reached.
     pub point: ArrayV<M, T>,
     /// Those where the Jacobian is to be evaluated.
-    middle: ArrayV<M, T>,
+    midpoint: ArrayV<M, T>,
     pub jacobian: M::Jacobian<T>,
     pub f: ArrayK<M, T>,
     /// `(ẋ, z)` at the start.
     pub start: ArrayK<M, T>,
     /// Start values for them, as they were given.
-    pub given: ArrayK<M, T>,
+    pub start_guess: ArrayK<M, T>,
     pub tolerances: Tolerances<M, T>,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
@@ -50,19 +50,19 @@ pub struct Workspace<M: Dae, T: Plain> {
     pub magnitudes: ArrayW<M, T>,
     pub u: VectorU<M, T>,
     /// Whether the constant entries of the Jacobian are there.
-    pub(super) ready: bool,
+    pub(super) jacobian_constants_written: bool,
 }
 
 impl<M: Dae, T: Real> Workspace<M, T> {
     /// The step that is tried, from where the run is.
-    fn step(&self, state: &StepState<T>) -> StepContext<'_, M, T> {
+    fn step_context(&self, state: &StepState<T>) -> StepContext<'_, M, T> {
         let Self { point, tolerances, .. } = self;
         StepContext {
-            point,
-            scale: &tolerances.scale,
+            start_point: point,
+            estimator_scale: &tolerances.scale,
             user_ratio: &tolerances.user_ratio,
             tolerance_ratio: tolerances.tolerance_ratio,
-            known: state.accepted.is_some(),
+            derivatives_are_known: state.last_step_size.is_some(),
             h: state.h,
         }
     }
@@ -78,7 +78,7 @@ pub struct Span<T> {
 impl<T: Real> Span<T> {
     /// # Errors
     /// [`Error::OutsideInterval`] if another interval is asked for than this one.
-    pub fn check_is(&self, start: T, end: T) -> Result<(), Error> {
+    pub fn check_same(&self, start: T, end: T) -> Result<(), Error> {
         let other = if start == self.start { end } else { start };
         if start == self.start && end == self.end {
             return Ok(());
@@ -91,26 +91,27 @@ impl<T: Real> Span<T> {
 /// What a run works with.
 pub struct Run<'a, M: Dae, T: Real> {
     pub options: &'a AdaptiveOptions,
-    pub base: &'a mut Workspace<M, T>,
+    pub workspace: &'a mut Workspace<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     /// Whether steps are to be remembered.
-    pub record: bool,
+    pub record_steps: bool,
     /// Derivatives, if they take part.
     pub sensitivities: Option<&'a mut Variational<M, T>>,
     pub statistics: &'a mut AdaptiveStatistics,
 }
 
 /// What is called after each accepted step, with memory for dense output.
-pub type After<'a, M, T> = &'a mut dyn FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>;
+pub type After<'a, M, T> =
+    &'a mut dyn FnMut(&mut AcceptedStepOutput<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>;
 
 /// Dense output.
-type Evaluate<'a, M, T> = &'a mut dyn FnMut(T, &mut Dense<M, T>) -> Result<(), Error>;
+type EvaluateDense<'a, M, T> = &'a mut dyn FnMut(T, &mut Dense<M, T>) -> Result<(), Error>;
 
 /// An accepted step.
-pub struct Accepted<'a, M: Dae, T: Real> {
+pub struct AcceptedStepOutput<'a, M: Dae, T: Real> {
     /// The solution at a time inside it.
-    pub evaluate: Evaluate<'a, M, T>,
+    pub evaluate_dense: EvaluateDense<'a, M, T>,
     /// The time at its end.
     pub end: T,
     /// Set if the interval is to end with it.
@@ -124,20 +125,25 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// As [`Consistent::forward`].
     pub(super) fn begin_sensitivities(&mut self, x0: &VectorX<M, T>, t: T) -> Result<(), Error> {
         let Some(sensitivities) = &mut self.sensitivities else { return Ok(()) };
-        let Workspace { u, parameters, start, magnitudes, .. } = &*self.base;
-        sensitivities.begin(&At { x: x0, u, p: parameters, t }, start, magnitudes, self.consistent)
+        let Workspace { u, parameters, start, magnitudes, .. } = &*self.workspace;
+        sensitivities.begin_run(
+            &ModelPoint { x: x0, u, p: parameters, t },
+            start,
+            magnitudes,
+            self.consistent,
+        )
     }
 
     /// What is tolerated by a method with so many stages.
-    fn tighten<B: Family>(&mut self, stages: usize) {
-        self.base.tolerances.tighten(stages, B::ENDS_ON_STAGE);
-        self.measure();
+    fn set_estimator_tolerances<B: Family>(&mut self, stages: usize) {
+        self.workspace.tolerances.set_estimator_tolerances(stages, B::ENDS_ON_STAGE);
+        self.update_scales();
     }
 
     /// What is tolerated at the time that was reached.
-    fn measure(&mut self) {
-        let Workspace { tolerances, point, .. } = &mut *self.base;
-        tolerances.measure(&point.as_ref()[M::Shape::NX..]);
+    fn update_scales(&mut self) {
+        let Workspace { tolerances, point, .. } = &mut *self.workspace;
+        tolerances.update_scales(&point.as_ref()[M::Shape::NX..]);
     }
 
     /// Integrates the interval from `x0`; `after` is called after each accepted step.
@@ -151,53 +157,53 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         span: Span<T>,
         after: After<'_, M, T>,
     ) -> Result<(), Error> {
-        self.prepare(x0, span)?;
+        self.prepare_run(x0, span)?;
         self.begin_sensitivities(x0, span.start)?;
-        let stages = levels.get::<B>(0)?.count();
-        self.tighten::<B>(stages);
+        let stages = levels.get::<B>(0)?.stage_count();
+        self.set_estimator_tolerances::<B>(stages);
         let mut state = StepState::new(span, self.options.max_step);
-        let first = self.first_step(span, state.longest)?;
+        let first = self.initial_step_size(span, state.max_step)?;
         if span.end == span.start {
-            self.finish();
+            self.write_result();
             return Ok(());
         }
-        state.begin(first);
+        state.set_first_step(first);
         loop {
-            self.choose_stages::<B>(levels, &mut state)?;
-            let stages = levels.get::<B>(state.order.level)?;
-            if !self.factor::<B>(stages, &mut state)? {
+            self.choose_order::<B>(levels, &mut state)?;
+            let stages = levels.get::<B>(state.order.order_index)?;
+            if !self.prepare_factors::<B>(stages, &mut state)? {
                 continue;
             }
-            if state.tried >= self.options.max_steps {
+            if state.attempts >= self.options.max_steps {
                 return Err(Error::TooManySteps {
                     t: state.t.to_f64(),
-                    steps: state.tried,
+                    steps: state.attempts,
                     stiff: false,
                     rounding: None,
                 });
             }
-            self.check_step(state.t, state.h, state.refusal)?;
-            state.tried += 1;
-            let attempt = self.attempt(stages, &mut state);
-            if self.blames_pivots(stages, &mut state, &attempt) {
+            self.check_step_size(state.t, state.h, state.last_refusal)?;
+            state.attempts += 1;
+            let attempt = self.attempt_step(stages, &mut state);
+            if self.retry_with_pivoting(stages, &mut state, &attempt) {
                 continue;
             }
             match attempt {
                 Err(failure) => {
                     match failure {
-                        Failure::Rough(_) => self.statistics.rejected += 1,
+                        NewtonFailure::Discontinuity(_) => self.statistics.rejected += 1,
                         _ => self.statistics.failed += 1,
                     }
-                    state.fail(failure);
-                    self.cross(&mut state, span)?;
-                    self.check_convergence(levels.get::<B>(state.order.level)?, &state, span)?;
+                    state.reject_failed_iteration(failure);
+                    self.cross_switching_surface(&mut state, span)?;
+                    self.check_convergence(levels.get::<B>(state.order.order_index)?, &state, span)?;
                 }
                 Ok(error) => {
-                    let factor = state.factor(error, stages.count());
+                    let factor = state.step_size_factor(error, stages.stage_count());
                     if error >= 1.0 {
                         self.statistics.rejected += 1;
-                        state.refuse(factor);
-                    } else if self.accept(stages, &mut state, factor, &mut *after)? {
+                        state.reject_error(factor);
+                    } else if self.accept_step(stages, &mut state, factor, &mut *after)? {
                         return Ok(());
                     }
                 }

@@ -1,8 +1,8 @@
 //! Where a run begins: consistent states, and the length of the first step.
 
-use crate::adaptive::point::{At, place_inputs, variable};
+use crate::adaptive::point::{ModelPoint, variable_of_unknown, write_inputs};
 use crate::adaptive::step::{Run, Span, Workspace};
-use crate::adaptive::step_size::first_length;
+use crate::adaptive::step_size::first_step_size;
 use crate::adaptive::tolerances::norm;
 use crate::error::Error;
 use crate::model::{ArrayK, Dae, VectorX};
@@ -12,19 +12,27 @@ use bytemuck::Zeroable;
 
 /// The exponent of implicit methods, whatever their order: with that of the estimate errors of five
 /// Gauss stages do not follow tolerances.
-const EXPONENT: f64 = 0.25;
+const FIRST_STEP_EXPONENT: f64 = 0.25;
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Everything at the start of the interval.
-    pub(super) fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
-        let Workspace { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
+    pub(super) fn prepare_run(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
+        let Workspace {
+            start,
+            start_guess: given,
+            u,
+            parameters,
+            jacobian,
+            jacobian_constants_written: ready,
+            ..
+        } = &mut *self.workspace;
         if !*ready {
             M::jacobian_constants::<T>(jacobian);
             *ready = true;
         }
         *start = *given;
-        let at = At { x: x0, u, p: parameters, t: span.start };
-        match self.consistent.solve_from_afar(&at, start) {
+        let at = ModelPoint { x: x0, u, p: parameters, t: span.start };
+        match self.consistent.solve_with_diagnosis(&at, start) {
             Ok(points) => self.statistics.residuals += points,
             // Without algebraic states all equations may still be solvable: the matrix of ẋ has not
             // full rank.
@@ -34,42 +42,42 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             Err(error) => return Err(error),
         }
         let start = *start;
-        self.place(x0, &start, span.start);
+        self.write_start(x0, &start, span.start);
         Ok(())
     }
 
     /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
-    pub(super) fn settle(&mut self, t: T) -> Result<(), Error> {
+    pub(super) fn make_consistent(&mut self, t: T) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        let Workspace { point, u, parameters, .. } = &mut *self.base;
+        let Workspace { point, u, parameters, .. } = &mut *self.workspace;
         let mut x = VectorX::<M, T>::zeroed();
         let mut y = ArrayK::<M, T>::zeroed();
         for (index, y) in y.as_mut().iter_mut().enumerate() {
-            *y = point[variable::<M>(index)];
+            *y = point[variable_of_unknown::<M>(index)];
         }
         x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
-        match self.consistent.solve(&At { x: &x, u, p: parameters, t }, &mut y) {
+        match self.consistent.solve(&ModelPoint { x: &x, u, p: parameters, t }, &mut y) {
             Ok(points) => self.statistics.residuals += points,
             // As at the start.
             Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => return Ok(()),
             Err(error) => return Err(error),
         }
         for (index, y) in y.as_ref().iter().enumerate() {
-            point[variable::<M>(index)] = *y;
+            point[variable_of_unknown::<M>(index)] = *y;
         }
         Ok(())
     }
 
     /// The variables at the start, from `(ẋ, z)` there.
-    pub fn place(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
+    pub fn write_start(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
         let nx = M::Shape::NX;
-        let Workspace { point, u, parameters, result, .. } = &mut *self.base;
+        let Workspace { point, u, parameters, result, .. } = &mut *self.workspace;
         let numbers = point.as_mut();
         for (index, value) in start.as_ref().iter().enumerate() {
-            numbers[variable::<M>(index)] = *value;
+            numbers[variable_of_unknown::<M>(index)] = *value;
         }
         numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
-        place_inputs::<M, T>(numbers, u, parameters);
+        write_inputs::<M, T>(numbers, u, parameters);
         if let Some(time) = numbers.last_mut() {
             *time = t;
         }
@@ -77,27 +85,27 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// The solution at the end.
-    pub fn finish(&mut self) {
+    pub fn write_result(&mut self) {
         let nx = M::Shape::NX;
-        let Workspace { point, result, .. } = &mut *self.base;
+        let Workspace { point, result, .. } = &mut *self.workspace;
         let states = &point.as_ref()[nx..];
         result.x.as_mut_slice().copy_from_slice(&states[..nx]);
         result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
     }
 
     /// The length of the first step.
-    pub(super) fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
+    pub(super) fn initial_step_size(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
         if let Some(step) = self.options.initial_step {
             return Ok(step.min(longest));
         }
         let nx = M::Shape::NX;
-        let Workspace { point, tolerances, parameters, u, start, .. } = &mut *self.base;
+        let Workspace { point, tolerances, parameters, u, start, .. } = &mut *self.workspace;
         let states = &point.as_ref()[nx..2 * nx];
-        tolerances.measure_user(states);
+        tolerances.update_user_scales(states);
         let scale = &tolerances.scale.as_ref()[..nx];
         let xdot = &start.as_ref()[..nx];
         let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let length = first_length([size, slope], longest, EXPONENT, |step| {
+        let length = first_step_size([size, slope], longest, FIRST_STEP_EXPONENT, |step| {
             // A second point, if there is a consistent one.
             let h = T::from_f64(if span.end < span.start { -step } else { step });
             let mut x = VectorX::<M, T>::zeroed();
@@ -105,7 +113,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 *to = *x + h * *xdot;
             }
             let mut y = *start;
-            let at = At { x: &x, u, p: parameters, t: span.start + h };
+            let at = ModelPoint { x: &x, u, p: parameters, t: span.start + h };
             let solved = self.consistent.solve(&at, &mut y);
             self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
             if solved.is_err() {
@@ -116,7 +124,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             norm(&y.as_ref()[..nx], scale)
         });
-        self.measure();
+        self.update_scales();
         Ok(length)
     }
 }

@@ -9,7 +9,7 @@ use crate::batch::single::{self, gather};
 use crate::error::Error;
 use crate::irk::{
     self, AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess,
-    Linearization, StageEquations, Step, StepOf, Work, multiply,
+    Linearization, StageEquations, StageWorkspace, Step, StepIndex, gradient_product,
 };
 use crate::linalg::dispatch;
 use crate::memory::{Heap, Memory, WithForward, WithHessian, fallback::Pivoting};
@@ -22,31 +22,31 @@ use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 use core::slice::{from_mut, from_ref};
 
-type Place<V> = <Heap as Memory>::Nominal<V>;
-type Places<V> = <Heap as Memory>::Tape<V>;
+type CallStorage<V> = <Heap as Memory>::Nominal<V>;
+type TapeStorage<V> = <Heap as Memory>::Tape<V>;
 
 /// A group of intervals, and the memory that it needs.
 pub struct Group<M: Dae, E: Lanes, const S: usize> {
     options: Options,
     coefficients: Coefficients<E, S>,
     statistics: Statistics,
-    work: Place<Work<M, E, S>>,
-    steps: Places<Step<M, E, S>>,
+    work: CallStorage<StageWorkspace<M, E, S>>,
+    steps: TapeStorage<Step<M, E, S>>,
     /// Whether start values were given.
     given: bool,
     /// The warm start, or solutions.
-    record: Places<Step<M, E, S>>,
+    record: TapeStorage<Step<M, E, S>>,
     /// Whether all lanes have stages of earlier calls, and whether those are solutions.
     warm: bool,
     solved: bool,
-    lambda: Place<ArrayX<M, E>>,
+    lambda: CallStorage<ArrayX<M, E>>,
     /// Weights of the algebraic states at the start, and whether there are any.
-    nu: Place<VectorZ<M, E>>,
-    weighted: bool,
-    forward: Place<ForwardMemory<M, E, S>>,
-    adjoint: Place<AdjointMemory<M, E, S, 1>>,
-    hessian: Place<HessianMemory<M, E, S>>,
-    tape: Places<HessianStep<M, E, S>>,
+    nu: CallStorage<VectorZ<M, E>>,
+    has_nu: bool,
+    forward: CallStorage<ForwardMemory<M, E, S>>,
+    adjoint: CallStorage<AdjointMemory<M, E, S, 1>>,
+    hessian: CallStorage<HessianMemory<M, E, S>>,
+    tape: TapeStorage<HessianStep<M, E, S>>,
 }
 
 /// What a pass over the steps works in.
@@ -54,7 +54,7 @@ struct Pass<'a, M: Dae, E: Lanes, const S: usize> {
     options: &'a Options,
     coefficients: &'a Coefficients<E, S>,
     statistics: &'a mut Statistics,
-    work: &'a mut Work<M, E, S>,
+    work: &'a mut StageWorkspace<M, E, S>,
     steps: &'a mut [Step<M, E, S>],
     from: InitialGuess<'a, M, E, S>,
 }
@@ -83,25 +83,28 @@ macro_rules! pass {
 }
 impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
     fn differentiate(&mut self, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
-        let mut pass = pass!(self);
+        let mut step_pass = pass!(self);
         let ForwardMemory { result, pass: forward, .. } = <Heap>::forward(&mut self.forward)?;
-        let count = pass.steps.len();
-        let good = pass.run(&mut [], |pass, n, step, exact, _| {
+        let count = step_pass.steps.len();
+        let converged = step_pass.integrate(&mut [], |pass, n, step, exact, _| {
             pass.linearize(None, n, step, exact);
-            forward.advance(
+            forward.differentiate_step(
                 pass.work,
                 None,
                 pass.coefficients,
-                StepOf { n, count, distant: false },
+                StepIndex { n, count, prefetch_output: false },
                 None,
                 &mut result.forward,
             )
         });
-        let good = E::and(good, forward.end::<Pivoting>(&pass.work.result, &mut result.forward).is_finite());
+        let converged = E::and(
+            converged,
+            forward.finish_unchecked::<Pivoting>(&step_pass.work.result, &mut result.forward).is_finite(),
+        );
         if adjoint {
-            multiply(result, <Heap>::nominal(&mut self.lambda)?.as_ref());
+            gradient_product(result, <Heap>::nominal(&mut self.lambda)?.as_ref());
         }
-        Ok((good, result))
+        Ok((converged, result))
     }
 }
 
@@ -121,7 +124,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             solved: false,
             lambda: Default::default(),
             nu: Default::default(),
-            weighted: false,
+            has_nu: false,
             forward: Default::default(),
             adjoint: Default::default(),
             hessian: Default::default(),
@@ -129,7 +132,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         }
     }
 
-    fn place(
+    fn load_intervals(
         &mut self,
         intervals: &[&Interval<'_, M, T>],
         given: Option<[&[T]; 2]>,
@@ -138,7 +141,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     ) -> Result<(), Error> {
         let count = self.options.steps;
         let work = <Heap>::nominal(&mut self.work)?;
-        work.prepare();
+        work.write_constants();
         let time = &mut work.inputs.time;
         gather(intervals, work.x.as_mut(), |interval| interval.x0.as_slice());
         gather(intervals, work.inputs.u.as_mut_slice(), |interval| interval.u);
@@ -147,27 +150,28 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         gather(intervals, from_mut(&mut time.start), |interval| from_ref(&interval.t0));
         time.step = time.interval / E::from_f64(count as f64);
         self.given = given.is_some();
-        let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
+        let (xdot, z) = work.start_values.as_mut().split_at_mut(M::Shape::NX);
         for (given, to) in given.iter().flatten().zip([xdot, z]) {
             pack(&[*given; MOST_LANES], to);
         }
         gather(intervals, <Heap>::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
         // All of them have some, or none.
-        self.weighted = intervals.iter().all(|interval| !interval.nu.is_empty());
-        if self.weighted {
+        self.has_nu = intervals.iter().all(|interval| !interval.nu.is_empty());
+        if self.has_nu {
             gather(intervals, <Heap>::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
         }
         <Heap>::tape(&mut self.steps, count)?;
         (self.warm, self.solved) = (stages.is_some(), stages.is_some() && solved);
         let Some(stages) = stages else { return Ok(()) };
         for (n, step) in <Heap>::tape(&mut self.record, count)?.iter_mut().enumerate() {
-            let from = stages.map(|stages| stages.get(n).map_or(&[][..], |y| y.as_ref().as_flattened()));
-            pack(&from, step.y.as_mut().as_flattened_mut());
+            let initial_guess =
+                stages.map(|stages| stages.get(n).map_or(&[][..], |y| y.as_ref().as_flattened()));
+            pack(&initial_guess, step.y.as_mut().as_flattened_mut());
         }
         Ok(())
     }
 
-    fn stages(&mut self, lane: usize, stages: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
+    fn copy_stages(&mut self, lane: usize, stages: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
         for (y, step) in stages.iter_mut().zip(<Heap>::tape(&mut self.steps, self.options.steps)?) {
             let mut to: [&mut [T]; MOST_LANES] = Default::default();
             if let Some(to) = to.get_mut(lane) {
@@ -178,19 +182,19 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         Ok(())
     }
 
-    fn work(&self) -> Statistics {
+    fn statistics(&self) -> Statistics {
         self.statistics
     }
 
     fn solve(&mut self) -> Verdict<'_, E, Nominal<M, E>> {
-        let mut pass = pass!(self);
-        let good = pass.run(&mut [], |_, _, _, _, _| yes::<E>());
-        Ok((good, &pass.work.result))
+        let mut step_pass = pass!(self);
+        let converged = step_pass.integrate(&mut [], |_, _, _, _, _| yes::<E>());
+        Ok((converged, &step_pass.work.result))
     }
 
     fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
-        let (good, result) = self.differentiate(false)?;
-        Ok((good, &result.forward))
+        let (converged, result) = self.differentiate(false)?;
+        Ok((converged, &result.forward))
     }
 
     fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
@@ -198,78 +202,93 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     }
 
     fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
-        let mut pass = pass!(self);
+        let mut step_pass = pass!(self);
         let adjoint = <Heap>::nominal(&mut self.adjoint)?;
         let lambda = <Heap>::nominal(&mut self.lambda)?;
-        let count = pass.steps.len();
+        let count = step_pass.steps.len();
         // On the way forth only the last step is linearised: it is where the way back begins.
-        let mut good = pass.run(&mut [], |pass, n, step, exact, _| {
+        let mut converged = step_pass.integrate(&mut [], |pass, n, step, exact, _| {
             if n + 1 == count {
                 pass.linearize(None, n, step, exact);
             }
             yes::<E>()
         });
-        adjoint.backward.start(lambda.as_ref(), &[]);
-        let Pass { steps, coefficients, work, statistics, .. } = pass;
+        adjoint.backward.set_seeds(lambda.as_ref(), &[]);
+        let Pass { steps, coefficients, work, statistics, .. } = step_pass;
         for (n, step) in steps.iter().enumerate().rev() {
             if n + 1 < count {
                 work.linearize_planned(coefficients, None, n, step, false, statistics);
             }
-            good = E::and(good, adjoint.backward.stages(work, None, coefficients));
-            adjoint.backward.advance(&work.linear);
+            converged = E::and(converged, adjoint.backward.solve_and_verify(work, None, coefficients));
+            adjoint.backward.advance(&work.linearization);
         }
-        adjoint.collect(work);
-        Ok((good, &adjoint.result))
+        adjoint.write_result(work);
+        Ok((converged, &adjoint.result))
     }
 
     fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
-        let mut pass = pass!(self);
+        let mut step_pass = pass!(self);
         let forward = &mut <Heap>::forward(&mut self.forward)?.pass;
         let HessianMemory { result, pass: hessian } = <Heap>::hessian(&mut self.hessian)?;
         let lambda = <Heap>::nominal(&mut self.lambda)?;
-        let nu = if self.weighted { <Heap>::nominal(&mut self.nu)?.as_slice() } else { &[] };
-        let count = pass.steps.len();
+        let nu = if self.has_nu { <Heap>::nominal(&mut self.nu)?.as_slice() } else { &[] };
+        let count = step_pass.steps.len();
         let records = <Heap>::hessian_tape(&mut self.tape, count)?;
-        let mut good = pass.run(records, |pass, n, step, exact, record| {
+        let mut converged = step_pass.integrate(records, |pass, n, step, exact, record| {
             let Some(record) = record else { return yes::<E>() };
-            let at = StepOf { n, count, distant: false };
+            let at = StepIndex { n, count, prefetch_output: false };
             let last = at.is_last();
-            let (linear, _) = record.parts();
-            pass.linearize((HessianStep::<M, E, S>::DIRECT && !last).then_some(linear), n, step, exact);
+            let (linear, _) = record.linearization_and_rows();
+            pass.linearize(
+                (HessianStep::<M, E, S>::FACTORS_ON_TAPE && !last).then_some(linear),
+                n,
+                step,
+                exact,
+            );
             // That of the last step is still there on the way back.
-            if !(HessianStep::<M, E, S>::DIRECT || last) {
-                record.remember(pass.work);
+            if !(HessianStep::<M, E, S>::FACTORS_ON_TAPE || last) {
+                record.store_linearization(pass.work);
             }
-            let (linear, curved) = record.parts();
-            let kept = (!last).then_some(&*linear);
+            let (linear, curved) = record.linearization_and_rows();
+            let stored_linearization = (!last).then_some(&*linear);
             let to = &mut result.first.forward;
-            forward.advance(pass.work, kept, pass.coefficients, at, Some(curved), to)
+            forward.differentiate_step(
+                pass.work,
+                stored_linearization,
+                pass.coefficients,
+                at,
+                Some(curved),
+                to,
+            )
         });
-        let finite = forward.end::<Pivoting>(&pass.work.result, &mut result.first.forward);
-        let Pass { steps, coefficients, work, .. } = pass;
-        hessian.begin(lambda.as_ref(), nu);
+        let finite = forward.finish_unchecked::<Pivoting>(&step_pass.work.result, &mut result.first.forward);
+        let Pass { steps, coefficients, work, .. } = step_pass;
+        hessian.set_seeds(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            let kept = record.kept(n + 1 == count);
+            let stored_linearization = record.stored_linearization(n + 1 == count);
             if n == 0 {
-                hessian.backward.weigh(coefficients);
+                hessian.backward.add_z0_weights(coefficients);
             }
-            good = E::and(good, hessian.backward.stages(work, kept, coefficients));
-            hessian.backward.advance(work.linear(kept));
-            hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(work, kept, coefficients, record, [n, count], &[]);
+            converged = E::and(
+                converged,
+                hessian.backward.solve_and_verify(work, stored_linearization, coefficients),
+            );
+            hessian.backward.advance(work.linearization(stored_linearization));
+            hessian.evaluate_hessian_entries(work, coefficients, n, step);
+            hessian.subtract_congruence(work, stored_linearization, coefficients, record, [n, count], &[]);
         }
-        let finite = hessian.collect::<Pivoting>(None, result) + finite;
-        Ok((E::and(good, finite.is_finite()), result))
+        let finite = hessian.write_result::<Pivoting>(None, result) + finite;
+        Ok((E::and(converged, finite.is_finite()), result))
     }
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
     /// The steps of the interval, with `after` called after each, with what is remembered of it, if
     /// anything is; whether all went well, lane by lane.
-    fn run(
+    fn integrate(
         &mut self,
         records: &mut [HessianStep<M, E, S>],
-        mut after: impl FnMut(
+        mut after_step: impl FnMut(
             &mut Pass<'_, M, E, S>,
             usize,
             &Step<M, E, S>,
@@ -277,36 +296,41 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             Option<&mut HessianStep<M, E, S>>,
         ) -> E::Mask,
     ) -> E::Mask {
-        self.work.begin();
-        let (mut good, count) = (yes::<E>(), self.steps.len());
+        self.work.begin_call();
+        let (mut converged, count) = (yes::<E>(), self.steps.len());
         for n in 0..count {
             let Self { options, coefficients, statistics, work, steps, from } = self;
-            let (done, rest) = steps.split_at_mut(n);
-            let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
+            let (earlier_steps, rest) = steps.split_at_mut(n);
+            let (previous_step, Some(step)) = (earlier_steps.last(), rest.first_mut()) else { break };
             step.x = work.x;
-            work.start(coefficients, from, n, before, &mut step.y);
+            work.set_initial_guess(coefficients, from, n, previous_step, &mut step.y);
             let Step { x, y } = &mut *step;
-            let (remembered, record) = records.split_at_mut_checked(n).unwrap_or_default();
-            let kept = if HessianStep::<M, E, S>::DIRECT { remembered.last() } else { None };
-            let kept = kept.and_then(|record| record.kept(false));
-            let equations = StageEquations { coefficients, kept, n, x };
-            let mut exact = false;
+            let (earlier_records, record) = records.split_at_mut_checked(n).unwrap_or_default();
+            let stored_linearization =
+                if HessianStep::<M, E, S>::FACTORS_ON_TAPE { earlier_records.last() } else { None };
+            let stored_linearization =
+                stored_linearization.and_then(|record| record.stored_linearization(false));
+            let equations = StageEquations { coefficients, stored_linearization, n, x };
+            let mut factors_at_solution = false;
             if !matches!(from, InitialGuess::Solution(_)) {
-                let mut solved = work.newton(equations, options, y, statistics);
-                if solved.stale {
-                    work.start(coefficients, from, n, before, y);
-                    solved = work.newton(equations, options, y, statistics);
+                let mut newton_result = work.newton(equations, options, y, statistics);
+                if newton_result.needs_restart {
+                    work.set_initial_guess(coefficients, from, n, previous_step, y);
+                    newton_result = work.newton(equations, options, y, statistics);
                 }
-                good = E::and(good, solved.converged);
-                exact = solved.exact;
+                converged = E::and(converged, newton_result.converged);
+                factors_at_solution = newton_result.factors_at_solution;
             }
             work.advance(coefficients, options.compensated, step, n, count);
-            let mut pass =
+            let mut step_pass =
                 Pass { options, coefficients, statistics, work, steps: &mut [], from: InitialGuess::Zero };
-            good = E::and(good, after(&mut pass, n, step, exact, record.first_mut()));
+            converged = E::and(
+                converged,
+                after_step(&mut step_pass, n, step, factors_at_solution, record.first_mut()),
+            );
             self.statistics.steps += 1;
         }
-        good
+        converged
     }
 
     fn linearize(
@@ -314,8 +338,8 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         to: Option<&mut Linearization<M, E, S>>,
         n: usize,
         step: &Step<M, E, S>,
-        exact: bool,
+        factors_at_solution: bool,
     ) {
-        self.work.linearize_planned(self.coefficients, to, n, step, exact, self.statistics);
+        self.work.linearize_planned(self.coefficients, to, n, step, factors_at_solution, self.statistics);
     }
 }

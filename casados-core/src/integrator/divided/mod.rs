@@ -7,12 +7,12 @@
 //! V_{k+1} = A V_k + (0, B)        λ_k = Aᵀ λ_{k+1}        d²(λᵀx_N)/dw² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ x_{k+1}) D_k
 //! ```
 
-mod calls;
+mod integrator_trait;
 
 use super::chain_rule::{
-    FullHessian, StateSensitivities, chain_states, identity, write_algebraic, write_states,
+    FullHessian, StateSensitivities, chain_states, set_identity, write_algebraic, write_states,
 };
-use super::{Integrator, U, X};
+use super::{ControlOf, Integrator, StateOf};
 use crate::error::{Argument, Error};
 use crate::finite::check_input;
 use crate::memory::{Family, Memory, WithForward};
@@ -91,7 +91,7 @@ impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
 struct HessianMemory<M: Dae, T: Real, const N: usize> {
     result: Hessian<M, T>,
     /// `V` at the start of each part.
-    history: [StateSensitivities<M, T>; N],
+    start_sensitivities: [StateSensitivities<M, T>; N],
     /// `∇²(λᵀx)` of a part times `D`, and the sum of all parts.
     product: FullHessian<M, T>,
     sum: FullHessian<M, T>,
@@ -138,15 +138,15 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     /// The solution, with the states where parts start.
     fn solve_parts(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: I::Number,
-        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
+        integrand: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
     ) -> Result<(), Error> {
         let (mut x, mut z0) = (*x0, None);
         for k in 0..N {
             let length = self.begin_part(k, h)?;
-            let mut chained = chain(along, None, false);
+            let mut chained = chained_integrand(integrand, None, false);
             let part = self.integrator.solve_with_quadrature(&x, u, length, as_dyn_integrand(&mut chained));
             let part = part.copied();
             self.add_part_statistics();
@@ -163,34 +163,34 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
     /// The solution and its derivatives, with what `keep` wants to know where parts start.
     fn differentiate_parts(
         &mut self,
-        x0: &X<Self>,
-        u: &U<Self>,
+        x0: &StateOf<Self>,
+        u: &ControlOf<Self>,
         h: I::Number,
-        second: bool,
-        along: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
-        mut keep: impl FnMut(&mut Self, usize, &X<Self>) -> Result<(), Error>,
+        with_hessian: bool,
+        integrand: &mut OptionalIntegrand<'_, '_, I::Model, I::Number>,
+        mut on_part_start: impl FnMut(&mut Self, usize, &StateOf<Self>) -> Result<(), Error>,
     ) -> Result<(), Error>
     where
         I::Memory: WithForward,
     {
         let mut x = *x0;
         let ForwardMemory { v: [now, _], .. } = I::Memory::forward(&mut self.forward)?;
-        identity::<I::Model, _>(now);
+        set_identity::<I::Model, _>(now);
         for k in 0..N {
-            keep(self, k, &x)?;
+            on_part_start(self, k, &x)?;
             let length = self.begin_part(k, h)?;
             let Self { integrator, forward, .. } = self;
             let ForwardMemory { result, v: [now, next] } = I::Memory::forward(forward)?;
-            let mut chained = chain(along, (k > 0).then_some(&*now), second);
+            let mut chained = chained_integrand(integrand, (k > 0).then_some(&*now), with_hessian);
             let part = integrator.forward_with_quadrature(&x, u, length, as_dyn_integrand(&mut chained));
             let part = part.map(|part| {
                 chain_states(part, now, next);
                 if k == 0 {
                     result.clone_from(part);
                 } else {
-                    let first = (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp);
+                    let start_results = (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp);
                     result.nominal = part.nominal;
-                    (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp) = first;
+                    (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp) = start_results;
                 }
                 if k + 1 == N {
                     write_states(next, result);
@@ -207,12 +207,12 @@ impl<I: Integrator, const N: usize> Divided<I, N> {
 }
 
 /// The integrand of a part.
-fn chain<'a, M: Dae, T: Real>(
-    along: &'a mut OptionalIntegrand<'_, '_, M, T>,
+fn chained_integrand<'a, M: Dae, T: Real>(
+    integrand: &'a mut OptionalIntegrand<'_, '_, M, T>,
     v: Option<&'a StateSensitivities<M, T>>,
-    second: bool,
+    with_hessian: bool,
 ) -> Option<ChainRuleIntegrand<'a, M, T>> {
-    along.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, second })
+    integrand.as_mut().map(|inner| ChainRuleIntegrand { inner: &mut **inner, v, with_hessian })
 }
 
 fn as_dyn_integrand<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(

@@ -1,28 +1,28 @@
 //! Forward sensitivities where the whole matrix was pivoted.
 
-use super::sweep::Sweep;
+use super::sweep::ForwardSweep;
 use crate::irk::directions::{Directions, panel_mut, panels};
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
     /// Solves by the factors of the whole matrix, column by column.
     pub(super) fn solve_columns<D: Directions<E>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
+        work: &mut StageWorkspace<M, E, S, F>,
         directions: D,
     ) {
-        let Work { increment, linear, .. } = work;
+        let StageWorkspace { increment, linearization: linear, .. } = work;
         let dy = R::flat_mut(self.dy_mut());
         panels!([D::COLUMNS, directions.columns()], E, S, column, W => {
             let rows = panel_mut::<E, W>(dy, column, M::Shape::NK * S);
             for c in 0..W {
-                take(rows, c, increment.as_mut().as_flattened_mut().as_flattened_mut());
+                read_column(rows, c, increment.as_mut().as_flattened_mut().as_flattened_mut());
                 linear.factors.solve(increment);
-                put(increment.as_ref().as_flattened().as_flattened(), rows, c);
+                write_column(increment.as_ref().as_flattened().as_flattened(), rows, c);
             }
         });
     }
@@ -32,7 +32,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
 
 /// A column of a panel.
 #[inline(never)]
-fn take<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
+fn read_column<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
     for (to, row) in to.iter_mut().zip(rows) {
         if let Some(element) = row.get(column) {
             *to = *element;
@@ -42,7 +42,7 @@ fn take<E: Copy, const W: usize>(rows: &[[E; W]], column: usize, to: &mut [E]) {
 
 /// The same back into the panel.
 #[inline(never)]
-pub(super) fn put<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
+pub(super) fn write_column<E: Copy, const W: usize>(from: &[E], rows: &mut [[E; W]], column: usize) {
     for (from, row) in from.iter().zip(rows) {
         if let Some(element) = row.get_mut(column) {
             *element = *from;

@@ -1,12 +1,12 @@
 //! Forward sensitivities in given directions.
 
-use super::matrices::Single;
-use super::sweep::{Linearized, Outputs, Sweep};
+use super::matrices::SingleMatrix;
+use super::sweep::{ForwardSweep, LinearizedStep, StepOutputs};
 use crate::error::Error;
 use crate::finite::check_output;
-use crate::irk::directions::Seeded;
-use crate::irk::driver::Parts;
-use crate::irk::workspace::Work;
+use crate::irk::directions::SeedDirections;
+use crate::irk::driver::CallContext;
+use crate::irk::workspace::StageWorkspace;
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayW, Dae};
 use crate::result::{Directional, Seeds};
@@ -20,7 +20,7 @@ use core::marker::PhantomData;
 #[zeroable(bound = "")]
 pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) result: Directional<M, T, C>,
-    sweep: Sweep<M, T, [T; C], S>,
+    sweep: ForwardSweep<M, T, [T; C], S>,
     /// The seeds, one row for each element of `w`.
     seeds: ArrayW<M, [T; C]>,
 }
@@ -32,7 +32,7 @@ impl<M: Dae, T: Real, const S: usize> Family for Directionals<M, T, S> {
 }
 
 impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S, C> {
-    pub(crate) fn seed(&mut self, seeds: &Seeds<M, T, C>) {
+    pub(crate) fn set_seeds(&mut self, seeds: &Seeds<M, T, C>) {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         for (w, row) in self.seeds.as_mut().iter_mut().enumerate() {
             *row = core::array::from_fn(|column| {
@@ -53,44 +53,55 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     /// [`Error::Singular`]
     pub(crate) fn step<F: Fallback>(
         &mut self,
-        parts: &mut Parts<'_, M, T, S, F>,
+        context: &mut CallContext<'_, M, T, S, F>,
         n: usize,
         count: usize,
     ) -> Result<(), Error> {
-        let Parts { work, coefficients, statistics, .. } = parts;
+        let CallContext { workspace: work, coefficients, statistics, .. } = context;
         let Self { result, sweep, seeds } = self;
-        let of = Linearized { kept: None, coefficients, directions: Seeded(seeds.as_ref()), first: n == 0 };
+        let linearized = LinearizedStep {
+            stored_linearization: None,
+            coefficients,
+            directions: SeedDirections(seeds.as_ref()),
+            is_first: n == 0,
+        };
         if n == 0 {
-            sweep.start(of.directions);
+            sweep.set_initial_directions(linearized.directions);
         }
         let nx = M::Shape::NX;
-        let end = (n + 1 == count).then(|| Single { matrix: result.dx.as_mut_slice(), rows: nx });
-        let outputs = &mut Outputs { curved: None, end, distant: false };
-        if !sweep.step(work, of, outputs) && work.linear.factors.is_planned() {
+        let result_output =
+            (n + 1 == count).then(|| SingleMatrix { matrix: result.dx.as_mut_slice(), rows: nx });
+        let outputs =
+            &mut StepOutputs { stage_sensitivities: None, result: result_output, prefetch_output: false };
+        if !sweep.step(work, linearized, outputs) && work.linearization.factors.is_from_plan() {
             work.factor_dense(coefficients, n, 0, statistics)?;
-            sweep.repeat(work, of, outputs);
+            sweep.repeat_step(work, linearized, outputs);
         }
         let nz = M::Shape::NZ;
         if n == 0 {
-            let to = &mut Single { matrix: result.dz0.as_mut_slice(), rows: nz };
-            sweep.write_algebraic((F::plan::<M>(), of.directions), &coefficients.start, to);
+            let to = &mut SingleMatrix { matrix: result.dz0.as_mut_slice(), rows: nz };
+            sweep.write_algebraic((F::plan::<M>(), linearized.directions), &coefficients.lagrange_start, to);
         }
         if n + 1 == count {
-            let to = &mut Single { matrix: result.dz.as_mut_slice(), rows: nz };
-            sweep.write_algebraic((F::plan::<M>(), of.directions), &coefficients.end, to);
+            let to = &mut SingleMatrix { matrix: result.dz.as_mut_slice(), rows: nz };
+            sweep.write_algebraic((F::plan::<M>(), linearized.directions), &coefficients.lagrange_end, to);
         }
         Ok(())
     }
 
     /// The derivatives of the stages of the last step, directions innermost.
     #[cfg(feature = "alloc")]
-    pub(crate) fn stages(&self) -> &[T] {
+    pub(crate) fn stage_derivatives(&self) -> &[T] {
         self.sweep.dy()
     }
 
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {
+    pub(crate) fn finish<F: Fallback>(
+        &mut self,
+        work: &StageWorkspace<M, T, S, F>,
+        step: usize,
+    ) -> Result<(), Error> {
         self.result.nominal = work.result;
         check_output(self.result.dx.as_slice(), step)?;
         check_output(self.result.dz.as_slice(), step)?;

@@ -9,7 +9,7 @@ use crate::scalar::{Lanes, Real};
 use crate::shape::Matrix;
 
 /// `∇(λᵀx)` from the derivatives of `x`.
-pub(crate) fn multiply<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lambda: &[E]) {
+pub(crate) fn gradient_product<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lambda: &[E]) {
     let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = result;
     for (matrix, gradient) in [
         (forward.dx_dx0.as_slice(), grad_x0.as_mut_slice()),
@@ -24,11 +24,11 @@ pub(crate) fn multiply<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lamb
 ///
 /// # Errors
 /// [`Error::Overflow`]
-pub(crate) fn gradient<M: Dae, T: Real>(
+pub(crate) fn checked_gradient<M: Dae, T: Real>(
     result: &mut ForwardAdjoint<M, T>,
     lambda: &[T],
 ) -> Result<(), Error> {
-    multiply(result, lambda);
+    gradient_product(result, lambda);
     check_gradient(result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice())
 }
 

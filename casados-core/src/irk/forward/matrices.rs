@@ -1,6 +1,6 @@
 //! The matrices that derivatives are written to.
 
-use super::output::Target;
+use super::output::DerivativeOutput;
 use crate::model::NO_COLUMN;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
@@ -8,13 +8,13 @@ use crate::shape::Matrix;
 use core::mem::take;
 
 /// Three matrices of derivatives with respect to `x₀`, `u` and `p`, column after column.
-pub(super) struct Split<'a, M, T> {
+pub(super) struct DerivativeMatrices<'a, M, T> {
     plan: M,
     matrices: [&'a mut [T]; 3],
     rows: usize,
 }
 
-impl<'a, M: Plan, T: Lanes> Split<'a, M, T> {
+impl<'a, M: Plan, T: Lanes> DerivativeMatrices<'a, M, T> {
     pub fn new<X: Matrix<T>>(
         plan: M,
         x: &'a mut X,
@@ -27,7 +27,7 @@ impl<'a, M: Plan, T: Lanes> Split<'a, M, T> {
 
     /// To which matrix `dw_index` belongs, and its column there.
     #[inline(always)]
-    fn place(plan: M, index: usize) -> (usize, usize) {
+    fn locate_direction(plan: M, index: usize) -> (usize, usize) {
         let (nx, nu) = (plan.nx(), plan.nu());
         if index < nx {
             (0, index)
@@ -39,10 +39,10 @@ impl<'a, M: Plan, T: Lanes> Split<'a, M, T> {
     }
 
     /// The columns of `dx₊` in directions that have no influence.
-    pub fn fill_others(&mut self) {
+    pub fn fill_inactive_columns(&mut self) {
         for (index, &column) in self.plan.structure().column_of_direction.iter().enumerate() {
             if column == NO_COLUMN {
-                let ((part, column), rows) = (Self::place(self.plan, index), self.rows);
+                let ((part, column), rows) = (Self::locate_direction(self.plan, index), self.rows);
                 let matrix = self.matrices.get_mut(part);
                 let column = matrix.and_then(|matrix| matrix.get_mut(column * rows..(column + 1) * rows));
                 let column = column.unwrap_or_default();
@@ -55,16 +55,16 @@ impl<'a, M: Plan, T: Lanes> Split<'a, M, T> {
     }
 }
 
-impl<M: Plan, T: Lanes> Target<T> for Split<'_, M, T> {
+impl<M: Plan, T: Lanes> DerivativeOutput<T> for DerivativeMatrices<'_, M, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+    fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
         // What is behind the last column of each: directions ascend.
         let [x, u, p] = &mut self.matrices;
         let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
         let directions = self.plan.structure().directions.get(column..).unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
-            let (part, own) = Self::place(self.plan, direction as usize);
+            let (part, own) = Self::locate_direction(self.plan, direction as usize);
             let Some((next, rest)) = rest.get_mut(part) else { continue };
             let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
             (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
@@ -74,9 +74,9 @@ impl<M: Plan, T: Lanes> Target<T> for Split<'_, M, T> {
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn following<const W: usize>(&self, column: usize) -> &[T] {
+    fn next_columns<const W: usize>(&self, column: usize) -> &[T] {
         let Some(&first) = self.plan.structure().directions.get(column + W) else { return &[] };
-        let (part, own) = Self::place(self.plan, first as usize);
+        let (part, own) = Self::locate_direction(self.plan, first as usize);
         let from = self.matrices.get(part).and_then(|matrix| matrix.get(own * self.rows..));
         let from = from.unwrap_or_default();
         from.get(..W * self.rows).unwrap_or(from)
@@ -84,14 +84,14 @@ impl<M: Plan, T: Lanes> Target<T> for Split<'_, M, T> {
 }
 
 /// One matrix, column after column.
-pub(super) struct Single<'a, T> {
+pub(super) struct SingleMatrix<'a, T> {
     pub matrix: &'a mut [T],
     pub rows: usize,
 }
 
-impl<T: Lanes> Target<T> for Single<'_, T> {
+impl<T: Lanes> DerivativeOutput<T> for SingleMatrix<'_, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+    fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
         let matrix = self.matrix.get_mut(column * self.rows..).unwrap_or_default();
         // A model without states has no columns to go through.

@@ -1,12 +1,12 @@
 //! The forward pass in all directions `w = (x₀, u, p)` side by side, and its memory.
 
-use super::matrices::Split;
-use super::sweep::{Linearized, Outputs, Sweep};
+use super::matrices::DerivativeMatrices;
+use super::sweep::{ForwardSweep, LinearizedStep, StepOutputs};
 use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{ArrayC, Identity, IdentityOf};
-use crate::irk::driver::Parts;
-use crate::irk::workspace::{Linearization, Work};
+use crate::irk::directions::{ArrayC, IdentityDirections, IdentityDirectionsOf};
+use crate::irk::driver::CallContext;
+use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::result::{DenseForward, Forward, ForwardAdjoint, Nominal};
@@ -27,71 +27,72 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
-    pub(crate) sweep: Sweep<M, T, ArrayC<M, T>, S>,
+    pub(crate) sweep: ForwardSweep<M, T, ArrayC<M, T>, S>,
     /// Zero if all derivatives of `z` are finite, else NaN.
-    finite: [T; 1],
+    finite_indicator: [T; 1],
 }
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
     /// A step that is linearised, by the factors that were `kept` or are there, as
     /// [`ForwardPass::step`]; whether the derivatives satisfy their equations.
-    pub(crate) fn advance<F: Fallback>(
+    pub(crate) fn differentiate_step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
+        work: &mut StageWorkspace<M, E, S, F>,
+        stored_linearization: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
-        at: StepOf,
-        curved: Option<&mut [E]>,
+        at: StepIndex,
+        stage_sensitivities: Option<&mut [E]>,
         to: &mut Forward<M, E>,
     ) -> E::Mask {
-        let of = at.linearized(kept, coefficients);
+        let linearized = at.linearized(stored_linearization, coefficients);
         if at.n == 0 {
-            self.sweep.start(of.directions);
+            self.sweep.set_initial_directions(linearized.directions);
         }
-        let good = self.sweep.step(work, of, &mut at.outputs::<M, _, F>(curved, to));
-        self.collect::<F>(coefficients, at, to);
-        good
+        let valid = self.sweep.step(work, linearized, &mut at.outputs::<M, _, F>(stage_sensitivities, to));
+        self.write_algebraic_outputs::<F>(coefficients, at, to);
+        valid
     }
 
     /// What a step contributes to derivatives of `z`.
-    fn collect<F: Fallback>(
+    fn write_algebraic_outputs<F: Fallback>(
         &mut self,
         coefficients: &Coefficients<E, S>,
-        at: StepOf,
+        at: StepIndex,
         to: &mut Forward<M, E>,
     ) {
-        let Self { sweep, finite: [finite] } = self;
-        let (plan, all) = (F::plan::<M>(), Identity::of::<M, E, F>());
+        let Self { sweep, finite_indicator: [finite] } = self;
+        let (plan, directions) = (F::plan::<M>(), IdentityDirections::for_model::<M, E, F>());
         if at.n == 0 {
-            let to = &mut Split::new(plan, &mut to.dz0_dx0, &mut to.dz0_du, &mut to.dz0_dp);
-            *finite = sweep.write_algebraic((plan, all), &coefficients.start, to);
+            let to = &mut DerivativeMatrices::new(plan, &mut to.dz0_dx0, &mut to.dz0_du, &mut to.dz0_dp);
+            *finite = sweep.write_algebraic((plan, directions), &coefficients.lagrange_start, to);
         }
         if at.is_last() {
-            let to = &mut Split::new(plan, &mut to.dz_dx0, &mut to.dz_du, &mut to.dz_dp);
-            *finite = *finite + sweep.write_algebraic((plan, all), &coefficients.end, to);
+            let to = &mut DerivativeMatrices::new(plan, &mut to.dz_dx0, &mut to.dz_du, &mut to.dz_dp);
+            *finite = *finite + sweep.write_algebraic((plan, directions), &coefficients.lagrange_end, to);
         }
     }
 
     /// What is left to be written after the last step. Zero if all derivatives are finite, else
     /// NaN.
-    pub(crate) fn end<F: Fallback>(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
+    pub(crate) fn finish_unchecked<F: Fallback>(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
         to.nominal = *nominal;
-        Split::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp).fill_others();
-        let ([of_x], [of_z]) = (self.sweep.finite, self.finite);
+        DerivativeMatrices::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp)
+            .fill_inactive_columns();
+        let ([of_x], [of_z]) = (self.sweep.finite_indicator, self.finite_indicator);
         of_x + of_z
     }
 }
 
 /// Which step of how many.
 #[derive(Clone, Copy)]
-pub(crate) struct StepOf {
+pub(crate) struct StepIndex {
     pub n: usize,
     pub count: usize,
     /// Whether the result may be in no cache.
-    pub distant: bool,
+    pub prefetch_output: bool,
 }
 
-impl StepOf {
+impl StepIndex {
     pub(crate) fn is_last(self) -> bool {
         self.n + 1 == self.count
     }
@@ -99,21 +100,27 @@ impl StepOf {
     /// The step, which goes through in all directions.
     fn linearized<'a, M: Dae, E: Lanes, const S: usize, F: Fallback>(
         self,
-        kept: Option<&'a Linearization<M, E, S, F>>,
+        stored_linearization: Option<&'a Linearization<M, E, S, F>>,
         coefficients: &'a Coefficients<E, S>,
-    ) -> Linearized<'a, M, E, IdentityOf<M, F>, S, F> {
-        Linearized { kept, coefficients, directions: Identity::of::<M, E, F>(), first: self.n == 0 }
+    ) -> LinearizedStep<'a, M, E, IdentityDirectionsOf<M, F>, S, F> {
+        LinearizedStep {
+            stored_linearization,
+            coefficients,
+            directions: IdentityDirections::for_model::<M, E, F>(),
+            is_first: self.n == 0,
+        }
     }
 
     /// What the step writes.
     fn outputs<'a, M: Dae, E: Lanes, F: Fallback>(
         self,
-        curved: Option<&'a mut [E]>,
+        stage_sensitivities: Option<&'a mut [E]>,
         to: &'a mut Forward<M, E>,
-    ) -> Outputs<'a, E, Split<'a, F::Plan<M>, E>> {
-        let end =
-            self.is_last().then(|| Split::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp));
-        Outputs { curved, end, distant: self.distant }
+    ) -> StepOutputs<'a, E, DerivativeMatrices<'a, F::Plan<M>, E>> {
+        let end = self
+            .is_last()
+            .then(|| DerivativeMatrices::new(F::plan::<M>(), &mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp));
+        StepOutputs { stage_sensitivities, result: end, prefetch_output: self.prefetch_output }
     }
 }
 
@@ -125,25 +132,26 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
     /// [`Error::Singular`]
     pub(crate) fn step<F: Fallback, const REFINED: bool>(
         &mut self,
-        parts: &mut Parts<'_, M, T, S, F>,
-        at: StepOf,
-        mut curved: Option<&mut [T]>,
+        context: &mut CallContext<'_, M, T, S, F>,
+        at: StepIndex,
+        mut stage_sensitivities: Option<&mut [T]>,
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
-        let Parts { work, coefficients, statistics, .. } = parts;
-        let good = self.advance(work, None, coefficients, at, curved.as_deref_mut(), to);
-        if good && !REFINED {
+        let CallContext { workspace: work, coefficients, statistics, .. } = context;
+        let valid =
+            self.differentiate_step(work, None, coefficients, at, stage_sensitivities.as_deref_mut(), to);
+        if valid && !REFINED {
             return Ok(());
         }
-        let of = at.linearized(None, coefficients);
-        if !good && work.linear.factors.is_planned() {
+        let linearized = at.linearized(None, coefficients);
+        if !valid && work.linearization.factors.is_from_plan() {
             work.factor_dense(coefficients, at.n, 0, statistics)?;
-            self.sweep.repeat(work, of, &mut at.outputs::<M, _, F>(curved, to));
+            self.sweep.repeat_step(work, linearized, &mut at.outputs::<M, _, F>(stage_sensitivities, to));
         }
         if const { REFINED } {
-            self.sweep.refine(work, of, &mut at.outputs::<M, _, F>(None, to));
+            self.sweep.refine(work, linearized, &mut at.outputs::<M, _, F>(None, to));
         }
-        self.collect::<F>(coefficients, at, to);
+        self.write_algebraic_outputs::<F>(coefficients, at, to);
         Ok(())
     }
 
@@ -158,7 +166,11 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
         // Only where one is not finite it is looked for.
-        if self.end::<F>(nominal, to).is_finite() { Ok(()) } else { crate::finite::check_forward(to, step) }
+        if self.finish_unchecked::<F>(nominal, to).is_finite() {
+            Ok(())
+        } else {
+            crate::finite::check_forward(to, step)
+        }
     }
 }
 
@@ -166,11 +178,11 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     /// Derivatives at a point of the last step.
     pub(crate) fn interpolate<F: Fallback>(&mut self, weights: &[T; S], lagrange: &[T; S]) {
         let Self { dense, pass: ForwardPass { sweep, .. }, .. } = self;
-        let (plan, all) = (F::plan::<M>(), Identity::of::<M, T, F>());
-        let to = &mut Split::new(plan, &mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
-        to.fill_others();
-        sweep.write_differential((plan, all), weights, to);
-        let to = &mut Split::new(plan, &mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
-        sweep.write_algebraic((plan, all), lagrange, to);
+        let (plan, directions) = (F::plan::<M>(), IdentityDirections::for_model::<M, T, F>());
+        let to = &mut DerivativeMatrices::new(plan, &mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
+        to.fill_inactive_columns();
+        sweep.write_differential((plan, directions), weights, to);
+        let to = &mut DerivativeMatrices::new(plan, &mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
+        sweep.write_algebraic((plan, directions), lagrange, to);
     }
 }

@@ -22,6 +22,6 @@ mod refine;
 pub(super) mod right_hand_side;
 #[cfg(feature = "alloc")]
 mod slopes;
-pub(super) mod stage_rows;
+pub(super) mod stage_sensitivities;
 pub(super) mod sweep;
-mod write;
+mod write_outputs;

@@ -5,21 +5,21 @@ use crate::scalar::Lanes;
 use core::ops::Range;
 
 /// Where derivatives are written.
-pub(crate) trait Target<E> {
+pub(crate) trait DerivativeOutput<E> {
     /// The columns of a matrix that belong to columns of the panels, from this one on.
-    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [E]; W];
+    fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [E]; W];
     /// Where the columns behind these are, if it is known.
-    fn following<const W: usize>(&self, _column: usize) -> &[E] {
+    fn next_columns<const W: usize>(&self, _column: usize) -> &[E] {
         &[]
     }
 }
 
 /// `V + Σ_i weight_i dy_i` of a panel.
-pub(in crate::irk) struct Columns<'a, E, const S: usize, const W: usize> {
+pub(in crate::irk) struct PanelCombination<'a, E, const S: usize, const W: usize> {
     /// What is added to. Nothing stands for zero, or for the unit matrix.
-    pub start: Option<&'a [[E; W]]>,
+    pub base: Option<&'a [[E; W]]>,
     /// In which row each column of the unit matrix has its one; empty without one.
-    pub ones: &'a [u32],
+    pub unit_rows: &'a [u32],
     /// The derivatives of the stages.
     pub dy: &'a [PanelRow<E, S, W>],
     /// The unknown of each row.
@@ -29,21 +29,27 @@ pub(in crate::irk) struct Columns<'a, E, const S: usize, const W: usize> {
 }
 
 /// So many rows are computed before they are written, each number to its column.
-const ROWS: usize = 4;
+const ROWS_PER_BLOCK: usize = 4;
 
-impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
+impl<E: Lanes, const S: usize, const W: usize> PanelCombination<'_, E, S, W> {
     /// Writes its columns; their sum, which is finite only if all of them are.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn write<A: Arithmetic>(&self, to: &mut [&mut [E]; W]) -> E {
         let mut sums = [E::from_f64(0.0); W];
-        let (blocks, rest) = self.dy.get(self.unknowns.clone()).unwrap_or_default().as_chunks::<ROWS>();
+        let (blocks, rest) =
+            self.dy.get(self.unknowns.clone()).unwrap_or_default().as_chunks::<ROWS_PER_BLOCK>();
         for (n, dy) in blocks.iter().enumerate() {
-            self.rows::<A, ROWS>(n * ROWS, dy, to, &mut sums);
+            self.write_rows::<A, ROWS_PER_BLOCK>(n * ROWS_PER_BLOCK, dy, to, &mut sums);
         }
         for (n, dy) in rest.iter().enumerate() {
-            self.rows::<A, 1>(blocks.len() * ROWS + n, core::array::from_ref(dy), to, &mut sums);
+            self.write_rows::<A, 1>(
+                blocks.len() * ROWS_PER_BLOCK + n,
+                core::array::from_ref(dy),
+                to,
+                &mut sums,
+            );
         }
-        for (to, &row) in to.iter_mut().zip(self.ones) {
+        for (to, &row) in to.iter_mut().zip(self.unit_rows) {
             if let Some(one) = to.get_mut(row as usize) {
                 *one = *one + E::from_f64(1.0);
             }
@@ -57,14 +63,14 @@ impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
 
     /// Some rows.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn rows<A: Arithmetic, const R: usize>(
+    fn write_rows<A: Arithmetic, const R: usize>(
         &self,
         begin: usize,
         dy: &[PanelRow<E, S, W>; R],
         to: &mut [&mut [E]; W],
         sums: &mut [E; W],
     ) {
-        let v = self.start.and_then(|v| v.get(begin..)?.first_chunk::<R>());
+        let v = self.base.and_then(|v| v.get(begin..)?.first_chunk::<R>());
         let mut rows = v.copied().unwrap_or([[E::from_f64(0.0); W]; R]);
         for (row, dk) in rows.iter_mut().zip(dy) {
             for (&weight, dk) in self.minus_weights.iter().zip(dk) {
@@ -75,22 +81,23 @@ impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
             }
         }
         // Of numbers that are not registers themselves four by four are exchanged in registers.
-        let squares = if const { size_of::<E>() <= 8 && R == ROWS } { W / ROWS } else { 0 };
-        for square in 0..squares {
-            let mut numbers = [[E::from_f64(0.0); ROWS]; ROWS];
+        let square_blocks =
+            if const { size_of::<E>() <= 8 && R == ROWS_PER_BLOCK } { W / ROWS_PER_BLOCK } else { 0 };
+        for square in 0..square_blocks {
+            let mut numbers = [[E::from_f64(0.0); ROWS_PER_BLOCK]; ROWS_PER_BLOCK];
             for (to, row) in numbers.iter_mut().zip(&rows) {
-                if let Some(row) = row.as_chunks::<ROWS>().0.get(square) {
+                if let Some(row) = row.as_chunks::<ROWS_PER_BLOCK>().0.get(square) {
                     *to = *row;
                 }
             }
             let numbers = A::transposed(&numbers);
-            for (to, numbers) in to.iter_mut().skip(square * ROWS).zip(&numbers) {
-                if let Some(to) = to.get_mut(begin..begin + ROWS) {
+            for (to, numbers) in to.iter_mut().skip(square * ROWS_PER_BLOCK).zip(&numbers) {
+                if let Some(to) = to.get_mut(begin..begin + ROWS_PER_BLOCK) {
                     to.copy_from_slice(numbers);
                 }
             }
         }
-        for (c, to) in to.iter_mut().enumerate().skip(squares * ROWS) {
+        for (c, to) in to.iter_mut().enumerate().skip(square_blocks * ROWS_PER_BLOCK) {
             if let Some(to) = to.get_mut(begin..begin + R) {
                 for (to, row) in to.iter_mut().zip(&rows) {
                     *to = row[c];

@@ -13,13 +13,13 @@
 //! is computed by tangents, and corrected with the factors that are there (iterative refinement; C.
 //! B. Moler, J. ACM 14, 1967). One sum of all directions tells whether that is worth it.
 
-use super::checksum::total;
-use super::dense_fallback::put;
-use super::output::Target;
-use super::sweep::{Linearized, Outputs, Sweep};
+use super::checksum::sum_accumulators;
+use super::dense_fallback::write_column;
+use super::output::DerivativeOutput;
+use super::sweep::{ForwardSweep, LinearizedStep, StepOutputs};
 use crate::irk::coefficients::{Coefficients, stage_values};
 use crate::irk::directions::{Directions, panel, panel_mut, panels};
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::linalg::{Arithmetic, Kernel, PanelRow, dispatch, minus_ha, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
@@ -29,33 +29,33 @@ use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
 /// A correction below this many ε of its unknown is none.
-const ROUNDING: f64 = 4096.0;
+const CORRECTION_TOLERANCE: f64 = 4096.0;
 
 /// So often derivatives are refined.
-const REFINEMENTS: usize = 3;
+const MAX_REFINEMENTS: usize = 3;
 
-impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
+impl<M: Dae, T: Real, R: Array<T>, const S: usize> ForwardSweep<M, T, R, S> {
     /// After a step whose derivatives satisfy their equations as the Jacobian has them: mends them,
     /// and what follows from them, where those of the model are others.
-    pub(in crate::irk) fn refine<D: Directions<T>, G: Target<T>, F: Fallback>(
+    pub(in crate::irk) fn refine<D: Directions<T>, G: DerivativeOutput<T>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
-        of: Linearized<'_, M, T, D, S, F>,
-        outputs: &mut Outputs<'_, T, G>,
+        work: &mut StageWorkspace<M, T, S, F>,
+        linearized: LinearizedStep<'_, M, T, D, S, F>,
+        outputs: &mut StepOutputs<'_, T, G>,
     ) {
-        let Linearized { coefficients, directions, .. } = of;
-        let mut last = f64::INFINITY;
-        for _ in 0..REFINEMENTS {
-            let correction = self.correction(work, coefficients);
+        let LinearizedStep { coefficients, directions, .. } = linearized;
+        let mut last_correction = f64::INFINITY;
+        for _ in 0..MAX_REFINEMENTS {
+            let correction = self.largest_correction(work, coefficients);
             // Also if it is not a number: then there is nothing to be refined with.
-            if !(correction > ROUNDING * T::EPSILON && correction < 0.5 * last) {
+            if !(correction > CORRECTION_TOLERANCE * T::EPSILON && correction < 0.5 * last_correction) {
                 return;
             }
-            last = correction;
+            last_correction = correction;
             self.refine_columns(work, coefficients, directions);
-            self.conclude(work, of, outputs);
+            self.update_outputs(work, linearized, outputs);
             // Each correction is that part of the one before.
-            if correction * correction <= ROUNDING * T::EPSILON {
+            if correction * correction <= CORRECTION_TOLERANCE * T::EPSILON {
                 return;
             }
             work.verify_forward(self, coefficients, directions, false);
@@ -64,10 +64,14 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// The largest correction of the sum of all directions, relative to each unknown; of a slope
     /// also to what it changes, `V_n / h`. The sum is where it was tried on the equations.
-    fn correction<F: Fallback>(&self, work: &mut Work<M, T, S, F>, coefficients: &Coefficients<T, S>) -> f64 {
+    fn largest_correction<F: Fallback>(
+        &self,
+        work: &mut StageWorkspace<M, T, S, F>,
+        coefficients: &Coefficients<T, S>,
+    ) -> f64 {
         let (nx, h) = (M::Shape::NX, work.inputs.time.step);
-        work.probe_tangent();
-        let Work { probe: [sum, tangent], increment, linear, .. } = work;
+        work.evaluate_tangent();
+        let StageWorkspace { variable_scratch: [sum, tangent], increment, linearization: linear, .. } = work;
         for (equation, tangent) in tangent.as_ref().iter().enumerate().take(M::Shape::NK) {
             if let Some(to) = increment.as_mut().get_mut(slot::<M>(equation)) {
                 *to = tangent.map(|element| [element]);
@@ -76,9 +80,10 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         linear.solve((coefficients, h), increment);
         let mut largest = 0.0f64;
         for (unknown, correction) in increment.as_ref().iter().enumerate() {
-            let own = if unknown < nx { unknown } else { unknown + nx };
-            let start = self.start_sums.as_ref().get(unknown).map_or(T::ZERO, |sum| total(sum) / h).abs();
-            let size = sum.as_ref().get(own).into_iter().flatten();
+            let variable = if unknown < nx { unknown } else { unknown + nx };
+            let start =
+                self.start_sums.as_ref().get(unknown).map_or(T::ZERO, |sum| sum_accumulators(sum) / h).abs();
+            let size = sum.as_ref().get(variable).into_iter().flatten();
             let size = size.fold(start.max(T::from_f64(T::SMALLEST)), |size, sum| sum.abs().max(size));
             for [correction] in correction {
                 let relative = (correction.abs() / size).to_f64();
@@ -94,7 +99,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// One correction of every direction.
     fn refine_columns<D: Directions<T>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
+        work: &mut StageWorkspace<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         directions: D,
     ) {
@@ -102,60 +107,60 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         panels!([D::COLUMNS, directions.columns()], T, S, column, W => {
             let mut right = ArrayK::<M, PanelRow<T, S, W>>::zeroed();
             for c in 0..W {
-                let inputs = work.probe[0].as_mut().get_mut(nx + nk..).unwrap_or_default();
+                let inputs = work.variable_scratch[0].as_mut().get_mut(nx + nk..).unwrap_or_default();
                 for (index, input) in inputs.iter_mut().enumerate() {
                     let mut row = [T::ZERO; 1];
-                    directions.add(nx + index, T::ONE, column + c, &mut row);
+                    directions.add_scaled(nx + index, T::ONE, column + c, &mut row);
                     *input = [row[0]; S];
                 }
-                dispatch(Aim::<M, T, S, W> {
+                dispatch(ColumnDirection::<M, T, S, W> {
                     v: panel(self.v(), column, nx),
                     dy: panel(self.dy(), column, nk * S).as_chunks().0,
                     a: &coefficients.a,
                     h: work.inputs.time.step,
-                    c,
-                    probe: work.probe[0].as_mut(),
+                    panel_column: column,
+                    direction: work.variable_scratch[0].as_mut(),
                     model: PhantomData,
                 });
-                work.probe_tangent();
-                for (equation, tangent) in work.probe[1].as_ref().iter().enumerate().take(nk) {
+                work.evaluate_tangent();
+                for (equation, tangent) in work.variable_scratch[1].as_ref().iter().enumerate().take(nk) {
                     if let Some(rows) = right.as_mut().get_mut(slot::<M>(equation)) {
-                        put(tangent, rows, c);
+                        write_column(tangent, rows, c);
                     }
                 }
             }
-            work.linear.solve::<W>((coefficients, work.inputs.time.step), &mut right);
+            work.linearization.solve::<W>((coefficients, work.inputs.time.step), &mut right);
             let dy = panel_mut::<T, W>(R::flat_mut(self.dy_mut()), column, nk * S);
-            correct(dy.as_flattened_mut(), right.as_ref().as_flattened().as_flattened());
+            subtract_corrections(dy.as_flattened_mut(), right.as_ref().as_flattened().as_flattened());
         });
     }
 }
 
 /// `x ← x − Δ`. Seldom needed: a loop of its own is not unrolled.
 #[cfg_attr(feature = "std", inline(never))]
-fn correct<T: Real>(x: &mut [T], corrections: &[T]) {
+fn subtract_corrections<T: Real>(x: &mut [T], corrections: &[T]) {
     for (x, correction) in x.iter_mut().zip(corrections) {
         *x = *x - *correction;
     }
 }
 
 /// The direction of one column, `(dk, V_n + h Σ_j a_j dk_j, dz)` at all stages.
-struct Aim<'a, M, T, const S: usize, const W: usize> {
+struct ColumnDirection<'a, M, T, const S: usize, const W: usize> {
     v: &'a [[T; W]],
     dy: &'a [PanelRow<T, S, W>],
     a: &'a [[T; S]; S],
     h: T,
-    c: usize,
-    probe: &'a mut [[T; S]],
+    panel_column: usize,
+    direction: &'a mut [[T; S]],
     model: PhantomData<M>,
 }
 
-impl<M: Dae, T: Real, const S: usize, const W: usize> Kernel for Aim<'_, M, T, S, W> {
+impl<M: Dae, T: Real, const S: usize, const W: usize> Kernel for ColumnDirection<'_, M, T, S, W> {
     type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { v, dy, a, h, c, probe, .. } = self;
+        let Self { v, dy, a, h, panel_column: c, direction: probe, .. } = self;
         if c >= W || probe.len() < M::Shape::NX + dy.len() {
             return;
         }
@@ -171,16 +176,16 @@ impl<M: Dae, T: Real, const S: usize, const W: usize> Kernel for Aim<'_, M, T, S
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// The tangent of the residual at all stages in the direction of the probe, beside it.
-    fn probe_tangent(&mut self) {
-        let Self { points, probe: [directions, tangent], .. } = self;
+    fn evaluate_tangent(&mut self) {
+        let Self { points, variable_scratch: [directions, tangent], .. } = self;
         // There are no derivatives by the time.
         if let Some(time) = directions.as_mut().last_mut() {
             *time = [T::ZERO; S];
         }
-        if let Err(call) = T::side_by_side(AtStages::<M, T, S> { points, directions, tangent }) {
-            let AtStages { points, directions, tangent } = call;
+        if let Err(call) = T::side_by_side(StageTangents::<M, T, S> { points, directions, tangent }) {
+            let StageTangents { points, directions, tangent } = call;
             for i in 0..S {
                 let v = ArrayV::<M, Tangent<T>>::from_fn(|variable| Tangent {
                     value: points[variable][i],
@@ -197,29 +202,29 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 }
 
 /// Tangents at all stages in one call.
-struct AtStages<'a, M: Dae, E: Lanes, const S: usize> {
+struct StageTangents<'a, M: Dae, E: Lanes, const S: usize> {
     points: &'a ArrayV<M, [E; S]>,
     directions: &'a ArrayV<M, [E; S]>,
     tangent: &'a mut ArrayV<M, [E; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for AtStages<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for StageTangents<'_, M, E, S> {
     #[inline(always)]
     fn call<R: Lanes<Cell = [E; S]>>(self) {
-        R::vectorize(InRegisters::<M, E, R, S> { stages: self, register: PhantomData });
+        R::vectorize(RegisterTangents::<M, E, R, S> { stages: self, register: PhantomData });
     }
 }
 
 /// The same, compiled for the register.
-struct InRegisters<'a, M: Dae, E: Lanes, R, const S: usize> {
-    stages: AtStages<'a, M, E, S>,
+struct RegisterTangents<'a, M: Dae, E: Lanes, R, const S: usize> {
+    stages: StageTangents<'a, M, E, S>,
     register: PhantomData<R>,
 }
 
-impl<M: Dae, E: Lanes, R: Lanes<Cell = [E; S]>, const S: usize> Piece for InRegisters<'_, M, E, R, S> {
+impl<M: Dae, E: Lanes, R: Lanes<Cell = [E; S]>, const S: usize> Piece for RegisterTangents<'_, M, E, R, S> {
     #[inline(always)]
     fn run(self) {
-        let AtStages { points, directions, tangent } = self.stages;
+        let StageTangents { points, directions, tangent } = self.stages;
         let v = ArrayV::<M, Tangent<R>>::from_fn(|variable| Tangent {
             value: R::load(&points[variable]),
             derivative: R::load(&directions[variable]),

@@ -6,10 +6,10 @@
 //! ```
 
 use crate::irk::directions::{Directions, panel_of};
-use crate::irk::kinematic::{KinematicPanel, dependence, minus_c};
-use crate::linalg::{Arithmetic, AtRow, PanelRow, each_row, is_short};
+use crate::irk::kinematic::{KinematicPanel, dependent_entry, minus_c};
+use crate::linalg::{Arithmetic, PanelRow, RowVisitor, for_each_row, is_unrolled};
 use crate::model::Dependent;
-use crate::plan::{Plan, Table};
+use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, each};
 
 /// Right-hand sides where every direction is an element of `w` and `V_n` the unit matrix: entries
@@ -25,31 +25,31 @@ pub(in crate::irk) struct Scatter<'a, M, E, D, const S: usize> {
 impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
     /// Places all of them.
     #[inline(always)]
-    pub fn all<A: Arithmetic>(&mut self) {
-        each_row::<A, _>(self);
-        each_row::<A, _>(&mut ScatterDependents(self));
+    pub fn evaluate<A: Arithmetic>(&mut self) {
+        for_each_row::<A, _>(self);
+        for_each_row::<A, _>(&mut ScatterDependents(self));
     }
 
     /// Subtracts from one column of an equation.
     #[inline(always)]
-    fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
+    fn subtract_column(&mut self, slot: usize, column: usize, values: &[E; S]) {
         let nk = self.plan.nk();
         let (begin, width) = panel_of::<E>(true, column, self.directions.columns(), S);
-        let place = begin * nk * S + (column - begin);
+        let offset = begin * nk * S + (column - begin);
         each!(i < S => {
-            if let Some(to) = self.dy.get_mut(place + (slot * S + i) * width) {
+            if let Some(to) = self.dy.get_mut(offset + (slot * S + i) * width) {
                 *to = *to - values[i];
             }
         });
     }
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor for Scatter<'_, M, E, D, S> {
     /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: Option<usize> = Table::Entries(1, 5).known::<M>();
+    const ROWS: Option<usize> = StructureTable::Entries(1, 5).known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Entries(1, 5).of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Entries(1, 5).row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
@@ -58,9 +58,9 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, 
         let Some((r, c, values)) = plan.entry(self.jacobian, first + row) else { return };
         let slot = plan.slot(r);
         if plan.kinematic(slot).is_none()
-            && let Some(column) = direction::<M, E, D>(plan, self.directions, c)
+            && let Some(column) = direction_column::<M, E, D>(plan, self.directions, c)
         {
-            self.subtract(slot, column, values);
+            self.subtract_column(slot, column, values);
         }
     }
 }
@@ -68,20 +68,24 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, 
 /// The entries by which other equations depend on kinematic states.
 struct ScatterDependents<'a, 'b, M, E, D, const S: usize>(&'a mut Scatter<'b, M, E, D, S>);
 
-impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDependents<'_, '_, M, E, D, S> {
-    const ROWS: Option<usize> = Table::Dependents.known::<M>();
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> RowVisitor
+    for ScatterDependents<'_, '_, M, E, D, S>
+{
+    const ROWS: Option<usize> = StructureTable::Dependents.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Dependents.of(self.0.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Dependents.row_count(self.0.plan.structure())
     }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Scatter { plan, jacobian, nodes, directions, .. } = &*self.0;
         let Some(dependent) = plan.structure().elimination.dependents.get(row) else { return };
-        let Some((slot, velocity, products)) = through(*plan, jacobian, nodes, dependent) else { return };
-        if let Some(column) = direction::<M, E, D>(*plan, *directions, velocity) {
-            self.0.subtract(slot, column, &products);
+        let Some((slot, velocity, products)) = eliminated_entry(*plan, jacobian, nodes, dependent) else {
+            return;
+        };
+        if let Some(column) = direction_column::<M, E, D>(*plan, *directions, velocity) {
+            self.0.subtract_column(slot, column, &products);
         }
     }
 }
@@ -89,15 +93,15 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize> AtRow for ScatterDepen
 /// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`,
 /// with its slot and the variable.
 #[inline(always)]
-fn through<M: Plan, E: Lanes, const S: usize>(
+fn eliminated_entry<M: Plan, E: Lanes, const S: usize>(
     plan: M,
     jacobian: &[[E; S]],
     nodes: &[E; S],
-    of: &Dependent,
+    dependent: &Dependent,
 ) -> Option<(usize, usize, [E; S])> {
-    let kinematic = plan.kinematic(of.state as usize)?;
+    let kinematic = plan.kinematic(dependent.state as usize)?;
     let minus_c = minus_c(kinematic, jacobian)?;
-    let (slot, &(mut products), derivative) = dependence(plan, of, jacobian)?;
+    let (slot, &(mut products), derivative) = dependent_entry(plan, dependent, jacobian)?;
     each!(i < S => {
         let factor = if derivative { minus_c } else { nodes[i] * minus_c };
         products[i] = -(products[i] * factor);
@@ -107,13 +111,13 @@ fn through<M: Plan, E: Lanes, const S: usize>(
 
 /// An entry of the Jacobian, by columns.
 #[inline(always)]
-fn by_column<M: Plan, V>(plan: M, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
+fn entry_by_column<M: Plan, V>(plan: M, jacobian: &[V], index: usize) -> Option<(usize, usize, &V)> {
     plan.entry(jacobian, *plan.structure().by_column.get(index)? as usize)
 }
 
 /// Entries of the Jacobian that are in their panels.
 #[derive(Clone, Copy, Default)]
-pub(in crate::irk) struct Placed {
+pub(in crate::irk) struct ScatterProgress {
     /// Column by column.
     entries: usize,
     /// Those by which equations depend on kinematic states.
@@ -123,11 +127,11 @@ pub(in crate::irk) struct Placed {
 /// The same of a panel that begins with a column: entries column by column, those that follow the
 /// ones of the panel before.
 #[inline(always)]
-pub(in crate::irk) fn place<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
+pub(in crate::irk) fn scatter_panel<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     (plan, directions): (M, D),
     jacobian: &[[E; S]],
     nodes: &[E; S],
-    placed: &mut Placed,
+    progress: &mut ScatterProgress,
     dy: &mut [PanelRow<E, S, W>],
     begin: usize,
 ) {
@@ -136,19 +140,19 @@ pub(in crate::irk) fn place<M: Plan, E: Lanes, D: Directions<E>, const S: usize,
             *panel_row = [[E::from_f64(0.0); W]; S];
         }
     }
-    while let Some(dependent) = plan.structure().elimination.dependents.get(placed.dependents) {
-        if let Some((slot, velocity, products)) = through(plan, jacobian, nodes, dependent)
-            && let Some(column) = direction::<M, E, D>(plan, directions, velocity)
+    while let Some(dependent) = plan.structure().elimination.dependents.get(progress.dependents) {
+        if let Some((slot, velocity, products)) = eliminated_entry(plan, jacobian, nodes, dependent)
+            && let Some(column) = direction_column::<M, E, D>(plan, directions, velocity)
         {
             if column >= begin + W {
                 break;
             }
             subtract_at(dy, slot, column.wrapping_sub(begin), &products);
         }
-        placed.dependents += 1;
+        progress.dependents += 1;
     }
-    while let Some((r, c, values)) = by_column(plan, jacobian, placed.entries) {
-        if let Some(column) = direction::<M, E, D>(plan, directions, c) {
+    while let Some((r, c, values)) = entry_by_column(plan, jacobian, progress.entries) {
+        if let Some(column) = direction_column::<M, E, D>(plan, directions, c) {
             if column >= begin + W {
                 break;
             }
@@ -156,7 +160,7 @@ pub(in crate::irk) fn place<M: Plan, E: Lanes, D: Directions<E>, const S: usize,
                 subtract_at(dy, plan.slot(r), column - begin, values);
             }
         }
-        placed.entries += 1;
+        progress.entries += 1;
     }
 }
 
@@ -178,7 +182,7 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
 
 /// The direction that a variable other than `ẋ` is, if it is one.
 #[inline(always)]
-fn direction<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variable: usize) -> Option<usize> {
+fn direction_column<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variable: usize) -> Option<usize> {
     let (nx, nz) = (plan.nx(), plan.nz());
     if variable >= 2 * nx && variable < 2 * nx + nz {
         return None;
@@ -187,35 +191,37 @@ fn direction<M: Plan, E, D: Directions<E>>(plan: M, directions: D, variable: usi
 }
 
 /// The same of a panel, whatever `V_n` is.
-pub(in crate::irk) struct Later<'a, M, E, D, const S: usize, const W: usize> {
+pub(in crate::irk) struct PanelRightHandSide<'a, M, E, D, const S: usize, const W: usize> {
     pub kinematic: KinematicPanel<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
     pub dy: &'a mut [PanelRow<E, S, W>],
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize>
+    PanelRightHandSide<'_, M, E, D, S, W>
+{
     /// Whether an unrolled loop begins with zeros everywhere: of plain numbers that is less than a
     /// row that begins with its first entry.
-    const AT_ONCE: bool = size_of::<E>() <= 8;
+    const CLEARS_FIRST: bool = size_of::<E>() <= 8;
 
     #[inline(always)]
-    pub fn all<A: Arithmetic>(mut self) {
-        if const { Self::AT_ONCE && is_short::<A, Self>() } {
+    pub fn evaluate<A: Arithmetic>(mut self) {
+        if const { Self::CLEARS_FIRST && is_unrolled::<A, Self>() } {
             self.dy.fill([[E::from_f64(0.0); W]; S]);
         }
         let plan = self.kinematic.plan;
-        self.kinematic.place::<A>(self.nodes, self.dy);
-        if const { is_short::<A, Self>() } {
-            each_row::<A, _>(&mut self);
-            if const { !Self::AT_ONCE } {
-                self.clear(const { Self::after_all() }, plan.nk());
+        self.kinematic.write_states::<A>(self.nodes, self.dy);
+        if const { is_unrolled::<A, Self>() } {
+            for_each_row::<A, _>(&mut self);
+            if const { !Self::CLEARS_FIRST } {
+                self.clear_rows(const { Self::equation_after_last() }, plan.nk());
             }
         } else {
             self.row_by_row::<A>();
         }
-        self.kinematic.subtract_derivatives::<A>(self.dy);
+        self.kinematic.subtract_derivative_terms::<A>(self.dy);
         let KinematicPanel { jacobian, directions, column, .. } = self.kinematic;
-        each_row::<A, _>(&mut Inputs { plan, jacobian, directions, dy: &mut *self.dy, column });
+        for_each_row::<A, _>(&mut InputEntries { plan, jacobian, directions, dy: &mut *self.dy, column });
     }
 
     /// Each row in registers, and written once; zeros where equations have no states.
@@ -226,19 +232,24 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<
         for index in blocks[1]..blocks[2] {
             let Some((r, c, values)) = plan.entry(self.kinematic.jacobian, index) else { return };
             if last != r {
-                self.put(last, &panel_row);
-                self.clear(last + 1, r);
+                self.write_row(last, &panel_row);
+                self.clear_rows(last + 1, r);
                 (panel_row, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            self.subtract::<A>(&mut panel_row, c - plan.nx(), values);
+            self.subtract_state::<A>(&mut panel_row, c - plan.nx(), values);
         }
-        self.put(last, &panel_row);
-        self.clear(last + 1, plan.nk());
+        self.write_row(last, &panel_row);
+        self.clear_rows(last + 1, plan.nk());
     }
 
     /// `panel_row − f_x,i V`, of one state.
     #[inline(always)]
-    fn subtract<A: Arithmetic>(&self, panel_row: &mut PanelRow<E, S, W>, state: usize, values: &[E; S]) {
+    fn subtract_state<A: Arithmetic>(
+        &self,
+        panel_row: &mut PanelRow<E, S, W>,
+        state: usize,
+        values: &[E; S],
+    ) {
         if self.kinematic.plan.kinematic(state).is_some() {
             let Some(x) = self.dy.get(state) else { return };
             each!(i < S => { A::subtract_row(&mut panel_row[i], values[i], &x[i]); });
@@ -250,7 +261,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<
 
     /// The equation that follows that of the entry before this one.
     #[inline(always)]
-    fn after(&self, row: usize) -> usize {
+    fn next_equation(&self, row: usize) -> usize {
         let structure = self.kinematic.plan.structure();
         match structure.jacobian.rows.get((structure.blocks[1] + row).wrapping_sub(1)) {
             Some(&equation) if row > 0 => equation as usize + 1,
@@ -259,15 +270,15 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<
     }
 
     /// The equation that follows that of the last entry, where kernels are compiled for one model.
-    const fn after_all() -> usize {
-        let Some(structure) = M::KNOWN else { return 0 };
+    const fn equation_after_last() -> usize {
+        let Some(structure) = M::KNOWN_STRUCTURE else { return 0 };
         let [_, begin, end, ..] = structure.blocks;
         if begin == end { 0 } else { structure.jacobian.at(end - 1).0 + 1 }
     }
 
     /// The row of an equation.
     #[inline(always)]
-    fn put(&mut self, equation: usize, panel_row: &PanelRow<E, S, W>) {
+    fn write_row(&mut self, equation: usize, panel_row: &PanelRow<E, S, W>) {
         let slot = self.kinematic.plan.slot(equation);
         if self.kinematic.plan.kinematic(slot).is_some() {
             return;
@@ -279,18 +290,20 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<
 
     /// Equations without states.
     #[inline(always)]
-    fn clear(&mut self, begin: usize, end: usize) {
+    fn clear_rows(&mut self, begin: usize, end: usize) {
         for equation in begin..end {
-            self.put(equation, &[[E::from_f64(0.0); W]; S]);
+            self.write_row(equation, &[[E::from_f64(0.0); W]; S]);
         }
     }
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Later<'_, M, E, D, S, W> {
-    const ROWS: Option<usize> = Table::Entries(1, 2).known::<M>();
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVisitor
+    for PanelRightHandSide<'_, M, E, D, S, W>
+{
+    const ROWS: Option<usize> = StructureTable::Entries(1, 2).known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Entries(1, 2).of(self.kinematic.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Entries(1, 2).row_count(self.kinematic.plan.structure())
     }
     const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
     #[inline(always)]
@@ -298,18 +311,18 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow 
         let (plan, first) = (self.kinematic.plan, self.kinematic.plan.structure().blocks[1]);
         let Some((r, c, values)) = plan.entry(self.kinematic.jacobian, first + row) else { return };
         let slot = plan.slot(r);
-        let next = self.after(row);
+        let next = self.next_equation(row);
         // The first entry of an equation has nothing to add to.
         let mut panel_row = [[E::from_f64(0.0); W]; S];
-        if Self::AT_ONCE || r < next {
+        if Self::CLEARS_FIRST || r < next {
             panel_row = *self.dy.get(slot).unwrap_or(&panel_row);
         } else {
-            self.clear(next, r);
+            self.clear_rows(next, r);
         }
         if plan.kinematic(slot).is_some() {
             return;
         }
-        self.subtract::<A>(&mut panel_row, c - plan.nx(), values);
+        self.subtract_state::<A>(&mut panel_row, c - plan.nx(), values);
         if let Some(to) = self.dy.get_mut(slot) {
             *to = panel_row;
         }
@@ -317,7 +330,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow 
 }
 
 /// `−f_w,i` of a panel, of controls and parameters.
-struct Inputs<'a, M, E, D, const S: usize, const W: usize> {
+struct InputEntries<'a, M, E, D, const S: usize, const W: usize> {
     plan: M,
     jacobian: &'a [[E; S]],
     directions: D,
@@ -325,13 +338,13 @@ struct Inputs<'a, M, E, D, const S: usize, const W: usize> {
     column: usize,
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow
-    for Inputs<'_, M, E, D, S, W>
+impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> RowVisitor
+    for InputEntries<'_, M, E, D, S, W>
 {
-    const ROWS: Option<usize> = Table::Entries(3, 5).known::<M>();
+    const ROWS: Option<usize> = StructureTable::Entries(3, 5).known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Entries(3, 5).of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Entries(3, 5).row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 4 + 2 * S;
     #[inline(always)]
@@ -341,7 +354,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow
         let slot = plan.slot(r);
         let (None, Some(panel_row)) = (plan.kinematic(slot), self.dy.get_mut(slot)) else { return };
         for (row, &value) in panel_row.iter_mut().zip(values) {
-            self.directions.add(c - shift, -value, self.column, row);
+            self.directions.add_scaled(c - shift, -value, self.column, row);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The derivatives of slopes, for steps of variable size.
 
 use super::memory::ForwardPass;
-use super::output::Target;
-use crate::irk::directions::Identity;
+use super::output::DerivativeOutput;
+use crate::irk::directions::IdentityDirections;
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayW, ArrayX, Dae};
 use crate::scalar::Real;
@@ -11,30 +11,30 @@ use core::mem::take;
 
 impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
     /// The derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
-    pub(crate) fn slopes(&self, weights: &[T; S], to: &mut ArrayW<M, ArrayX<M, T>>) {
+    pub(crate) fn slope_derivatives(&self, weights: &[T; S], to: &mut ArrayW<M, ArrayX<M, T>>) {
         for direction in to.as_mut() {
             direction.as_mut().fill(T::ZERO);
         }
-        let all = (Pivoting::plan::<M>(), Identity::of::<M, T, Pivoting>());
-        self.sweep.write_slopes(all, weights, &mut Rows::<M, T> { rows: to });
+        let directions = (Pivoting::plan::<M>(), IdentityDirections::for_model::<M, T, Pivoting>());
+        self.sweep.write_slopes(directions, weights, &mut DirectionRows::<M, T> { rows: to });
     }
 }
 
 /// A row for each direction.
-struct Rows<'a, M: Dae, T: Plain> {
+struct DirectionRows<'a, M: Dae, T: Plain> {
     rows: &'a mut ArrayW<M, ArrayX<M, T>>,
 }
 
-impl<M: Dae, T: Real> Target<T> for Rows<'_, M, T> {
+impl<M: Dae, T: Real> DerivativeOutput<T> for DirectionRows<'_, M, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+    fn columns_mut<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
         let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
         let (mut next, mut rest) = (0, self.rows.as_mut());
         let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
             let from = take(&mut rest).get_mut(direction as usize - next..).unwrap_or_default();
-            if let Some((own, behind)) = from.split_first_mut() {
-                (*to, rest, next) = (own.as_mut(), behind, direction as usize + 1);
+            if let Some((own, following)) = from.split_first_mut() {
+                (*to, rest, next) = (own.as_mut(), following, direction as usize + 1);
             }
         }
         columns

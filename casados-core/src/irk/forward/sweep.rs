@@ -1,22 +1,22 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to
 //! `V_{n+1}`, which after the last step is a result, and to what second derivatives need of both.
 
-use super::checksum::{ACCUMULATORS, Summed, accumulate, clear, minus_weights};
-use super::output::{Columns, Target};
-use super::right_hand_side::{Later, Placed, Scatter, place};
-use super::stage_rows::CurvedRows;
+use super::checksum::{ACCUMULATORS, ChecksumVisitor, accumulate, clear_accumulators, minus_weights};
+use super::output::{DerivativeOutput, PanelCombination};
+use super::right_hand_side::{PanelRightHandSide, Scatter, ScatterProgress, scatter_panel};
+use super::stage_sensitivities::StageRowWriter;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel, panel_mut, panels};
 use crate::irk::kinematic::KinematicPanel;
-use crate::irk::workspace::{Linearization, Work};
+use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Factors, Kernel, Planned, Up, dispatch, is_long, is_short, kernels,
-    minus_ha, sweeps,
+    Arithmetic, Block, Down, Factors, Kernel, PlannedFactors, Prefetch, Up, dispatch, is_large_plan,
+    is_unrolled, kernels, minus_ha, solve_triangular_pair,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Array, Plain, Shape, copy};
 use bytemuck::Zeroable;
@@ -25,151 +25,155 @@ use core::marker::PhantomData;
 /// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
+pub struct ForwardSweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     /// `dx_n/dw` at the start of the step, and at its end if that is not the end of the interval.
     v: [Aligned<ArrayX<M, R>>; 2],
     /// Which of them is at the end.
-    end: bool,
+    end_is_first: bool,
     /// The first of them is what it is at the start of an interval, where that is always the same.
-    begun: bool,
+    identity_written: bool,
     /// `d(k, z)/dw` at its stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in accumulators.
-    pub(in crate::irk) sums: Aligned<ArrayK<M, [[T; ACCUMULATORS]; S]>>,
+    pub(in crate::irk) stage_sums: Aligned<ArrayK<M, [[T; ACCUMULATORS]; S]>>,
     pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; ACCUMULATORS]>>,
     /// Zero if all that was written to a result after the last step is finite, else NaN.
-    pub(in crate::irk) finite: [T; 1],
+    pub(in crate::irk) finite_indicator: [T; 1],
 }
 
 /// A step that is linearised, and the directions that go through it.
-pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
+pub(in crate::irk) struct LinearizedStep<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
     /// Where its factors are, if they are not where they are made.
-    pub kept: Option<&'a Linearization<M, E, S, F>>,
+    pub stored_linearization: Option<&'a Linearization<M, E, S, F>>,
     pub coefficients: &'a Coefficients<E, S>,
     pub directions: D,
     /// Whether it is the first of the interval.
-    pub first: bool,
+    pub is_first: bool,
 }
-copy!(['a, M: Dae, E: Lanes, D: Copy, const S: usize, F: Fallback] Linearized<'a, M, E, D, S, F>);
+copy!(['a, M: Dae, E: Lanes, D: Copy, const S: usize, F: Fallback] LinearizedStep<'a, M, E, D, S, F>);
 
 /// What a step writes beside its own memory.
-pub(in crate::irk) struct Outputs<'a, E, G> {
+pub(in crate::irk) struct StepOutputs<'a, E, G> {
     /// The rows of `D` for second derivatives.
-    pub curved: Option<&'a mut [E]>,
+    pub stage_sensitivities: Option<&'a mut [E]>,
     /// The result, after the last step: it has `V_{n+1}`.
-    pub end: Option<G>,
+    pub result: Option<G>,
     /// Whether that may be in no cache.
-    pub distant: bool,
+    pub prefetch_output: bool,
 }
 
 /// What is done to a panel.
 #[derive(Clone, Copy, PartialEq)]
-pub(in crate::irk) enum Phase {
+pub(in crate::irk) enum SweepPart {
     /// All of it.
-    Whole,
+    All,
     /// The right-hand side.
-    Before,
+    RightHandSide,
     /// What comes after the solution.
-    After,
+    AfterSolve,
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> ForwardSweep<M, E, R, S> {
     /// `V_0`
-    pub(crate) fn start<D: Directions<E>>(&mut self, directions: D) {
-        self.end = false;
+    pub(crate) fn set_initial_directions<D: Directions<E>>(&mut self, directions: D) {
+        self.end_is_first = false;
         // Without an operating system every call takes the same time, the first one too.
-        if !(cfg!(feature = "std") && D::SPARSE && self.begun) {
+        if !(cfg!(feature = "std") && D::ARE_UNIT_VECTORS && self.identity_written) {
             let end = R::flat_mut(self.v[0].as_mut());
             unit_or_seeds::<E, D, S>(end, M::Shape::NX, directions);
         }
-        self.begun = D::SPARSE;
+        self.identity_written = D::ARE_UNIT_VECTORS;
     }
 
     /// The step that follows, which is linearised. Whether the derivatives of the stages satisfy
     /// their equations.
-    pub(in crate::irk) fn step<D: Directions<E>, G: Target<E>, F: Fallback>(
+    pub(in crate::irk) fn step<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
-        of: Linearized<'_, M, E, D, S, F>,
-        outputs: &mut Outputs<'_, E, G>,
+        work: &mut StageWorkspace<M, E, S, F>,
+        linearized: LinearizedStep<'_, M, E, D, S, F>,
+        outputs: &mut StepOutputs<'_, E, G>,
     ) -> E::Mask {
-        self.end = !self.end;
-        self.repeat(work, of, outputs)
+        self.end_is_first = !self.end_is_first;
+        self.repeat_step(work, linearized, outputs)
     }
 
     /// The same step again.
-    pub(in crate::irk) fn repeat<D: Directions<E>, G: Target<E>, F: Fallback>(
+    pub(in crate::irk) fn repeat_step<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
-        of: Linearized<'_, M, E, D, S, F>,
-        outputs: &mut Outputs<'_, E, G>,
+        work: &mut StageWorkspace<M, E, S, F>,
+        linearized: LinearizedStep<'_, M, E, D, S, F>,
+        outputs: &mut StepOutputs<'_, E, G>,
     ) -> E::Mask {
-        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE } || work.linear(of.kept).factors.is_planned() {
-            self.run(work, of, outputs, Phase::Whole, false);
+        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE }
+            || work.linearization(linearized.stored_linearization).factors.is_from_plan()
+        {
+            self.run(work, linearized, outputs, SweepPart::All, false);
         } else {
-            self.run(work, of, outputs, Phase::Before, false);
-            self.solve_columns(work, of.directions);
-            self.run(work, of, outputs, Phase::After, false);
+            self.run(work, linearized, outputs, SweepPart::RightHandSide, false);
+            self.solve_columns(work, linearized.directions);
+            self.run(work, linearized, outputs, SweepPart::AfterSolve, false);
         }
-        let good = work.verify_forward(self, of.coefficients, of.directions, false);
-        if E::all(good) {
-            return good;
+        let valid = work.verify_forward(self, linearized.coefficients, linearized.directions, false);
+        if E::all(valid) {
+            return valid;
         }
-        self.run(work, of, outputs, Phase::After, true);
-        E::or(good, work.verify_forward(self, of.coefficients, of.directions, true))
+        self.run(work, linearized, outputs, SweepPart::AfterSolve, true);
+        E::or(valid, work.verify_forward(self, linearized.coefficients, linearized.directions, true))
     }
 
-    fn run<D: Directions<E>, G: Target<E>, F: Fallback>(
+    fn run<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
-        work: &Work<M, E, S, F>,
-        of: Linearized<'_, M, E, D, S, F>,
-        outputs: &mut Outputs<'_, E, G>,
-        phase: Phase,
-        second: bool,
+        work: &StageWorkspace<M, E, S, F>,
+        linearized: LinearizedStep<'_, M, E, D, S, F>,
+        outputs: &mut StepOutputs<'_, E, G>,
+        part: SweepPart,
+        with_second_weights: bool,
     ) {
-        self.begun &= self.end;
-        let Linearized { kept, coefficients, directions, first } = of;
-        let Self { v, end, dy, sums, start_sums, finite, .. } = self;
+        self.identity_written &= self.end_is_first;
+        let LinearizedStep { stored_linearization: kept, coefficients, directions, is_first: first } =
+            linearized;
+        let Self { v, end_is_first: end, dy, stage_sums: sums, start_sums, finite_indicator: finite, .. } =
+            self;
         let [start, other] = v;
         let (v, next) = if *end { (start, other) } else { (other, start) };
-        *finite = [dispatch(Step::<_, E, D, G, F, S> {
+        *finite = [dispatch(SweepKernel::<_, E, D, G, F, S> {
             plan: F::plan::<M>(),
-            phase,
-            jacobian: F::Plan::<M>::jacobian(&work.linear.jacobian),
-            factors: work.linear(kept).factors.planned(),
+            part,
+            jacobian: F::Plan::<M>::jacobian(&work.linearization.jacobian),
+            factors: work.linearization(kept).factors.planned(),
             coefficients,
             h: work.inputs.time.step,
             directions,
-            first,
+            is_first: first,
             v: R::flat(v.as_ref()),
-            next: R::flat_mut(next.as_mut()),
+            v_next: R::flat_mut(next.as_mut()),
             dy: R::flat_mut(dy.as_mut().as_flattened_mut()),
             sums: sums.as_mut(),
             start_sums: start_sums.as_mut(),
-            curved: outputs.curved.as_deref_mut(),
-            result: outputs.end.as_mut(),
-            distant: outputs.distant,
-            sum: E::from_f64(0.0),
-            second,
-            placed: Placed::default(),
-            of: PhantomData,
+            stage_sensitivities: outputs.stage_sensitivities.as_deref_mut(),
+            result: outputs.result.as_mut(),
+            prefetch_output: outputs.prefetch_output,
+            output_sum: E::from_f64(0.0),
+            with_second_weights,
+            scatter_progress: ScatterProgress::default(),
+            fallback: PhantomData,
         })];
     }
 
     /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums
     /// over all directions.
-    pub(in crate::irk) fn conclude<D: Directions<E>, G: Target<E>, F: Fallback>(
+    pub(in crate::irk) fn update_outputs<D: Directions<E>, G: DerivativeOutput<E>, F: Fallback>(
         &mut self,
-        work: &Work<M, E, S, F>,
-        of: Linearized<'_, M, E, D, S, F>,
-        outputs: &mut Outputs<'_, E, G>,
+        work: &StageWorkspace<M, E, S, F>,
+        linearized: LinearizedStep<'_, M, E, D, S, F>,
+        outputs: &mut StepOutputs<'_, E, G>,
     ) {
-        self.run(work, of, outputs, Phase::After, false);
+        self.run(work, linearized, outputs, SweepPart::AfterSolve, false);
     }
 
     /// `V` at the start of the step.
     pub(in crate::irk) fn v(&self) -> &[E] {
-        self.v.get(usize::from(!self.end)).map_or(&[], |v| R::flat(v.as_ref()))
+        self.v.get(usize::from(!self.end_is_first)).map_or(&[], |v| R::flat(v.as_ref()))
     }
 
     /// The derivatives of the stages.
@@ -193,39 +197,39 @@ kernels! {
         v.fill(E::from_f64(0.0));
         panels!([D::COLUMNS, directions.columns()], E, S, column, W => {
             for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {
-                directions.add(index, E::from_f64(1.0), column, row);
+                directions.add_scaled(index, E::from_f64(1.0), column, row);
             }
         });
     }
 }
 
 /// See [`Sweep::step`].
-struct Step<'a, M: Plan, E: Plain, D, G, F, const S: usize> {
+struct SweepKernel<'a, M: Plan, E: Plain, D, G, F, const S: usize> {
     plan: M,
-    phase: Phase,
+    part: SweepPart,
     jacobian: &'a M::Jacobian<[E; S]>,
-    factors: Planned<'a, M, E, S>,
+    factors: PlannedFactors<'a, M, E, S>,
     coefficients: &'a Coefficients<E, S>,
     h: E,
     directions: D,
-    first: bool,
+    is_first: bool,
     v: &'a [E],
-    next: &'a mut [E],
+    v_next: &'a mut [E],
     dy: &'a mut [E],
     sums: &'a mut [[[E; ACCUMULATORS]; S]],
     start_sums: &'a mut [[E; ACCUMULATORS]],
-    curved: Option<&'a mut [E]>,
+    stage_sensitivities: Option<&'a mut [E]>,
     result: Option<&'a mut G>,
-    distant: bool,
+    prefetch_output: bool,
     /// That of all that was written to the result.
-    sum: E,
-    second: bool,
-    placed: Placed,
-    of: PhantomData<F>,
+    output_sum: E,
+    with_second_weights: bool,
+    scatter_progress: ScatterProgress,
+    fallback: PhantomData<F>,
 }
 
 /// What all panels share.
-struct Shared<E, const S: usize> {
+struct PanelCoefficients<E, const S: usize> {
     /// `h c_i`
     nodes: [E; S],
     /// `−hA`
@@ -234,144 +238,166 @@ struct Shared<E, const S: usize> {
     minus_weights: [E; S],
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize> Kernel
-    for Step<'_, M, E, D, G, F, S>
+impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, const S: usize> Kernel
+    for SweepKernel<'_, M, E, D, G, F, S>
 {
     type Number = E;
     type Output = E;
-    const WIDE: bool = is_long::<M, S>() && matches!(D::COLUMNS, Some(8..));
+    const WIDE: bool = is_large_plan::<M, S>() && matches!(D::COLUMNS, Some(8..));
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) -> E {
         let nodes = nodes(&self.coefficients.a, self.h);
-        if self.phase != Phase::Before {
+        if self.part != SweepPart::RightHandSide {
             for accumulators in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
-                clear(accumulators);
+                clear_accumulators(accumulators);
             }
-            if D::SPARSE && self.first {
+            if D::ARE_UNIT_VECTORS && self.is_first {
                 for (state, [sum, ..]) in self.start_sums.iter_mut().enumerate() {
-                    *sum = self.directions.total(state, self.second);
+                    *sum = self.directions.weighted_sum(state, self.with_second_weights);
                 }
             }
         }
-        if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
+        if const { D::ARE_UNIT_VECTORS && Self::fits_cache::<A>() }
+            && self.part != SweepPart::AfterSolve
+            && self.is_first
+        {
             self.dy.fill(E::from_f64(0.0));
             let Self { plan, directions, .. } = self;
             let jacobian = self.jacobian.as_ref();
-            Scatter { plan, jacobian, nodes: &nodes, dy: &mut *self.dy, directions }.all::<A>();
+            Scatter { plan, jacobian, nodes: &nodes, dy: &mut *self.dy, directions }.evaluate::<A>();
         }
         let Self { coefficients, h, .. } = self;
         let mut minus_weights = coefficients.b;
         for weight in &mut minus_weights {
             *weight = -(h * *weight);
         }
-        let shared = &Shared { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
+        let shared = &PanelCoefficients { nodes, minus_ha: minus_ha(&coefficients.a, h), minus_weights };
         let columns = self.directions.columns();
-        panels!([D::COLUMNS, columns], E, S, column, W => self.panel::<A, W>(column, shared));
+        panels!([D::COLUMNS, columns], E, S, column, W => self.process_panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
-        E::from_f64(0.0) * self.sum
+        E::from_f64(0.0) * self.output_sum
     }
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: usize>
-    Step<'_, M, E, D, G, F, S>
+impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, const S: usize>
+    SweepKernel<'_, M, E, D, G, F, S>
 {
     /// Whether `V_n` is always the unit matrix.
-    const UNIT: bool = D::SPARSE && !F::INTERVALS;
+    const ALWAYS_IDENTITY: bool = D::ARE_UNIT_VECTORS && !F::INTERVALS;
 
     /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
-    const fn is_small<A: Arithmetic>() -> bool {
-        let (Some(columns), Some(nk)) = (D::COLUMNS, Table::Unknowns.known::<M>()) else { return false };
+    const fn fits_cache<A: Arithmetic>() -> bool {
+        let (Some(columns), Some(nk)) = (D::COLUMNS, StructureTable::Unknowns.known_row_count::<M>()) else {
+            return false;
+        };
         let bytes = columns * nk * S * size_of::<E>();
-        bytes <= L1_CACHE_BYTES && is_short::<A, Scatter<'_, M, E, D, S>>()
+        bytes <= L1_CACHE_BYTES && is_unrolled::<A, Scatter<'_, M, E, D, S>>()
     }
 
     /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
     /// cache, and registers are few.
-    const fn sums_late<A: Arithmetic>() -> bool {
-        size_of::<E>() <= 8 && Self::is_small::<A>()
+    const fn sums_after_solve<A: Arithmetic>() -> bool {
+        size_of::<E>() <= 8 && Self::fits_cache::<A>()
     }
 
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<E, S>) {
-        self.before::<A, W>(column, &shared.nodes);
+    fn process_panel<A: Arithmetic, const W: usize>(
+        &mut self,
+        column: usize,
+        shared: &PanelCoefficients<E, S>,
+    ) {
+        self.compute_right_hand_side::<A, W>(column, &shared.nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, self.plan.nk() * S).as_chunks_mut::<S>();
-        let minus_weights = &minus_weights::<E, W>(column, self.second);
-        if self.phase == Phase::Whole {
-            if const { Self::sums_late::<A>() } {
-                sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
+        let minus_weights = &minus_weights::<E, W>(column, self.with_second_weights);
+        if self.part == SweepPart::All {
+            if const { Self::sums_after_solve::<A>() } {
+                solve_triangular_pair::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
             } else {
                 let ahead = match &self.result {
-                    Some(to) if self.distant => Ahead(to.following::<W>(column)),
-                    _ => Ahead(&[]),
+                    Some(to) if self.prefetch_output => Prefetch(to.next_columns::<W>(column)),
+                    _ => Prefetch(&[]),
                 };
                 let sums = &mut *self.sums;
-                let visitor = &mut Summed { sums, minus_weights, ahead };
-                sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
+                let visitor = &mut ChecksumVisitor { sums, minus_weights, prefetch: ahead };
+                solve_triangular_pair::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
             }
         }
-        self.after::<A, W>(column, minus_weights, shared);
+        self.process_solution::<A, W>(column, minus_weights, shared);
     }
 
     /// The right-hand side of a panel, with `h c_i`.
     #[inline(always)]
-    fn before<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
+    fn compute_right_hand_side<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
         let (plan, nx, nk) = (self.plan, self.plan.nx(), self.plan.nk());
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
         // Lengths that the optimiser knows need no looking at.
-        if self.phase == Phase::After || v.len() != nx || dy.len() != nk {
+        if self.part == SweepPart::AfterSolve || v.len() != nx || dy.len() != nk {
             return;
         }
         let (jacobian, directions) = (self.jacobian.as_ref(), self.directions);
-        if const { !Self::UNIT } && !(self.first && D::SPARSE) {
+        if const { !Self::ALWAYS_IDENTITY } && !(self.is_first && D::ARE_UNIT_VECTORS) {
             let kinematic = KinematicPanel { plan, jacobian, v, directions, column };
-            Later { kinematic, nodes, dy: &mut *dy }.all::<A>();
-        } else if const { !Self::is_small::<A>() } {
-            place::<M, E, D, S, W>((plan, directions), jacobian, nodes, &mut self.placed, dy, column);
+            PanelRightHandSide { kinematic, nodes, dy: &mut *dy }.evaluate::<A>();
+        } else if const { !Self::fits_cache::<A>() } {
+            scatter_panel::<M, E, D, S, W>(
+                (plan, directions),
+                jacobian,
+                nodes,
+                &mut self.scatter_progress,
+                dy,
+                column,
+            );
         }
     }
 
     /// What follows from the solution of a panel.
     #[inline(always)]
-    fn after<A: Arithmetic, const W: usize>(
+    fn process_solution<A: Arithmetic, const W: usize>(
         &mut self,
         column: usize,
         minus_weights: &[E; W],
-        shared: &Shared<E, S>,
+        shared: &PanelCoefficients<E, S>,
     ) {
         let (plan, nx, nk) = (self.plan, self.plan.nx(), self.plan.nk());
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
-        if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
+        if self.part == SweepPart::RightHandSide || v.len() != nx || dy.len() != nk {
             return;
         }
         let (jacobian, directions) = (self.jacobian.as_ref(), self.directions);
         let kinematic = KinematicPanel { plan, jacobian, v, directions, column };
-        let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
-        if const { !Self::sums_late::<A>() } && self.phase != Phase::After {
+        let mut sums = ChecksumVisitor { sums: &mut *self.sums, minus_weights, prefetch: Prefetch(&[]) };
+        if const { !Self::sums_after_solve::<A>() } && self.part != SweepPart::AfterSolve {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
         } else {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
-            sums.all::<A>(dy);
+            sums.add_panel::<A>(dy);
         }
-        let unit = Self::UNIT || self.first && D::SPARSE;
-        if const { !Self::UNIT } && !unit {
+        let is_identity = Self::ALWAYS_IDENTITY || self.is_first && D::ARE_UNIT_VECTORS;
+        if const { !Self::ALWAYS_IDENTITY } && !is_identity {
             for (accumulators, row) in self.start_sums.iter_mut().zip(v) {
                 accumulate::<A, E, W>(accumulators, minus_weights, row);
             }
         }
         // The unit matrix need not be read.
-        let from = if unit { None } else { Some(v) };
-        let ones = if unit { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };
+        let base = if is_identity { None } else { Some(v) };
+        let ones =
+            if is_identity { plan.structure().directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
-            let end =
-                Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
-            self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
-        } else if const { !Self::UNIT } {
-            let next = panel_mut::<E, W>(self.next, column, nx);
+            let end = PanelCombination {
+                base: base,
+                unit_rows: ones,
+                dy,
+                unknowns: 0..nx,
+                minus_weights: &shared.minus_weights,
+            };
+            self.output_sum = self.output_sum + end.write::<A>(&mut to.columns_mut::<W>(column));
+        } else if const { !Self::ALWAYS_IDENTITY } {
+            let next = panel_mut::<E, W>(self.v_next, column, nx);
             for (n, (to, dk)) in next.iter_mut().zip(dy.iter()).enumerate() {
-                let mut row = from.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);
+                let mut row = base.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);
                 for (&weight, dk) in shared.minus_weights.iter().zip(dk) {
                     A::subtract_row(&mut row, weight, dk);
                 }
@@ -383,10 +409,11 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: Target<E>, F: Fallback, const S: us
                 }
             }
         }
-        if let Some(curved) = &mut self.curved {
+        if let Some(curved) = &mut self.stage_sensitivities {
             let count = plan.structure().curved.len();
             let d = panel_mut::<E, W>(curved, column, count * S);
-            CurvedRows { plan, minus_ha: shared.minus_ha, directions }.panel::<A, W>(v, dy, d, column);
+            StageRowWriter { plan, minus_ha: shared.minus_ha, directions }
+                .write_panel::<A, W>(v, dy, d, column);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Second derivatives on the diagonal that need no row of `D`: of a direction itself.
 
-use super::products::Square;
+use super::products::StridedMatrix;
 use crate::irk::directions::column_of;
 use crate::linalg::{Arithmetic, Kernel};
 use crate::plan::Plan;
@@ -8,13 +8,13 @@ use crate::scalar::Lanes;
 
 /// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit
 /// matrix.
-pub(in crate::irk) struct Diagonal<'a, M, E, const S: usize> {
+pub(in crate::irk) struct DiagonalUpdate<'a, M, E, const S: usize> {
     pub plan: M,
     pub entries: &'a [[E; S]],
-    pub sum: Square<'a, E>,
+    pub sum: StridedMatrix<'a, E>,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Diagonal<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for DiagonalUpdate<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]

@@ -12,37 +12,37 @@
 //! (`products`) take as many operations as there are curved variables for each pair of directions;
 //! this takes a sparse solve for each direction, which is less where a model is large.
 
-use super::matrix_adjoint_step::{Advance, Inverse, add_stages, columns};
-use super::products::{COLUMNS, Square};
+use super::matrix_adjoint_step::{AdvancePanel, InverseWeights, add_stages, row_chunk};
+use super::products::{G_COLUMNS, StridedMatrix};
 use super::sparse_product::multiply_panel;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::directions::{all_columns, column_of, known_columns, panel_of, panels};
-use crate::irk::forward::stage_rows::Rows;
-use crate::irk::forward::sweep::Phase;
-use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
-use crate::irk::workspace::{Linearization, Work};
+use crate::irk::directions::{column_of, panel_of, panels, static_columns, total_columns};
+use crate::irk::forward::stage_sensitivities::StageRowLayout;
+use crate::irk::forward::sweep::SweepPart;
+use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, condense};
+use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Factors, Kernel, PanelRow, Planned, TransposedDown, TransposedUp, dispatch,
-    is_long, minus_ha, sweeps,
+    Arithmetic, Block, Factors, Kernel, PanelRow, PlannedFactors, Prefetch, TransposedDown, TransposedUp,
+    dispatch, is_large_plan, minus_ha, solve_triangular_pair,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
-use crate::plan::{Plan, PlanOf, is_direct};
+use crate::plan::{Plan, PlanOf, has_direct_rates};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 
 /// Whether second derivatives are summed in this way: where it takes less than 4/9 of the products
 /// that panels take, counted for each direction. A solve waits for memory, which products of panels
 /// do not. Only of single numbers: registers of them leave no room for panel rows.
-pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
+pub(in crate::irk) const fn is_cheaper<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
-    if COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
+    if G_COLUMNS < 16 || size_of::<E>() > 8 || !structure.elimination.has_plan() {
         return false;
     }
     // Each of its products is an operation for the sum, too.
     let solve = structure.elimination_cost(S as u64).1 as usize / 2;
     let blocks = &structure.blocks;
-    let of_x = if is_direct(structure) { blocks[1] } else { blocks[2] - blocks[1] };
+    let of_x = if has_direct_rates(structure) { blocks[1] } else { blocks[2] - blocks[1] };
     let entries = S * (of_x + blocks[5] - blocks[3]);
     let right = S * (structure.x.len() + S * structure.curved.len());
     let products = structure.curved.len() * S * structure.directions.len() / 2;
@@ -57,48 +57,60 @@ pub(in crate::irk) struct MatrixAdjoint<'a, M: Dae, E: Plain, const S: usize> {
     /// The rows of `D` that enter second derivatives.
     pub d: &'a [E],
     /// Memory for `G` and `M` of a panel.
-    pub g: &'a mut ArrayV<M, [[E; COLUMNS]; S]>,
+    pub g: &'a mut ArrayV<M, [[E; G_COLUMNS]; S]>,
     /// `(Λ, Λ_w)`, over the directions that have any influence: a row for each, and a column.
-    pub sum: Square<'a, E>,
+    pub sum: StridedMatrix<'a, E>,
     /// Whether the step is the first of the interval: of its result nobody needs more than the
     /// lower triangle.
-    pub first: bool,
+    pub is_first: bool,
     /// Whether it is the last one: `Λ_N = 0`.
-    pub last: bool,
+    pub is_last: bool,
     /// Where the result will be written, if that is far away.
-    pub ahead: &'a [E],
+    pub prefetch: &'a [E],
 }
 
 impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
     /// Over a step that is linearised, with its factors, which were `kept` or are there.
-    pub fn run<F: Fallback>(mut self, work: &mut Work<M, E, S, F>, kept: Option<&Linearization<M, E, S, F>>) {
+    pub fn run<F: Fallback>(
+        mut self,
+        work: &mut StageWorkspace<M, E, S, F>,
+        stored_linearization: Option<&Linearization<M, E, S, F>>,
+    ) {
         let h = work.inputs.time.step;
-        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE } || work.linear(kept).factors.is_planned() {
-            self.phase(work.linear(kept), h, Phase::Whole, 0);
+        if const { !Factors::<M, E, S, F>::MAY_BE_DENSE }
+            || work.linearization(stored_linearization).factors.is_from_plan()
+        {
+            self.run_part(work.linearization(stored_linearization), h, SweepPart::All, 0);
             return;
         }
         let mut column = 0;
-        let columns = const { all_columns::<M, E, F>() };
+        let columns = const { total_columns::<M, E, F>() };
         while column < columns {
-            let known = const { F::Plan::<M>::KNOWN.is_some() };
+            let known = const { F::Plan::<M>::KNOWN_STRUCTURE.is_some() };
             let (_, width) = panel_of::<E>(known, column, columns, S);
-            self.phase(work.linear(kept), h, Phase::Before, column);
-            self.solve_columns(work, kept, width);
-            self.phase(work.linear(kept), h, Phase::After, column);
+            self.run_part(work.linearization(stored_linearization), h, SweepPart::RightHandSide, column);
+            self.solve_columns(work, stored_linearization, width);
+            self.run_part(work.linearization(stored_linearization), h, SweepPart::AfterSolve, column);
             column += width;
         }
     }
 
     /// All panels, or a part of what is done to one of them.
-    fn phase<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>, h: E, phase: Phase, only: usize) {
-        let Self { coefficients, entries, d, g, sum, first, last, ahead } = self;
-        let (g, m) = halves::<M, E, S>(g);
-        let Square { elements, stride } = sum;
-        dispatch(Panels::<_, E, S> {
+    fn run_part<F: Fallback>(
+        &mut self,
+        linear: &Linearization<M, E, S, F>,
+        h: E,
+        phase: SweepPart,
+        selected_panel: usize,
+    ) {
+        let Self { coefficients, entries, d, g, sum, is_first: first, is_last: last, prefetch: ahead } = self;
+        let (g, m) = split_g_and_m::<M, E, S>(g);
+        let StridedMatrix { elements, stride } = sum;
+        dispatch(PanelKernel::<_, E, S> {
             plan: F::plan::<M>(),
-            columns: const { all_columns::<M, E, F>() },
-            phase,
-            only,
+            columns: const { total_columns::<M, E, F>() },
+            part: phase,
+            selected_panel,
             jacobian: F::Plan::<M>::jacobian(&linear.jacobian),
             factors: linear.factors.planned(),
             minus_ha: minus_ha(&coefficients.a, h),
@@ -107,25 +119,25 @@ impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
             d,
             g,
             m,
-            sum: Square { elements, stride: *stride },
-            first: *first,
-            last: *last,
-            ahead,
-            inverse: Inverse::new(coefficients, h),
-            placed: 0,
+            sum: StridedMatrix { elements, stride: *stride },
+            is_first: *first,
+            is_last: *last,
+            prefetch: ahead,
+            inverse_weights: InverseWeights::new(coefficients, h),
+            skipped_entries: 0,
         });
     }
 
     /// Solves by the factors of the whole matrix, column by column, of which the panel has so many.
     fn solve_columns<F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
+        work: &mut StageWorkspace<M, E, S, F>,
+        stored_linearization: Option<&Linearization<M, E, S, F>>,
         width: usize,
     ) {
-        let Work { increment, linear, .. } = work;
-        let linear = kept.unwrap_or(linear);
-        let (_, m) = halves::<M, E, S>(self.g);
+        let StageWorkspace { increment, linearization: linear, .. } = work;
+        let linear = stored_linearization.unwrap_or(linear);
+        let (_, m) = split_g_and_m::<M, E, S>(self.g);
         for column in 0..width {
             for (to, from) in increment.as_mut().as_flattened_mut().iter_mut().zip(m.chunks_exact(width)) {
                 *to = [from[column]];
@@ -140,21 +152,23 @@ impl<M: Dae, E: Lanes, const S: usize> MatrixAdjoint<'_, M, E, S> {
 }
 
 /// Where `G` and `M` of a panel are.
-fn halves<M: Dae, E: Plain, const S: usize>(g: &mut ArrayV<M, [[E; COLUMNS]; S]>) -> (&mut [E], &mut [E]) {
+fn split_g_and_m<M: Dae, E: Plain, const S: usize>(
+    g: &mut ArrayV<M, [[E; G_COLUMNS]; S]>,
+) -> (&mut [E], &mut [E]) {
     let all = g.as_mut().as_flattened_mut().as_flattened_mut();
     all.split_at_mut(all.len() / 2)
 }
 
 /// See [`MatrixAdjoint`].
-struct Panels<'a, M: Plan, E: Plain, const S: usize> {
+struct PanelKernel<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
     /// Of all directions.
     columns: usize,
-    phase: Phase,
+    part: SweepPart,
     /// The panel that a phase other than all is of.
-    only: usize,
+    selected_panel: usize,
     jacobian: &'a M::Jacobian<[E; S]>,
-    factors: Planned<'a, M, E, S>,
+    factors: PlannedFactors<'a, M, E, S>,
     /// `−hA`
     minus_ha: Block<E, S>,
     /// `−hb`
@@ -163,42 +177,42 @@ struct Panels<'a, M: Plan, E: Plain, const S: usize> {
     d: &'a [E],
     g: &'a mut [E],
     m: &'a mut [E],
-    sum: Square<'a, E>,
-    first: bool,
-    last: bool,
-    ahead: &'a [E],
+    sum: StridedMatrix<'a, E>,
+    is_first: bool,
+    is_last: bool,
+    prefetch: &'a [E],
     /// See [`Advance`].
-    inverse: Option<Inverse<E, S>>,
-    placed: usize,
+    inverse_weights: Option<InverseWeights<E, S>>,
+    skipped_entries: usize,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Panels<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for PanelKernel<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>() && matches!(known_columns::<M, E>(), Some(8..));
+    const WIDE: bool = is_large_plan::<M, S>() && matches!(static_columns::<M, E>(), Some(8..));
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        let columns = match const { known_columns::<M, E>() } {
+        let columns = match const { static_columns::<M, E>() } {
             Some(columns) => columns,
             None => self.columns,
         };
         self.columns = columns;
-        if M::KNOWN.is_some() {
+        if M::KNOWN_STRUCTURE.is_some() {
             self.sum.stride = M::NC;
         }
-        panels!([known_columns::<M, E>(), columns], E, S, column, W => {
-            if self.phase == Phase::Whole || self.only == column {
-                self.panel::<A, W>(column);
+        panels!([static_columns::<M, E>(), columns], E, S, column, W => {
+            if self.part == SweepPart::All || self.selected_panel == column {
+                self.process_panel::<A, W>(column);
             }
         });
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Panels<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> PanelKernel<'_, M, E, S> {
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
+    fn process_panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
         let (plan, nk) = (self.plan, self.plan.nk());
-        let (rows, count) = (Rows::of::<M, E, S>(plan), plan.structure().curved.len() * S);
+        let (rows, count) = (StageRowLayout::for_plan::<M, E, S>(plan), plan.structure().curved.len() * S);
         let g = self.g.get_mut(..count * W).unwrap_or_default().as_chunks_mut::<W>().0;
         let m = self.m.get_mut(..nk * S * W).unwrap_or_default();
         let m = m.as_chunks_mut::<W>().0.as_chunks_mut::<S>().0;
@@ -206,23 +220,41 @@ impl<M: Plan, E: Lanes, const S: usize> Panels<'_, M, E, S> {
         if g.len() != count || m.len() != nk {
             return;
         }
-        if self.phase != Phase::After {
+        if self.part != SweepPart::AfterSolve {
             multiply_panel::<A, M, E, S, W>(plan, self.entries, self.d, g, column);
-            let sum = if self.last { None } else { Some(&self.sum) };
+            let sum = if self.is_last { None } else { Some(&self.sum) };
             let (minus_ha, minus_hb) = (&self.minus_ha, &self.minus_hb);
-            RightHandSide { plan, rows, g, minus_ha, minus_hb, sum, column }.all::<A>(m);
-            around::<A, M, E, S, W, CONDENSE_TRANSPOSED>(plan, self.jacobian.as_ref(), &self.minus_ha, m);
+            RightHandSide { plan, rows, g, minus_ha, minus_hb, sum, column }.evaluate::<A>(m);
+            condense::<A, M, E, S, W, CONDENSE_TRANSPOSED>(plan, self.jacobian.as_ref(), &self.minus_ha, m);
         }
-        if self.phase == Phase::Whole {
-            let own = self.ahead.get(column * plan.nx()..).unwrap_or_default();
+        if self.part == SweepPart::All {
+            let own = self.prefetch.get(column * plan.nx()..).unwrap_or_default();
             let own = own.get(..W * plan.nx()).unwrap_or(own);
-            let ahead = &mut Ahead(own);
-            sweeps::<A, M, E, [E; W], S, W, TransposedDown, TransposedUp>(self.factors, m, 0, ahead);
+            let ahead = &mut Prefetch(own);
+            solve_triangular_pair::<A, M, E, [E; W], S, W, TransposedDown, TransposedUp>(
+                self.factors,
+                m,
+                0,
+                ahead,
+            );
         }
-        if self.phase != Phase::Before {
-            around::<A, M, E, S, W, RECONSTRUCT_TRANSPOSED>(plan, self.jacobian.as_ref(), &self.minus_ha, m);
-            let Self { jacobian, sum, first, last, inverse, placed, .. } = self;
-            Advance {
+        if self.part != SweepPart::RightHandSide {
+            condense::<A, M, E, S, W, RECONSTRUCT_TRANSPOSED>(
+                plan,
+                self.jacobian.as_ref(),
+                &self.minus_ha,
+                m,
+            );
+            let Self {
+                jacobian,
+                sum,
+                is_first: first,
+                is_last: last,
+                inverse_weights: inverse,
+                skipped_entries: placed,
+                ..
+            } = self;
+            AdvancePanel {
                 plan,
                 rows,
                 jacobian: jacobian.as_ref(),
@@ -230,12 +262,12 @@ impl<M: Plan, E: Lanes, const S: usize> Panels<'_, M, E, S> {
                 m,
                 sum,
                 column,
-                first: *first,
-                last: *last,
+                is_first: *first,
+                is_last: *last,
                 inverse,
-                placed,
+                skipped_entries: placed,
             }
-            .all::<A>();
+            .evaluate::<A>();
         }
     }
 }
@@ -243,25 +275,25 @@ impl<M: Plan, E: Lanes, const S: usize> Panels<'_, M, E, S> {
 /// `h (b ⊗ Λ_{n+1}, 0) + Qᵀ G` of a panel.
 struct RightHandSide<'a, M, E, const S: usize, const W: usize> {
     plan: M,
-    rows: Rows,
+    rows: StageRowLayout,
     g: &'a [[E; W]],
     minus_ha: &'a Block<E, S>,
     minus_hb: &'a [E; S],
     /// `Λ_{n+1}`; nothing where it is zero.
-    sum: Option<&'a Square<'a, E>>,
+    sum: Option<&'a StridedMatrix<'a, E>>,
     column: usize,
 }
 
 impl<M: Plan, E: Lanes, const S: usize, const W: usize> RightHandSide<'_, M, E, S, W> {
     #[inline(always)]
-    fn all<A: Arithmetic>(&self, m: &mut [PanelRow<E, S, W>]) {
+    fn evaluate<A: Arithmetic>(&self, m: &mut [PanelRow<E, S, W>]) {
         let (plan, rows, nx) = (self.plan, self.rows, self.plan.nx());
-        let (mut derivative, mut state) = (0, plan.facts().curved[0]);
-        let mut algebraic = plan.facts().curved[1];
+        let (mut derivative, mut state) = (0, plan.facts().nonlinear_before[0]);
+        let mut algebraic = plan.facts().nonlinear_before[1];
         for (unknown, to) in m.iter_mut().enumerate() {
             let mut panel_row = [[E::from_f64(0.0); W]; S];
             if unknown >= nx {
-                if is_at(plan, algebraic, unknown + nx) {
+                if is_variable_at(plan, algebraic, unknown + nx) {
                     add_stages::<A, E, S, W>(rows, &mut panel_row, self.g, algebraic);
                     algebraic += 1;
                 }
@@ -270,19 +302,19 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> RightHandSide<'_, M, E, 
             }
             if let Some(sum) = self.sum
                 && let Some(row) = column_of(plan, unknown)
-                && let Some(lambda) = columns::<E, W>(sum, row, self.column)
+                && let Some(lambda) = row_chunk::<E, W>(sum, row, self.column)
             {
                 for (row, &minus_hb) in panel_row.iter_mut().zip(self.minus_hb) {
                     A::subtract_row(row, minus_hb, lambda);
                 }
             }
-            if is_at(plan, derivative, unknown) {
+            if is_variable_at(plan, derivative, unknown) {
                 add_stages::<A, E, S, W>(rows, &mut panel_row, self.g, derivative);
                 derivative += 1;
             }
-            if is_at(plan, state, nx + unknown) {
+            if is_variable_at(plan, state, nx + unknown) {
                 for stage in 0..S {
-                    let Some(g) = self.g.get(rows.at::<S>(state, stage)) else { continue };
+                    let Some(g) = self.g.get(rows.row_index::<S>(state, stage)) else { continue };
                     for (row, minus_ha) in panel_row.iter_mut().zip(self.minus_ha) {
                         A::subtract_row(row, minus_ha[stage], g);
                     }
@@ -296,6 +328,6 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> RightHandSide<'_, M, E, 
 
 /// Whether the curved variable in a position is this one.
 #[inline(always)]
-fn is_at<M: Plan>(plan: M, position: usize, variable: usize) -> bool {
+fn is_variable_at<M: Plan>(plan: M, position: usize, variable: usize) -> bool {
     matches!(plan.structure().curved.get(position), Some(&of) if of as usize == variable)
 }

@@ -8,20 +8,20 @@
 //! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
 //! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
 
-use super::products::Square;
+use super::products::StridedMatrix;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::forward::stage_rows::Rows;
+use crate::irk::forward::stage_sensitivities::StageRowLayout;
 use crate::linalg::{Arithmetic, PanelRow};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
 /// `−ω`, and `1 − bᵀ A⁻¹ 1`.
-pub(in crate::irk) struct Inverse<E, const S: usize> {
+pub(in crate::irk) struct InverseWeights<E, const S: usize> {
     minus_weights: [E; S],
-    keep: E,
+    r_infinity: E,
 }
 
-impl<E: Lanes, const S: usize> Inverse<E, S> {
+impl<E: Lanes, const S: usize> InverseWeights<E, S> {
     /// No more than this may `Σ |b_i (A⁻¹ 1)_i|` be: so often rounding errors of `Λ` are added.
     const MAX_GROWTH: f64 = 16.0;
 
@@ -37,7 +37,7 @@ impl<E: Lanes, const S: usize> Inverse<E, S> {
         }
         let finite = minus_weights.iter().all(|weight| E::all(weight.is_finite()));
         // What is not finite is not small either.
-        (finite && size <= Self::MAX_GROWTH).then_some(Self { minus_weights, keep: E::from_f64(keep) })
+        (finite && size <= Self::MAX_GROWTH).then_some(Self { minus_weights, r_infinity: E::from_f64(keep) })
     }
 }
 
@@ -45,14 +45,14 @@ impl<E: Lanes, const S: usize> Inverse<E, S> {
 fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
     let mut x = [1.0; S];
     for k in 0..S {
-        let mut best = k;
+        let mut pivot_row = k;
         for i in k + 1..S {
-            if a[i][k].abs() > a[best][k].abs() {
-                best = i;
+            if a[i][k].abs() > a[pivot_row][k].abs() {
+                pivot_row = i;
             }
         }
-        a.swap(k, best);
-        x.swap(k, best);
+        a.swap(k, pivot_row);
+        x.swap(k, pivot_row);
         let row = a[k];
         for i in (0..S).filter(|&i| i != k) {
             let factor = a[i][k] / row[k];
@@ -69,56 +69,56 @@ fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
 }
 
 /// Of a panel.
-pub(in crate::irk) struct Advance<'a, 'b, M, E, const S: usize, const W: usize> {
+pub(in crate::irk) struct AdvancePanel<'a, 'b, M, E, const S: usize, const W: usize> {
     pub plan: M,
-    pub rows: Rows,
+    pub rows: StageRowLayout,
     pub jacobian: &'a [[E; S]],
     pub g: &'a [[E; W]],
     pub m: &'a [PanelRow<E, S, W>],
     /// `(Λ, Λ_w)`
-    pub sum: &'a mut Square<'b, E>,
+    pub sum: &'a mut StridedMatrix<'b, E>,
     pub column: usize,
     /// Only the lower triangle is wanted.
-    pub first: bool,
+    pub is_first: bool,
     /// `Λ_{n+1} = 0`
-    pub last: bool,
-    pub inverse: &'a Option<Inverse<E, S>>,
+    pub is_last: bool,
+    pub inverse: &'a Option<InverseWeights<E, S>>,
     /// How many entries of the Jacobian, column by column, belong to rows above the triangle.
-    pub placed: &'a mut usize,
+    pub skipped_entries: &'a mut usize,
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const W: usize> Advance<'_, '_, M, E, S, W> {
+impl<M: Plan, E: Lanes, const S: usize, const W: usize> AdvancePanel<'_, '_, M, E, S, W> {
     #[inline(always)]
-    pub fn all<A: Arithmetic>(mut self) {
-        let mut row = if self.first { self.column } else { 0 };
-        if self.plan.facts().direct
+    pub fn evaluate<A: Arithmetic>(mut self) {
+        let mut row = if self.is_first { self.column } else { 0 };
+        if self.plan.facts().has_direct_rates
             && let Some(inverse) = self.inverse
         {
             let mut derivative = 0;
             while let Some(&direction) = self.plan.structure().directions.get(row)
                 && (direction as usize) < self.plan.nx()
             {
-                self.direct::<A>(inverse, row, direction as usize, &mut derivative);
+                self.row_from_derivatives::<A>(inverse, row, direction as usize, &mut derivative);
                 row += 1;
             }
         }
-        self.by_entries::<A>(row);
+        self.rows_from_entries::<A>(row);
     }
 
     /// The row of a state, from `f_ẋ`.
     #[inline(always)]
-    fn direct<A: Arithmetic>(
+    fn row_from_derivatives<A: Arithmetic>(
         &mut self,
-        inverse: &Inverse<E, S>,
+        inverse: &InverseWeights<E, S>,
         row: usize,
         state: usize,
         derivative: &mut usize,
     ) {
         let mut panel_row = [E::from_f64(0.0); W];
-        if !self.last
-            && let Some(lambda) = columns::<E, W>(self.sum, row, self.column)
+        if !self.is_last
+            && let Some(lambda) = row_chunk::<E, W>(self.sum, row, self.column)
         {
-            A::subtract_row(&mut panel_row, -inverse.keep, lambda);
+            A::subtract_row(&mut panel_row, -inverse.r_infinity, lambda);
         }
         if let Some((equation, _, values)) = self.plan.entry(self.jacobian, state)
             && let Some(m) = self.m.get(self.plan.slot(equation))
@@ -132,46 +132,46 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> Advance<'_, '_, M, E, S,
         {
             for (stage, &weight) in inverse.minus_weights.iter().enumerate() {
                 if of as usize == state
-                    && let Some(g) = self.g.get(self.rows.at::<S>(*derivative, stage))
+                    && let Some(g) = self.g.get(self.rows.row_index::<S>(*derivative, stage))
                 {
                     A::subtract_row(&mut panel_row, -weight, g);
                 }
             }
             *derivative += 1;
         }
-        self.put(row, &panel_row);
+        self.write_row(row, &panel_row);
     }
 
     /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
     #[inline(always)]
-    fn by_entries<A: Arithmetic>(&mut self, begin: usize) {
+    fn rows_from_entries<A: Arithmetic>(&mut self, begin: usize) {
         let plan = self.plan;
-        let (mut place, mut row) = (*self.placed, begin);
-        let mut c = plan.facts().curved[0];
+        let (mut position, mut row) = (*self.skipped_entries, begin);
+        let mut c = plan.facts().nonlinear_before[0];
         while let Some(&direction) = plan.structure().directions.get(row) {
-            let variable = variable_of(plan, direction as usize);
+            let variable = variable_of_direction(plan, direction as usize);
             // One sum for each stage: an addition to one does not wait for that to another.
             let mut sums = [[E::from_f64(0.0); W]; S];
-            if !self.last
-                && let Some(lambda) = columns::<E, W>(self.sum, row, self.column)
+            if !self.is_last
+                && let Some(lambda) = row_chunk::<E, W>(self.sum, row, self.column)
             {
                 sums[0] = *lambda;
             }
             // Entries of algebraic states, and of rows that are not wanted, are passed by.
-            while let Some(of) = variable_at(plan, place)
+            while let Some(of) = variable_of_entry(plan, position)
                 && of < variable
             {
-                place += 1;
+                position += 1;
             }
             // Those are not wanted in later panels either.
-            if row == begin && (self.first || plan.facts().direct && self.inverse.is_some()) {
-                *self.placed = place;
+            if row == begin && (self.is_first || plan.facts().has_direct_rates && self.inverse.is_some()) {
+                *self.skipped_entries = position;
             }
-            while let Some(&index) = plan.structure().by_column.get(place)
+            while let Some(&index) = plan.structure().by_column.get(position)
                 && let Some((equation, of, values)) = plan.entry(self.jacobian, index as usize)
                 && of == variable
             {
-                place += 1;
+                position += 1;
                 if let Some(m) = self.m.get(self.plan.slot(equation)) {
                     for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
                         A::subtract_row(sum, value, m);
@@ -191,13 +191,13 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> Advance<'_, '_, M, E, S,
                 A::subtract_row(panel_row, E::from_f64(-1.0), other);
             }
             let panel_row = *panel_row;
-            self.put(row, &panel_row);
+            self.write_row(row, &panel_row);
             row += 1;
         }
     }
 
     #[inline(always)]
-    fn put(&mut self, row: usize, panel_row: &[E; W]) {
+    fn write_row(&mut self, row: usize, panel_row: &[E; W]) {
         if let Some(to) = self.sum.row_mut(row, self.column).and_then(|to| to.first_chunk_mut()) {
             *to = *panel_row;
         }
@@ -206,22 +206,22 @@ impl<M: Plan, E: Lanes, const S: usize, const W: usize> Advance<'_, '_, M, E, S,
 
 /// The variable that an entry belongs to, in their order by columns.
 #[inline(always)]
-fn variable_at<M: Plan>(plan: M, place: usize) -> Option<usize> {
+fn variable_of_entry<M: Plan>(plan: M, place: usize) -> Option<usize> {
     let &entry = plan.structure().by_column.get(place)?;
     Some(*plan.structure().jacobian.columns.get(entry as usize)? as usize)
 }
 
 /// The variable that a direction is.
 #[inline(always)]
-fn variable_of<M: Plan>(plan: M, direction: usize) -> usize {
+fn variable_of_direction<M: Plan>(plan: M, direction: usize) -> usize {
     let (nx, nz) = (plan.nx(), plan.nz());
     nx + direction + if direction < nx { 0 } else { nz }
 }
 
 /// A few columns of a row.
 #[inline(always)]
-pub(in crate::irk) fn columns<'a, E, const W: usize>(
-    of: &'a Square<'_, E>,
+pub(in crate::irk) fn row_chunk<'a, E, const W: usize>(
+    of: &'a StridedMatrix<'_, E>,
     row: usize,
     column: usize,
 ) -> Option<&'a [E; W]> {
@@ -231,13 +231,13 @@ pub(in crate::irk) fn columns<'a, E, const W: usize>(
 /// `panel_row += G` of a curved variable.
 #[inline(always)]
 pub(in crate::irk) fn add_stages<A: Arithmetic, E: Lanes, const S: usize, const W: usize>(
-    rows: Rows,
+    rows: StageRowLayout,
     panel_row: &mut PanelRow<E, S, W>,
     g: &[[E; W]],
     curved: usize,
 ) {
     for (stage, row) in panel_row.iter_mut().enumerate() {
-        if let Some(g) = g.get(rows.at::<S>(curved, stage)) {
+        if let Some(g) = g.get(rows.row_index::<S>(curved, stage)) {
             A::subtract_row(row, E::from_f64(-1.0), g);
         }
     }

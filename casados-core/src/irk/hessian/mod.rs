@@ -9,10 +9,10 @@
 //! [steps](matrix_adjoint_step) where a model is large. Terms [on the diagonal](diagonal) need
 //! neither. The lower triangle is [written](output) to the matrices of results.
 
+pub(super) mod backward_pass;
 mod diagonal;
 mod matrix_adjoint;
 mod matrix_adjoint_step;
 mod output;
-pub(super) mod pass;
 pub(super) mod products;
 mod sparse_product;

@@ -2,44 +2,44 @@
 //! have any influence, to the matrices of results: those over one part of `w = (x₀, u, p)` have
 //! both triangles, those over two parts lie whole in the one that was found.
 
-use super::products::Square;
+use super::products::StridedMatrix;
 use crate::irk::directions::column_of;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::Dae;
-use crate::plan::{Plan, before};
+use crate::plan::{Plan, count_before};
 use crate::result::Hessian;
 use crate::scalar::Lanes;
 use crate::shape::Matrix;
 use crate::structure::Structure;
 
 /// A lower triangle.
-pub(in crate::irk) struct Triangle<'a, M, E> {
+pub(in crate::irk) struct HessianTriangle<'a, M, E> {
     pub plan: M,
-    pub rows: Square<'a, E>,
+    pub rows: StridedMatrix<'a, E>,
     /// What an integrand adds, over all directions: a lower triangle, too.
-    pub more: Option<&'a [E]>,
+    pub integrand_hessian: Option<&'a [E]>,
 }
 
-impl<M: Plan, E: Lanes> Triangle<'_, M, E> {
+impl<M: Plan, E: Lanes> HessianTriangle<'_, M, E> {
     /// Writes the matrices of a result. Zero if all of them are finite, else NaN.
     pub fn write<D: Dae>(&self, to: &mut Hessian<D, E>) -> E {
-        let total = self.part::<X, X>(to.h_xx.as_mut_slice())
-            + self.part::<U, U>(to.h_uu.as_mut_slice())
-            + self.part::<P, P>(to.h_pp.as_mut_slice())
-            + self.part::<X, U>(to.h_xu.as_mut_slice())
-            + self.part::<X, P>(to.h_xp.as_mut_slice())
-            + self.part::<U, P>(to.h_up.as_mut_slice());
+        let total = self.write_block::<X, X>(to.h_xx.as_mut_slice())
+            + self.write_block::<U, U>(to.h_uu.as_mut_slice())
+            + self.write_block::<P, P>(to.h_pp.as_mut_slice())
+            + self.write_block::<X, U>(to.h_xu.as_mut_slice())
+            + self.write_block::<X, P>(to.h_xp.as_mut_slice())
+            + self.write_block::<U, P>(to.h_up.as_mut_slice());
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * total
     }
 
     /// Its part over the directions of one part of `w` and those of another, which is not before
     /// it; the sum, which is finite only if all of it is.
-    fn part<const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, columns: &mut [E]) -> E {
+    fn write_block<const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, columns: &mut [E]) -> E {
         if columns.is_empty() {
             return E::from_f64(0.0);
         }
-        dispatch(Part::<_, E, OF_ROWS, OF_COLUMNS> { of: self, columns })
+        dispatch(BlockKernel::<_, E, OF_ROWS, OF_COLUMNS> { triangle: self, columns })
     }
 }
 
@@ -49,7 +49,7 @@ const U: usize = 1;
 const P: usize = 2;
 
 /// Where a part of `w` begins.
-const fn begin(structure: &Structure, part: usize) -> usize {
+const fn block_begin(structure: &Structure, part: usize) -> usize {
     match part {
         X => 0,
         U => structure.x.len(),
@@ -59,58 +59,62 @@ const fn begin(structure: &Structure, part: usize) -> usize {
 }
 
 /// The directions of a part that have any influence, as columns of the triangle.
-const fn columns_of(structure: &Structure, part: usize) -> [usize; 2] {
+const fn active_columns(structure: &Structure, part: usize) -> [usize; 2] {
     let directions = structure.directions;
-    [before(directions, begin(structure, part)), before(directions, begin(structure, part + 1))]
+    [
+        count_before(directions, block_begin(structure, part)),
+        count_before(directions, block_begin(structure, part + 1)),
+    ]
 }
 
-/// See [`Triangle::part`].
-struct Part<'a, M, E, const OF_ROWS: usize, const OF_COLUMNS: usize> {
-    of: &'a Triangle<'a, M, E>,
+/// See [`HessianTriangle::part`].
+struct BlockKernel<'a, M, E, const OF_ROWS: usize, const OF_COLUMNS: usize> {
+    triangle: &'a HessianTriangle<'a, M, E>,
     columns: &'a mut [E],
 }
 
 impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
-    for Part<'_, M, E, OF_ROWS, OF_COLUMNS>
+    for BlockKernel<'_, M, E, OF_ROWS, OF_COLUMNS>
 {
     type Number = E;
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { of: Triangle { plan, rows, more }, columns } = self;
+        let Self { triangle: HessianTriangle { plan, rows, integrand_hessian: more }, columns } = self;
         let (zero, structure, nw) = (E::from_f64(0.0), plan.structure(), plan.nw());
-        let (row, column) = (begin(structure, OF_ROWS), begin(structure, OF_COLUMNS));
-        let count_of_rows = begin(structure, OF_ROWS + 1) - row;
-        let all = structure.directions.len() == structure.column_of_direction.len();
+        let (row, column) = (block_begin(structure, OF_ROWS), block_begin(structure, OF_COLUMNS));
+        let count_of_rows = block_begin(structure, OF_ROWS + 1) - row;
+        let all_active = structure.directions.len() == structure.column_of_direction.len();
         // The directions of these rows that have any influence.
         let known = const {
-            match M::KNOWN {
-                Some(structure) => Some(columns_of(structure, OF_ROWS)),
+            match M::KNOWN_STRUCTURE {
+                Some(structure) => Some(active_columns(structure, OF_ROWS)),
                 None => None,
             }
         };
-        let [first, end] = known.unwrap_or_else(|| columns_of(structure, OF_ROWS));
+        let [first, end] = known.unwrap_or_else(|| active_columns(structure, OF_ROWS));
         let directions = structure.directions.get(first..end).unwrap_or_default();
         let mut total = zero;
         for (c, to) in columns.chunks_exact_mut(count_of_rows.max(1)).enumerate() {
-            let of_c = column_of(*plan, column + c).and_then(|c| rows.row(c, first)?.get(..end - first));
-            let of_c = of_c.unwrap_or_default();
+            let column_values =
+                column_of(*plan, column + c).and_then(|c| rows.row(c, first)?.get(..end - first));
+            let column_values = column_values.unwrap_or_default();
             // What is in the triangle.
             let count = if const { OF_ROWS == OF_COLUMNS } { c + 1 } else { count_of_rows };
             let Some(to) = to.get_mut(..count) else { continue };
-            match of_c.get(..count) {
-                Some(of_c) if all => to.copy_from_slice(of_c),
+            match column_values.get(..count) {
+                Some(of_c) if all_active => to.copy_from_slice(of_c),
                 _ => {
                     to.fill(zero);
-                    for (&direction, &value) in directions.iter().zip(of_c) {
+                    for (&direction, &value) in directions.iter().zip(column_values) {
                         if let Some(to) = to.get_mut((direction as usize).wrapping_sub(row)) {
                             *to = value;
                         }
                     }
                 }
             }
-            let of_more = (column + c) * nw + row..(column + c + 1) * nw;
-            if let Some(more) = more.and_then(|more| more.get(of_more)) {
+            let integrand_range = (column + c) * nw + row..(column + c + 1) * nw;
+            if let Some(more) = more.and_then(|more| more.get(integrand_range)) {
                 for (to, &more) in to.iter_mut().zip(more) {
                     *to = *to + more;
                 }
@@ -121,28 +125,28 @@ impl<M: Plan, E: Lanes, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
                 }
             }
         }
-        if const { OF_ROWS == OF_COLUMNS } { mirror::<A, E>(columns, count_of_rows) } else { total }
+        if const { OF_ROWS == OF_COLUMNS } { mirror_triangle::<A, E>(columns, count_of_rows) } else { total }
     }
 }
 
 /// So many rows or columns are exchanged at a time.
-const SQUARE: usize = 4;
+const TRANSPOSE_SIZE: usize = 4;
 
 /// Writes one triangle of a matrix of so many rows, the first elements of its columns, to the other
 /// one; the sum of the former.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn mirror<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
+fn mirror_triangle<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
     let zero = E::from_f64(0.0);
-    let (mut sums, mut begin) = ([zero; SQUARE], 0);
+    let (mut sums, mut begin) = ([zero; TRANSPOSE_SIZE], 0);
     while begin < n {
         let Some((before, own)) = columns.split_at_mut_checked(begin * n) else { break };
-        let count = SQUARE.min(n - begin);
-        if count == SQUARE {
+        let count = TRANSPOSE_SIZE.min(n - begin);
+        if count == TRANSPOSE_SIZE {
             // Those of the columns before, which are whole squares.
-            for (square, to) in before.chunks_exact_mut(SQUARE * n).enumerate() {
-                let mut numbers = [[zero; SQUARE]; SQUARE];
+            for (square, to) in before.chunks_exact_mut(TRANSPOSE_SIZE * n).enumerate() {
+                let mut numbers = [[zero; TRANSPOSE_SIZE]; TRANSPOSE_SIZE];
                 for (numbers, own) in numbers.iter_mut().zip(own.chunks_exact(n)) {
-                    if let Some(own) = own.as_chunks::<SQUARE>().0.get(square) {
+                    if let Some(own) = own.as_chunks::<TRANSPOSE_SIZE>().0.get(square) {
                         *numbers = *own;
                     }
                 }
@@ -150,7 +154,7 @@ fn mirror<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
                     for (sum, &number) in sums.iter_mut().zip(numbers) {
                         *sum = *sum + number;
                     }
-                    if let Some(to) = to.get_mut(begin..begin + SQUARE) {
+                    if let Some(to) = to.get_mut(begin..begin + TRANSPOSE_SIZE) {
                         to.copy_from_slice(numbers);
                     }
                 }
@@ -174,7 +178,7 @@ fn mirror<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
                 }
             }
         }
-        begin += SQUARE;
+        begin += TRANSPOSE_SIZE;
     }
     let [a, b, c, d] = sums;
     (a + b) + (c + d)

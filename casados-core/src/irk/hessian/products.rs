@@ -5,24 +5,24 @@
 //! variables of a stage do: what is multiplied is then in the nearest cache.
 
 use super::sparse_product::multiply;
-use crate::irk::directions::{known_columns, panel, panels};
-use crate::irk::forward::stage_rows::together;
-use crate::linalg::{Arithmetic, Kernel, is_long};
+use crate::irk::directions::{panel, panels, static_columns};
+use crate::irk::forward::stage_sensitivities::stages_adjacent;
+use crate::linalg::{Arithmetic, Kernel, is_large_plan};
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
 /// So many columns of `G` are there at a time: two panels, where registers are enough for their
 /// products, or one and what the adjoint makes of it (`matrix_adjoint`). In firmware memory is
 /// dearer than time.
-pub const COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
+pub const G_COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
 
 /// A matrix over all directions, row after row, whose rows are so far apart.
-pub struct Square<'a, E> {
+pub struct StridedMatrix<'a, E> {
     pub elements: &'a mut [E],
     pub stride: usize,
 }
 
-impl<E> Square<'_, E> {
+impl<E> StridedMatrix<'_, E> {
     /// A row, from a column on.
     #[inline(always)]
     pub fn row(&self, row: usize, column: usize) -> Option<&[E]> {
@@ -38,66 +38,66 @@ impl<E> Square<'_, E> {
 
 /// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
 /// with zero.
-pub struct Subtract<'a, M, E, const S: usize> {
+pub struct CongruenceKernel<'a, M, E, const S: usize> {
     pub plan: M,
     /// Of all directions.
     pub columns: usize,
     pub entries: &'a [[E; S]],
     pub d: &'a [E],
-    pub g: &'a mut [[[E; COLUMNS]; S]],
-    pub sum: Square<'a, E>,
-    pub fresh: bool,
+    pub g: &'a mut [[[E; G_COLUMNS]; S]],
+    pub sum: StridedMatrix<'a, E>,
+    pub from_zero: bool,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Subtract<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for CongruenceKernel<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = is_long::<M, S>() && matches!(known_columns::<M, E>(), Some(8..));
+    const WIDE: bool = is_large_plan::<M, S>() && matches!(static_columns::<M, E>(), Some(8..));
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         let mut start = 0;
-        let columns = match const { known_columns::<M, E>() } {
+        let columns = match const { static_columns::<M, E>() } {
             Some(columns) => columns,
             None => self.columns,
         };
         self.columns = columns;
-        if M::KNOWN.is_some() {
+        if M::KNOWN_STRUCTURE.is_some() {
             self.sum.stride = M::NC;
         }
-        if const { A::WIDE && size_of::<E>() <= 8 && COLUMNS == 16 } {
+        if const { A::WIDE && size_of::<E>() <= 8 && G_COLUMNS == 16 } {
             while start + 16 <= columns {
-                self.panels::<A, 8, 2>(start);
+                self.subtract_panels::<A, 8, 2>(start);
                 start += 16;
             }
         }
-        panels!([known_columns::<M, E>(), columns], E, S, column from start, W => self.panels::<A, W, 1>(column));
+        panels!([static_columns::<M, E>(), columns], E, S, column from start, W => self.subtract_panels::<A, W, 1>(column));
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Subtract<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> CongruenceKernel<'_, M, E, S> {
     /// `P` panels of `W` columns: all stages at a time, or pairs of them.
     #[inline(always)]
-    fn panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
-        if const { together::<M, E, S>() } {
-            self.stages::<A, S, 1, W, P>(0, column);
+    fn subtract_panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
+        if const { stages_adjacent::<M, E, S>() } {
+            self.subtract_stages::<A, S, 1, W, P>(0, column);
             return;
         }
         let mut stage = 0;
         // Rows that go through their columns together fit the registers with pairs of stages, or
         // with wider panels.
         while const { W <= 4 } && stage + 2 <= S {
-            self.stages::<A, 1, 2, W, P>(stage, column);
+            self.subtract_stages::<A, 1, 2, W, P>(stage, column);
             stage += 2;
         }
         while stage < S {
-            self.stages::<A, 1, 1, W, P>(stage, column);
+            self.subtract_stages::<A, 1, 1, W, P>(stage, column);
             stage += 1;
         }
     }
 
     /// `N` groups of `L` stages, which lie together, from a stage on.
     #[inline(always)]
-    fn stages<A: Arithmetic, const L: usize, const N: usize, const W: usize, const P: usize>(
+    fn subtract_stages<A: Arithmetic, const L: usize, const N: usize, const W: usize, const P: usize>(
         &mut self,
         stage: usize,
         column: usize,
@@ -115,41 +115,41 @@ impl<M: Plan, E: Lanes, const S: usize> Subtract<'_, M, E, S> {
             column,
         );
         for group in 0..N {
-            self.tiles::<A, W, P>(group * rows, rows, (stage + group * L) * curved, column);
+            self.subtract_tiles::<A, W, P>(group * rows, rows, (stage + group * L) * curved, column);
         }
     }
 
     /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of
     /// `D` from another one on.
     #[inline(always)]
-    fn tiles<A: Arithmetic, const W: usize, const P: usize>(
+    fn subtract_tiles<A: Arithmetic, const W: usize, const P: usize>(
         &mut self,
-        of_g: usize,
+        g_begin: usize,
         count: usize,
-        of_d: usize,
+        d_begin: usize,
         column: usize,
     ) {
-        let (all, columns) = (self.plan.structure().curved.len() * S, self.columns);
+        let (row_count, columns) = (self.plan.structure().curved.len() * S, self.columns);
         let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
-        panels!([known_columns::<M, E>(), columns], E, S, row, V => {
+        panels!([static_columns::<M, E>(), columns], E, S, row, V => {
             if row >= column {
-                let g = g.get(of_g..of_g + count).unwrap_or_default();
-                let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
-                let (sum, fresh) = (&mut self.sum, self.fresh && of_d == 0);
+                let g = g.get(g_begin..g_begin + count).unwrap_or_default();
+                let d = panel::<E, V>(self.d, row, row_count).get(d_begin..d_begin + count).unwrap_or_default();
+                let (sum, fresh) = (&mut self.sum, self.from_zero && d_begin == 0);
                 if const { size_of::<E>() > 8 && V > 2 && W <= 4 && A::WIDE } {
-                    tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 } {
-                    tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 2 } {
-                    tiles::<A, E, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
                 } else {
-                    tiles::<A, E, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
+                    subtract_panel_tiles::<A, E, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
                 }
             }
         });
@@ -160,7 +160,7 @@ impl<M: Plan, E: Lanes, const S: usize> Subtract<'_, M, E, S> {
 /// tile is in registers while it goes through all variables at all stages, in as many accumulators
 /// as hide how long an addition takes. Above the diagonal it writes what nobody reads.
 #[inline(always)]
-fn tiles<
+fn subtract_panel_tiles<
     A: Arithmetic,
     E: Lanes,
     const V: usize,
@@ -171,8 +171,8 @@ fn tiles<
 >(
     d: &[[E; V]],
     g: &[[[E; W]; P]],
-    sum: &mut Square<'_, E>,
-    fresh: bool,
+    sum: &mut StridedMatrix<'_, E>,
+    from_zero: bool,
     [row, column]: [usize; 2],
 ) {
     for t in 0..V / ROWS {
@@ -201,7 +201,7 @@ fn tiles<
             // In registers: of loops over single elements the compiler makes one over rows, which
             // lie far apart.
             for (columns, tile) in columns.iter_mut().zip(tile) {
-                let mut sum = if fresh { [E::from_f64(0.0); W] } else { *columns };
+                let mut sum = if from_zero { [E::from_f64(0.0); W] } else { *columns };
                 A::subtract_row(&mut sum, E::from_f64(1.0), tile);
                 *columns = sum;
             }
@@ -222,9 +222,9 @@ fn subtract_outer<
     tile: &mut [[[E; W]; P]; ROWS],
     d: &[E; V],
     g: &[[E; W]; P],
-    t: usize,
+    tile_index: usize,
 ) {
-    let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { return };
+    let Some(d) = d.as_chunks::<ROWS>().0.get(tile_index) else { return };
     for (tile, &d) in tile.iter_mut().zip(d) {
         for (tile, g) in tile.iter_mut().zip(g) {
             A::subtract_row(tile, d, g);

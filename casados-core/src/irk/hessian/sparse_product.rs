@@ -2,7 +2,7 @@
 //! columns at a time.
 
 use crate::irk::directions::panel;
-use crate::irk::forward::stage_rows::together;
+use crate::irk::forward::stage_sensitivities::stages_adjacent;
 use crate::linalg::Arithmetic;
 use crate::model::Term;
 use crate::plan::Plan;
@@ -20,7 +20,7 @@ pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Plan, E: Lanes, const S: 
     column: usize,
 ) {
     let g = g.as_chunks_mut::<1>().0;
-    if const { together::<M, E, S>() } {
+    if const { stages_adjacent::<M, E, S>() } {
         multiply::<A, M, E, S, S, 1, W, 1>(plan, entries, d, g.as_chunks_mut().0, 0, column);
         return;
     }
@@ -60,56 +60,56 @@ pub(in crate::irk) fn multiply<
     }
     let mut terms = plan.structure().symmetric;
     while let Some(first) = terms.first() {
-        let of = Multiply { entries, d: &of_d, stage };
+        let product = SparseProduct { entries, d: &of_d, stage };
         terms = match first.rows {
-            3 if const { MOST_ROWS >= 3 } => of.rows::<A, 3>(curved, terms, g),
-            2 if const { MOST_ROWS >= 2 } => of.rows::<A, 2>(curved, terms, g),
-            _ => of.row::<A, 1>(curved, terms, g, 0),
+            3 if const { MOST_ROWS >= 3 } => product.multiply_rows::<A, 3>(curved, terms, g),
+            2 if const { MOST_ROWS >= 2 } => product.multiply_rows::<A, 2>(curved, terms, g),
+            _ => product.multiply_row::<A, 1>(curved, terms, g, 0),
         };
     }
 }
 
 /// See [`multiply`].
-struct Multiply<'a, E, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize> {
+struct SparseProduct<'a, E, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize> {
     entries: &'a [[E; S]],
     d: &'a [[&'a [[[E; W]; L]]; P]; N],
     stage: usize,
 }
 
 impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
-    Multiply<'_, E, S, L, N, W, P>
+    SparseProduct<'_, E, S, L, N, W, P>
 {
     /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied
     /// with is fetched once for all of them, so many columns and stages at a time that it fits
     /// registers beside them; of sixteen registers it seldom does.
     #[inline(always)]
-    fn rows<A: Arithmetic, const R: usize>(
+    fn multiply_rows<A: Arithmetic, const R: usize>(
         &self,
         curved: usize,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
         if const { !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
-            let mut others = terms;
+            let mut remaining_terms = terms;
             for row in 0..R {
-                others = self.row::<A, R>(curved, terms, g, row);
+                remaining_terms = self.multiply_row::<A, R>(curved, terms, g, row);
             }
-            return others;
+            return remaining_terms;
         }
         if const { size_of::<E>() > 8 && W > 4 } {
-            self.in_parts::<A, R, 1, 4>(curved, terms, g)
+            self.rows_in_parts::<A, R, 1, 4>(curved, terms, g)
         } else if const { size_of::<E>() > 8 || A::WIDE && L % 2 == 1 } {
-            self.in_parts::<A, R, 1, W>(curved, terms, g)
+            self.rows_in_parts::<A, R, 1, W>(curved, terms, g)
         } else if const { A::WIDE } {
-            self.in_parts::<A, R, 2, W>(curved, terms, g)
+            self.rows_in_parts::<A, R, 2, W>(curved, terms, g)
         } else {
-            self.in_parts::<A, R, L, W>(curved, terms, g)
+            self.rows_in_parts::<A, R, L, W>(curved, terms, g)
         }
     }
 
     /// One of `R` rows, at all stages.
     #[inline(always)]
-    fn row<A: Arithmetic, const R: usize>(
+    fn multiply_row<A: Arithmetic, const R: usize>(
         &self,
         curved: usize,
         mut terms: &'static [Term],
@@ -118,8 +118,8 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     ) -> &'static [Term] {
         let mut panel_rows = [[[[E::from_f64(0.0); W]; P]; L]; N];
         let Some(&first) = terms.get(row) else { return &[] };
-        while let Some((now, rest)) = terms.split_first_chunk::<R>()
-            && let Some(term) = now.get(row)
+        while let Some((current_terms, rest)) = terms.split_first_chunk::<R>()
+            && let Some(term) = current_terms.get(row)
             && term.row == first.row
         {
             if let Some(values) = self.entries.get(term.entry as usize) {
@@ -129,7 +129,7 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
                         subtract_stages::<A, E, L, W, P>(
                             panel_row,
                             p,
-                            from(values, self.stage + group * L),
+                            values_from(values, self.stage + group * L),
                             d,
                         );
                     }
@@ -147,27 +147,27 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
 
     /// `R` rows, `K` stages and `C` columns at a time.
     #[inline(always)]
-    fn in_parts<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
+    fn rows_in_parts<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
         &self,
         curved: usize,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
-        let mut others = terms;
+        let mut remaining_terms = terms;
         for (group, of_d) in self.d.iter().enumerate() {
             let g = g.get_mut(group * curved..).unwrap_or_default();
             for stage in 0..L / K {
                 for part in 0..W / C {
                     let values = self.stage + group * L + stage * K;
-                    others = self.part::<A, R, K, C>(terms, g, of_d, [stage, part, values]);
+                    remaining_terms = self.rows_of_part::<A, R, K, C>(terms, g, of_d, [stage, part, values]);
                 }
             }
         }
-        others
+        remaining_terms
     }
 
     #[inline(always)]
-    fn part<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
+    fn rows_of_part<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
         &self,
         mut terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
@@ -176,12 +176,12 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     ) -> &'static [Term] {
         let mut panel_rows = [[[[E::from_f64(0.0); C]; P]; K]; R];
         let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
-        while let Some((now, rest)) = terms.split_first_chunk::<R>()
-            && now[0].row == rows[0].row
+        while let Some((current_terms, rest)) = terms.split_first_chunk::<R>()
+            && current_terms[0].row == rows[0].row
         {
             let mut factors = [[[E::from_f64(0.0); C]; P]; K];
             for (p, of_d) in of_d.iter().enumerate() {
-                let Some(d) = of_d.get(now[0].column as usize) else { continue };
+                let Some(d) = of_d.get(current_terms[0].column as usize) else { continue };
                 let Some(d) = d.as_chunks::<K>().0.get(stage) else { continue };
                 for (factors, d) in factors.iter_mut().zip(d) {
                     if let Some(d) = d.as_chunks::<C>().0.get(part) {
@@ -189,10 +189,10 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
                     }
                 }
             }
-            for (term, panel_rows) in now.iter().zip(&mut panel_rows) {
+            for (term, panel_rows) in current_terms.iter().zip(&mut panel_rows) {
                 let Some(values) = self.entries.get(term.entry as usize) else { continue };
                 for ((panel_rows, &value), factors) in
-                    panel_rows.iter_mut().zip(from(values, of_values)).zip(&factors)
+                    panel_rows.iter_mut().zip(values_from(values, of_values)).zip(&factors)
                 {
                     for (panel_row, factors) in panel_rows.iter_mut().zip(factors) {
                         A::subtract_row(panel_row, value, factors);
@@ -237,6 +237,6 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
 
 /// From one of them on.
 #[inline(always)]
-fn from<V>(all: &[V], first: usize) -> &[V] {
+fn values_from<V>(all: &[V], first: usize) -> &[V] {
     all.get(first..).unwrap_or_default()
 }

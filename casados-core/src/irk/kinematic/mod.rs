@@ -13,30 +13,30 @@
 
 mod stages;
 
-pub(super) use stages::derivative;
+pub(super) use stages::kinematic_derivative;
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::Directions;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, PanelRow, Visitor, dispatch, each_row, minus_ha, subtract,
-    subtract_diagonal, subtract_transposed,
+    Arithmetic, Block, Kernel, PanelRow, RowVisitor, Visitor, dispatch, for_each_row, minus_ha,
+    subtract_diagonal, subtract_product, subtract_transposed,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae, Dependent, Kinematic};
-use crate::plan::{self, Facts, Plan, PlanOf, Table};
+use crate::plan::{self, DerivedFacts, Plan, PlanOf, StructureTable};
 use crate::scalar::{Lanes, each};
 use crate::shape::Plain;
 
 /// Whether any state is kinematic.
-pub(super) const fn is_any<M: Dae>() -> bool {
+pub(super) const fn has_kinematic_states<M: Dae>() -> bool {
     !M::STRUCTURE.elimination.kinematic.is_empty()
 }
 
 /// `−c`
 #[inline(always)]
-pub(super) fn minus_c<E: Copy, const S: usize>(of: &Kinematic, jacobian: &[[E; S]]) -> Option<E> {
-    match jacobian.get(of.entry as usize) {
+pub(super) fn minus_c<E: Copy, const S: usize>(kinematic: &Kinematic, jacobian: &[[E; S]]) -> Option<E> {
+    match jacobian.get(kinematic.entry as usize) {
         Some(entry) => entry.first().copied(),
         None => None,
     }
@@ -45,20 +45,20 @@ pub(super) fn minus_c<E: Copy, const S: usize>(of: &Kinematic, jacobian: &[[E; S
 /// An entry by which an equation depends on a kinematic state: its slot, its values, whether it
 /// multiplies the derivative.
 #[inline(always)]
-pub(super) fn dependence<'a, M: Plan, E, const S: usize>(
+pub(super) fn dependent_entry<'a, M: Plan, E, const S: usize>(
     plan: M,
-    of: &Dependent,
+    kinematic: &Dependent,
     jacobian: &'a [[E; S]],
 ) -> Option<(usize, &'a [E; S], bool)> {
-    let index = of.entry as usize;
+    let index = kinematic.entry as usize;
     let (row, _, values) = plan.entry(jacobian, index)?;
     Some((plan.slot(row), values, index < plan.structure().blocks[1]))
 }
 
 /// Whether no [unknown](crate::plan::Facts::unknowns) is known to be kinematic.
-pub(super) const fn are_together<M: Plan>() -> bool {
-    let Some(structure) = M::KNOWN else { return false };
-    let (mut index, end) = Facts::of(structure).unknowns;
+pub(super) const fn has_no_kinematic_unknowns<M: Plan>() -> bool {
+    let Some(structure) = M::KNOWN_STRUCTURE else { return false };
+    let (mut index, end) = DerivedFacts::of(structure).non_kinematic_range;
     while index < end {
         if plan::kinematic(structure, index).is_some() {
             return false;
@@ -75,14 +75,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
         (coefficients, h): (&Coefficients<E, S>, E),
         b: &mut ArrayK<M, PanelRow<E, S, W>>,
     ) {
-        if const { !is_any::<M>() } {
+        if const { !has_kinematic_states::<M>() } {
             return self.factors.solve(b);
         }
         let (plan, a) = (F::plan::<M>(), &coefficients.a);
         let jacobian = F::Plan::<M>::jacobian(&self.jacobian);
-        dispatch(Around::<_, E, S, W, ELIMINATE> { plan, jacobian, a, h, rows: b.as_mut() });
+        dispatch(CondensationKernel::<_, E, S, W, ELIMINATE> { plan, jacobian, a, h, rows: b.as_mut() });
         self.factors.solve(b);
-        dispatch(Around::<_, E, S, W, RECONSTRUCT> { plan, jacobian, a, h, rows: b.as_mut() });
+        dispatch(CondensationKernel::<_, E, S, W, RECONSTRUCT> { plan, jacobian, a, h, rows: b.as_mut() });
     }
 
     /// Solves `Jᵀ X = B` for all equations in place; the solution has them in their slots.
@@ -91,14 +91,26 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
         (coefficients, h): (&Coefficients<E, S>, E),
         b: &mut ArrayK<M, PanelRow<E, S, W>>,
     ) {
-        if const { !is_any::<M>() } {
+        if const { !has_kinematic_states::<M>() } {
             return self.factors.solve_transposed(b);
         }
         let (plan, a) = (F::plan::<M>(), &coefficients.a);
         let jacobian = F::Plan::<M>::jacobian(&self.jacobian);
-        dispatch(Around::<_, E, S, W, CONDENSE_TRANSPOSED> { plan, jacobian, a, h, rows: b.as_mut() });
+        dispatch(CondensationKernel::<_, E, S, W, CONDENSE_TRANSPOSED> {
+            plan,
+            jacobian,
+            a,
+            h,
+            rows: b.as_mut(),
+        });
         self.factors.solve_transposed(b);
-        dispatch(Around::<_, E, S, W, RECONSTRUCT_TRANSPOSED> { plan, jacobian, a, h, rows: b.as_mut() });
+        dispatch(CondensationKernel::<_, E, S, W, RECONSTRUCT_TRANSPOSED> {
+            plan,
+            jacobian,
+            a,
+            h,
+            rows: b.as_mut(),
+        });
     }
 }
 
@@ -109,7 +121,7 @@ const RECONSTRUCT: u8 = 1;
 pub(super) const CONDENSE_TRANSPOSED: u8 = 2;
 pub(super) const RECONSTRUCT_TRANSPOSED: u8 = 3;
 
-struct Around<'a, M: Plan, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
+struct CondensationKernel<'a, M: Plan, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
     plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
@@ -118,20 +130,27 @@ struct Around<'a, M: Plan, E: Plain, const S: usize, const W: usize, const WHAT:
 }
 
 impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
-    for Around<'_, M, E, S, W, WHAT>
+    for CondensationKernel<'_, M, E, S, W, WHAT>
 {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { plan, jacobian, a, h, rows } = self;
-        around::<A, M, E, S, W, WHAT>(plan, jacobian.as_ref(), &minus_ha(a, h), rows);
+        condense::<A, M, E, S, W, WHAT>(plan, jacobian.as_ref(), &minus_ha(a, h), rows);
     }
 }
 
 /// The same inside of a kernel.
 #[inline(always)]
-pub(super) fn around<A: Arithmetic, M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8>(
+pub(super) fn condense<
+    A: Arithmetic,
+    M: Plan,
+    E: Lanes,
+    const S: usize,
+    const W: usize,
+    const OPERATION: u8,
+>(
     plan: M,
     jacobian: &[[E; S]],
     minus_ha: &Block<E, S>,
@@ -141,15 +160,15 @@ pub(super) fn around<A: Arithmetic, M: Plan, E: Lanes, const S: usize, const W: 
         return;
     }
     let (minus_ha, sum) = (*minus_ha, [[E::from_f64(0.0); W]; S]);
-    let mut rows = Rows::<M, E, S, W, WHAT> { plan, jacobian, minus_ha, rows, sum };
-    if const { WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED } {
-        each_row::<A, _>(&mut AtDependent(rows));
+    let mut rows = VelocityRows::<M, E, S, W, OPERATION> { plan, jacobian, minus_ha, rows, sum };
+    if const { OPERATION == ELIMINATE || OPERATION == RECONSTRUCT_TRANSPOSED } {
+        for_each_row::<A, _>(&mut DependentRows(rows));
     } else {
-        each_row::<A, _>(&mut rows);
+        for_each_row::<A, _>(&mut rows);
     }
 }
 
-struct Rows<'a, M, E, const S: usize, const W: usize, const WHAT: u8> {
+struct VelocityRows<'a, M, E, const S: usize, const W: usize, const WHAT: u8> {
     plan: M,
     jacobian: &'a [[E; S]],
     minus_ha: Block<E, S>,
@@ -159,80 +178,86 @@ struct Rows<'a, M, E, const S: usize, const W: usize, const WHAT: u8> {
 }
 
 /// About how many instructions a product with `hA` takes.
-const fn product<E>(stages: usize, width: usize) -> usize {
+const fn product_instructions<E>(stages: usize, width: usize) -> usize {
     if size_of::<E>() > 8 { stages * stages * width } else { stages * stages * width.div_ceil(4) }
 }
 
 /// Between a kinematic state and its velocity.
-impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for Rows<'_, M, E, S, W, WHAT> {
-    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisitor
+    for VelocityRows<'_, M, E, S, W, WHAT>
+{
+    const ROWS: Option<usize> = StructureTable::Kinematic.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Kinematic.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Kinematic.row_count(self.plan.structure())
     }
-    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
+    const INSTRUCTIONS: usize = 2 + product_instructions::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Self { plan, jacobian, minus_ha, rows, .. } = self;
-        let Some(of) = plan.kinematic(state) else { return };
-        let (Some(velocity), Some(minus_c)) = (plan.velocity(of), minus_c(of, jacobian)) else { return };
+        let Some(kinematic) = plan.kinematic(state) else { return };
+        let (Some(velocity), Some(minus_c)) = (plan.velocity(kinematic), minus_c(kinematic, jacobian)) else {
+            return;
+        };
         let (from, to) = if const { WHAT == RECONSTRUCT } { (velocity, state) } else { (state, velocity) };
         let Some(from) = rows.get(from) else { return };
-        let mut moved = [[E::from_f64(0.0); W]; S];
+        let mut product = [[E::from_f64(0.0); W]; S];
         if const { WHAT == RECONSTRUCT } {
-            subtract::<A, E, S, W>(&mut moved, minus_ha, from);
+            subtract_product::<A, E, S, W>(&mut product, minus_ha, from);
         } else {
-            subtract_transposed::<A, E, S, W>(&mut moved, minus_ha, from);
+            subtract_transposed::<A, E, S, W>(&mut product, minus_ha, from);
         }
         if let Some(to) = rows.get_mut(to) {
-            subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &moved);
+            subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &product);
         }
     }
 }
 
 /// Between a kinematic state and the equations that depend on it.
-struct AtDependent<'a, M, E, const S: usize, const W: usize, const WHAT: u8>(Rows<'a, M, E, S, W, WHAT>);
+struct DependentRows<'a, M, E, const S: usize, const W: usize, const WHAT: u8>(
+    VelocityRows<'a, M, E, S, W, WHAT>,
+);
 
-impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
-    for AtDependent<'_, M, E, S, W, WHAT>
+impl<M: Plan, E: Lanes, const S: usize, const W: usize, const WHAT: u8> RowVisitor
+    for DependentRows<'_, M, E, S, W, WHAT>
 {
-    const ROWS: Option<usize> = Table::Dependents.known::<M>();
+    const ROWS: Option<usize> = StructureTable::Dependents.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Dependents.of(self.0.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Dependents.row_count(self.0.plan.structure())
     }
-    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
+    const INSTRUCTIONS: usize = 2 + product_instructions::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, index: usize) {
-        let Rows { plan, jacobian, minus_ha, rows, sum } = &mut self.0;
-        let Some(of) = plan.structure().elimination.dependents.get(index) else { return };
-        let Some((slot, values, derivative)) = dependence(*plan, of, jacobian) else { return };
-        let (Some(&own), Some(&row)) = (rows.get(of.state as usize), rows.get(slot)) else { return };
-        let (mut own, mut row) = (own, row);
-        if of.first {
+        let VelocityRows { plan, jacobian, minus_ha, rows, sum } = &mut self.0;
+        let Some(kinematic) = plan.structure().elimination.dependents.get(index) else { return };
+        let Some((slot, values, derivative)) = dependent_entry(*plan, kinematic, jacobian) else { return };
+        let (Some(&own), Some(&row)) = (rows.get(kinematic.state as usize), rows.get(slot)) else { return };
+        let (mut own_row, mut row) = (own, row);
+        if kinematic.first {
             *sum = [[E::from_f64(0.0); W]; S];
         }
         if const { WHAT == ELIMINATE } {
-            if of.first {
-                subtract::<A, E, S, W>(sum, minus_ha, &own);
+            if kinematic.first {
+                subtract_product::<A, E, S, W>(sum, minus_ha, &own_row);
             }
-            subtract_diagonal::<A, E, S, W>(&mut row, values, if derivative { &own } else { sum });
+            subtract_diagonal::<A, E, S, W>(&mut row, values, if derivative { &own_row } else { sum });
             if let Some(to) = rows.get_mut(slot) {
                 *to = row;
             }
             return;
         }
         if derivative {
-            subtract_diagonal::<A, E, S, W>(&mut own, values, &row);
+            subtract_diagonal::<A, E, S, W>(&mut own_row, values, &row);
         } else {
             subtract_diagonal::<A, E, S, W>(sum, values, &row);
         }
-        if of.last {
+        if kinematic.last {
             // `own + (hA)ᵀ sum`
-            subtract_transposed::<A, E, S, W>(&mut own, minus_ha, sum);
+            subtract_transposed::<A, E, S, W>(&mut own_row, minus_ha, sum);
         }
-        if let (true, Some(to)) = (derivative || of.last, rows.get_mut(of.state as usize)) {
-            *to = own;
+        if let (true, Some(to)) = (derivative || kinematic.last, rows.get_mut(kinematic.state as usize)) {
+            *to = own_row;
         }
     }
 }
@@ -251,18 +276,18 @@ pub(super) struct KinematicPanel<'a, M, E, D, const S: usize, const W: usize> {
 impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> KinematicPanel<'_, M, E, D, S, W> {
     /// `c V_v`
     #[inline(always)]
-    pub fn own<A: Arithmetic>(&self, of: &Kinematic) -> [E; W] {
+    pub fn velocity_directions<A: Arithmetic>(&self, kinematic: &Kinematic) -> [E; W] {
         let mut row = [E::from_f64(0.0); W];
-        let Some(minus_c) = minus_c(of, self.jacobian) else { return row };
-        match self.plan.velocity(of) {
+        let Some(minus_c) = minus_c(kinematic, self.jacobian) else { return row };
+        match self.plan.velocity(kinematic) {
             Some(velocity) => {
                 if let Some(v) = self.v.get(velocity) {
                     A::subtract_row(&mut row, minus_c, v);
                 }
             }
             None => {
-                let input = of.velocity as usize - self.plan.nk();
-                self.directions.add(input, -minus_c, self.column, &mut row);
+                let input = kinematic.velocity as usize - self.plan.nk();
+                self.directions.add_scaled(input, -minus_c, self.column, &mut row);
             }
         }
         row
@@ -270,10 +295,12 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
 
     /// Writes `V_q + h c_i c V_v`, what entries of `f_q` multiply, to the rows of the states.
     #[inline(always)]
-    pub fn place<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [PanelRow<E, S, W>]) {
-        for state in 0..Table::Kinematic.of(self.plan.structure()) {
-            let Some(of) = self.plan.kinematic(state) else { continue };
-            let (own, Some(v), Some(to)) = (self.own::<A>(of), self.v.get(state), rows.get_mut(state)) else {
+    pub fn write_states<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [PanelRow<E, S, W>]) {
+        for state in 0..StructureTable::Kinematic.row_count(self.plan.structure()) {
+            let Some(kinematic) = self.plan.kinematic(state) else { continue };
+            let (own, Some(v), Some(to)) =
+                (self.velocity_directions::<A>(kinematic), self.v.get(state), rows.get_mut(state))
+            else {
                 continue;
             };
             for (to, &node) in to.iter_mut().zip(nodes) {
@@ -286,17 +313,17 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
 
     /// Subtracts `f_q̇ c V_v` from the equations that depend on derivatives.
     #[inline(always)]
-    pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [PanelRow<E, S, W>]) {
+    pub fn subtract_derivative_terms<A: Arithmetic>(&self, rows: &mut [PanelRow<E, S, W>]) {
         if const { !depend_on_derivatives::<M>() } {
             return;
         }
         for dependent in self.plan.structure().elimination.dependents {
             let of = self.plan.kinematic(dependent.state as usize);
             if let (Some(of), Some((slot, values, true))) =
-                (of, dependence(self.plan, dependent, self.jacobian))
+                (of, dependent_entry(self.plan, dependent, self.jacobian))
                 && let Some(row) = rows.get_mut(slot)
             {
-                let own = self.own::<A>(of);
+                let own = self.velocity_directions::<A>(of);
                 subtract_diagonal::<A, E, S, W>(row, values, &[own; S]);
             }
         }
@@ -310,43 +337,43 @@ impl<M: Plan, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Kinema
         rows: &mut [PanelRow<E, S, W>],
         visitor: &mut impl Visitor<E, S, W>,
     ) {
-        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, visitor });
+        for_each_row::<A, _>(&mut ReconstructPanel { panel: self, minus_ha, rows, visitor });
     }
 }
 
 /// See [`KinematicPanel::reconstruct`].
-struct Reconstruct<'a, 'b, M, E, D, V, const S: usize, const W: usize> {
-    of: &'b KinematicPanel<'a, M, E, D, S, W>,
+struct ReconstructPanel<'a, 'b, M, E, D, V, const S: usize, const W: usize> {
+    panel: &'b KinematicPanel<'a, M, E, D, S, W>,
     minus_ha: &'b Block<E, S>,
     rows: &'b mut [PanelRow<E, S, W>],
     visitor: &'b mut V,
 }
 
-impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, const W: usize> AtRow
-    for Reconstruct<'_, '_, M, E, D, V, S, W>
+impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, const W: usize> RowVisitor
+    for ReconstructPanel<'_, '_, M, E, D, V, S, W>
 {
-    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+    const ROWS: Option<usize> = StructureTable::Kinematic.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Kinematic.of(self.of.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Kinematic.row_count(self.panel.plan.structure())
     }
-    const INSTRUCTIONS: usize = 4 + product::<E>(S, W);
+    const INSTRUCTIONS: usize = 4 + product_instructions::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Self { of: forward, minus_ha, rows, visitor } = self;
-        let Some(of) = forward.plan.kinematic(state) else { return };
+        let Self { panel: forward, minus_ha, rows, visitor } = self;
+        let Some(kinematic) = forward.plan.kinematic(state) else { return };
         let mut panel_row = [[E::from_f64(0.0); W]; S];
-        match (forward.plan.velocity(of), minus_c(of, forward.jacobian)) {
+        match (forward.plan.velocity(kinematic), minus_c(kinematic, forward.jacobian)) {
             (Some(velocity), Some(minus_c)) => {
                 if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity)) {
                     panel_row = [*v; S];
-                    subtract::<A, E, S, W>(&mut panel_row, minus_ha, dk);
+                    subtract_product::<A, E, S, W>(&mut panel_row, minus_ha, dk);
                 }
                 each!(i < S => {
                     each!(w < W => { panel_row[i][w] = -(minus_c * panel_row[i][w]); });
                 });
             }
-            _ => panel_row = [forward.own::<A>(of); S],
+            _ => panel_row = [forward.velocity_directions::<A>(kinematic); S],
         }
         if let Some(row) = rows.get_mut(state) {
             *row = panel_row;
@@ -357,7 +384,7 @@ impl<M: Plan, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, c
 
 /// Whether an equation may depend on the derivative of a kinematic state that is not its own.
 const fn depend_on_derivatives<M: Plan>() -> bool {
-    let Some(structure) = M::KNOWN else { return true };
+    let Some(structure) = M::KNOWN_STRUCTURE else { return true };
     let (dependents, mut index) = (structure.elimination.dependents, 0);
     while index < dependents.len() {
         if (dependents[index].entry as usize) < structure.blocks[1] {

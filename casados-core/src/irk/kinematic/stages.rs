@@ -1,28 +1,28 @@
 //! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
 
-use super::{is_any, minus_c};
+use super::{has_kinematic_states, minus_c};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::nodes;
 use crate::irk::coefficients::stage_values;
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::linalg::{kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Writes `k_q`.
-    pub(in crate::irk) fn reconstruct(
+    pub(in crate::irk) fn reconstruct_kinematic(
         &mut self,
         coefficients: &Coefficients<E, S>,
         x: &ArrayX<M, E>,
         y: &mut ArrayK<M, [E; S]>,
     ) {
-        if const { !is_any::<M>() } {
+        if const { !has_kinematic_states::<M>() } {
             return;
         }
-        let Self { linear, points, compensation, inputs, .. } = self;
+        let Self { linearization: linear, points, compensation, inputs, .. } = self;
         let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
         let (points, y) = (F::Plan::<M>::v_mut(points), F::Plan::<M>::k_mut(y));
         let x = [F::Plan::<M>::x(x), F::Plan::<M>::x(compensation)];
@@ -32,21 +32,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is
     /// evaluated there once; what is missing is [eliminated](Self::eliminate_missing) then. Where
     /// stages are evaluated side by side that spares nothing, and of two stages little.
-    pub(in crate::irk) fn is_missing(&mut self, jacobian: bool) -> bool {
-        if const { !is_any::<M>() } {
+    pub(in crate::irk) fn omits_kinematic(&mut self, jacobian: bool) -> bool {
+        if const { !has_kinematic_states::<M>() } {
             return false;
         }
-        self.alike &= jacobian && E::LANES > 1 && S > 2;
-        self.alike
+        self.identical_stages &= jacobian && E::LANES > 1 && S > 2;
+        self.identical_stages
     }
 
     /// The residual as it would be with `k_q`, by a Jacobian that all stages share as they share
     /// the point where it is: what `k_q` adds to `x` differs between them only by the nodes.
-    pub(in crate::irk) fn eliminate_missing(&mut self, coefficients: &Coefficients<E, S>) {
-        if const { !is_any::<M>() } {
+    pub(in crate::irk) fn eliminate_omitted(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { !has_kinematic_states::<M>() } {
             return;
         }
-        let Self { f, points, linear, inputs, .. } = self;
+        let Self { f, points, linearization: linear, inputs, .. } = self;
         let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
         let (points, f) = (F::Plan::<M>::v_mut(points), F::Plan::<M>::k_mut(f));
         eliminate_missing(F::plan::<M>(), jacobian, points, f, a, h);
@@ -55,20 +55,20 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
     /// digit.
     pub(in crate::irk) fn reconstruct_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
-        if const { !is_any::<M>() } {
+        if const { !has_kinematic_states::<M>() } {
             return;
         }
-        let jacobian = F::Plan::<M>::jacobian(&self.linear.jacobian);
+        let jacobian = F::Plan::<M>::jacobian(&self.linearization.jacobian);
         let (points, y) = (F::Plan::<M>::v_mut(&mut self.points), F::Plan::<M>::k_mut(y));
         reconstruct_compensated(F::plan::<M>(), jacobian, points, y);
     }
 
     /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
-    pub(in crate::irk) fn eliminate_rounded(&mut self, coefficients: &Coefficients<E, S>) {
-        if const { !is_any::<M>() } {
+    pub(in crate::irk) fn eliminate_rounding(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { !has_kinematic_states::<M>() } {
             return;
         }
-        let Self { f, linear, inputs, .. } = self;
+        let Self { f, linearization: linear, inputs, .. } = self;
         let (jacobian, a, h) = (F::Plan::<M>::jacobian(&linear.jacobian), &coefficients.a, inputs.time.step);
         eliminate_rounded(F::plan::<M>(), jacobian, F::Plan::<M>::k_mut(f), a, h);
     }
@@ -76,14 +76,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
 /// `k_q` at the stages, from `v` at these points.
 #[inline(always)]
-pub(in crate::irk) fn derivative<M: Plan, E: Lanes, const S: usize>(
+pub(in crate::irk) fn kinematic_derivative<M: Plan, E: Lanes, const S: usize>(
     plan: M,
     state: usize,
     jacobian: &[[E; S]],
     points: &[[E; S]],
 ) -> Option<[E; S]> {
-    let of = plan.kinematic(state)?;
-    let (mut k, minus_c) = (*points.get(of.velocity as usize)?, minus_c(of, jacobian)?);
+    let kinematic = plan.kinematic(state)?;
+    let (mut k, minus_c) = (*points.get(kinematic.velocity as usize)?, minus_c(kinematic, jacobian)?);
     for k in &mut k {
         *k = -(minus_c * *k);
     }
@@ -104,9 +104,9 @@ kernels! {
         let ([x, rest], y, points) = (x.map(|x| x.as_ref()), y.as_mut(), points.as_mut());
         let jacobian = jacobian.as_ref();
         let minus_ha = minus_ha(a, h);
-        for state in 0..Table::Kinematic.of(plan.structure()) {
-            let Some(of) = plan.kinematic(state) else { continue };
-            if let Some(v) = plan.velocity(of)
+        for state in 0..StructureTable::Kinematic.row_count(plan.structure()) {
+            let Some(kinematic) = plan.kinematic(state) else { continue };
+            if let Some(v) = plan.velocity(kinematic)
                 && let (Some(&x), Some(&rest), Some(k)) =
                     (x.get(v), rest.get(v), y.get(v))
                 && let Some(xi) = points.get_mut(plan.nx() + v)
@@ -116,7 +116,7 @@ kernels! {
                     *xi = *xi + x;
                 }
             }
-            if let (Some(y), Some(k)) = (y.get_mut(state), derivative(plan, state, jacobian, points)) {
+            if let (Some(y), Some(k)) = (y.get_mut(state), kinematic_derivative(plan, state, jacobian, points)) {
                 *y = k;
             }
         }
@@ -133,26 +133,26 @@ kernels! {
     ) {
         let (nodes, points, f, jacobian) = (nodes(a, h), points.as_mut(), f.as_mut(), jacobian.as_ref());
         for dependent in plan.structure().elimination.dependents {
-            let of = plan.kinematic(dependent.state as usize);
-            let missing = of.and_then(|of| f.get(of.equation as usize)).map(|own| own[0]);
-            let (Some(missing), Some((row, _, values))) =
-                (missing, plan.entry(jacobian, dependent.entry as usize))
+            let kinematic = plan.kinematic(dependent.state as usize);
+            let omitted = kinematic.and_then(|of| f.get(of.equation as usize)).map(|own| own[0]);
+            let (Some(omitted), Some((row, _, values))) =
+                (omitted, plan.entry(jacobian, dependent.entry as usize))
             else {
                 continue;
             };
             let Some(f) = f.get_mut(row) else { continue };
-            let share = values[0] * missing;
+            let product = values[0] * omitted;
             for (f, &node) in f.iter_mut().zip(&nodes) {
                 let derivative = (dependent.entry as usize) < plan.structure().blocks[1];
-                *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
+                *f = A::subtract(*f, product, if derivative { E::from_f64(1.0) } else { node });
             }
         }
-        for state in 0..Table::Kinematic.of(plan.structure()) {
-            let Some(of) = plan.kinematic(state) else { continue };
-            let Some(own) = f.get_mut(of.equation as usize) else { continue };
-            let missing = core::mem::replace(own, [E::from_f64(0.0); S])[0];
+        for state in 0..StructureTable::Kinematic.row_count(plan.structure()) {
+            let Some(kinematic) = plan.kinematic(state) else { continue };
+            let Some(own) = f.get_mut(kinematic.equation as usize) else { continue };
+            let omitted = core::mem::replace(own, [E::from_f64(0.0); S])[0];
             for k in points.get_mut(state).into_iter().flatten() {
-                *k = *k - missing;
+                *k = *k - omitted;
             }
         }
     }
@@ -165,8 +165,8 @@ kernels! {
         y: &'k mut M::K<[E; S]>,
     ) {
         let (points, y, jacobian) = (points.as_mut(), y.as_mut(), jacobian.as_ref());
-        for state in 0..Table::Kinematic.of(plan.structure()) {
-            let k = derivative(plan, state, jacobian, points);
+        for state in 0..StructureTable::Kinematic.row_count(plan.structure()) {
+            let k = kinematic_derivative(plan, state, jacobian, points);
             if let (Some(k), Some(point), Some(y)) =
                 (k, points.get_mut(state), y.get_mut(state))
             {
@@ -185,8 +185,8 @@ kernels! {
     ) {
         let (minus_ha, f, jacobian) = (minus_ha(a, h), f.as_mut(), jacobian.as_ref());
         for dependent in plan.structure().elimination.dependents {
-            let of = plan.kinematic(dependent.state as usize);
-            let residual = of.and_then(|of| f.get(of.equation as usize)).copied();
+            let kinematic = plan.kinematic(dependent.state as usize);
+            let residual = kinematic.and_then(|of| f.get(of.equation as usize)).copied();
             let (Some(mut residual), Some((row, _, values))) =
                 (residual, plan.entry(jacobian, dependent.entry as usize))
             else {

@@ -15,7 +15,7 @@
 use crate::error::{Error, Place, Quantity};
 use crate::finite::find_non_finite;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::linalg::slot;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
@@ -25,12 +25,12 @@ use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
 /// Residuals below this many ε of their terms are rounding errors.
-const ROUNDING: f64 = 4.0;
+const RESIDUAL_ROUNDING: f64 = 4.0;
 /// Residuals that no longer shrink are rounding errors of the model below this many ε of their
 /// terms.
-const NOISE: f64 = 256.0;
+const STAGNATED_RESIDUAL: f64 = 256.0;
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Solves the stages of a step from the start values in `y`.
     ///
     /// # Errors
@@ -44,19 +44,20 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         y: &mut ArrayK<M, [T; S]>,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
-        let (rounding, noise) = (T::from_f64(T::EPSILON * ROUNDING), T::from_f64(T::EPSILON * NOISE));
+        let (rounding, noise) =
+            (T::from_f64(T::EPSILON * RESIDUAL_ROUNDING), T::from_f64(T::EPSILON * STAGNATED_RESIDUAL));
         let tolerance = T::from_f64(options.tolerance).max(rounding);
         let mut frozen = options.jacobian == Jacobian::Frozen;
-        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
-        let test = options.fixed_iterations.is_none();
-        let mut last = Increment { size: T::ZERO, unknown: 0 };
-        let mut before = T::ZERO;
+        let max_iterations = options.fixed_iterations.unwrap_or(options.max_iterations);
+        let tests_convergence = options.fixed_iterations.is_none();
+        let mut last_increment = Increment { size: T::ZERO, unknown: 0 };
+        let mut last_residual = T::ZERO;
         let mut iteration = 0;
         self.validity.factors = false;
         loop {
-            self.place(coefficients, step, x, y);
-            let current = !frozen || iteration == 0;
-            if current {
+            self.place_stages(coefficients, step, x, y);
+            let evaluates_jacobian = !frozen || iteration == 0;
+            if evaluates_jacobian {
                 statistics.jacobians += 1;
                 self.evaluate_jacobian();
             } else {
@@ -64,51 +65,57 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 self.evaluate_residual();
             }
             self.check_model(step, iteration)?;
-            if test {
+            if tests_convergence {
                 let (residual, equation, stage) = self.relative_residual();
-                let stuck = iteration > 1 && residual >= before;
-                before = residual;
+                let stagnates = iteration > 1 && residual >= last_residual;
+                last_residual = residual;
                 // Start values that happen to be good are not yet as good as what one iteration
                 // makes of them.
-                if iteration > 0 && residual <= rounding || stuck && residual <= noise {
+                if iteration > 0 && residual <= rounding || stagnates && residual <= noise {
                     return Ok(());
                 }
-                if iteration == most {
+                if iteration == max_iterations {
                     return Err(Error::NotConverged {
                         residual: residual.to_f64(),
                         equation,
-                        unknown: unknown_name::<M>(last.unknown),
-                        increment: last.size.to_f64(),
+                        unknown: unknown_name::<M>(last_increment.unknown),
+                        increment: last_increment.size.to_f64(),
                         at: Place { step, stage, iteration },
                         started: None,
                     });
                 }
             }
-            if current {
+            if evaluates_jacobian {
                 self.factor_dense(coefficients, step, iteration, statistics)?;
             }
             self.solve_dense(coefficients);
-            let increment = self.update(y);
+            let increment = self.subtract_dense_increment(y);
             iteration += 1;
             statistics.iterations += 1;
             // The first Jacobian does as long as increments shrink to half; one that is no smaller
             // than the last one is not made.
-            let noise = increment.size <= T::from_f64(T::STAGNATION);
-            if test && !current && !noise && increment.size + increment.size >= last.size {
+            let is_rounding = increment.size <= T::from_f64(T::STAGNATION);
+            if tests_convergence
+                && !evaluates_jacobian
+                && !is_rounding
+                && increment.size + increment.size >= last_increment.size
+            {
                 frozen = false;
-                if increment.size >= last.size {
-                    self.take_back(y);
+                if increment.size >= last_increment.size {
+                    self.undo_increment(y);
                     continue;
                 }
             }
             if !increment.size.is_finite() {
                 return Err(Error::Overflow { step, index: increment.unknown });
             }
-            let settled = || iteration > 1 && is_settled(increment.size, last.size, tolerance);
-            if test && (settled() || increment.size == T::ZERO) || !test && iteration == most {
+            let converged = || iteration > 1 && has_converged(increment.size, last_increment.size, tolerance);
+            if tests_convergence && (converged() || increment.size == T::ZERO)
+                || !tests_convergence && iteration == max_iterations
+            {
                 return Ok(());
             }
-            last = increment;
+            last_increment = increment;
         }
     }
 
@@ -126,22 +133,22 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         let h = self.inputs.time.step;
         statistics.factorizations += 1;
         statistics.dense += usize::from(M::STRUCTURE.elimination.has_plan());
-        self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(|missing| {
-            match missing {
+        self.linearization.factors.factor_dense(&self.linearization.jacobian, &coefficients.a, h).map_err(
+            |singular| match singular {
                 Some((unknown, stage)) => Error::Singular {
                     unknown: unknown_name::<M>(unknown),
                     at: Place { step, stage, iteration },
                 },
                 None => Error::NotPivoted { step },
-            }
-        })
+            },
+        )
     }
 
     /// # Errors
     /// The first value of the model that is not finite: of the residual, which says more, or of the
     /// Jacobian.
     pub(crate) fn check_model(&self, step: usize, iteration: usize) -> Result<(), Error> {
-        let (f, jacobian) = (self.f.as_ref(), self.linear.jacobian.as_ref());
+        let (f, jacobian) = (self.f.as_ref(), self.linearization.jacobian.as_ref());
         let error = |quantity, equation, stage, value| Error::NonFiniteModel {
             quantity,
             equation,
@@ -163,7 +170,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     pub(crate) fn relative_residual(&self) -> (T, usize, usize) {
         let mut magnitude: ArrayK<M, [T; S]> = Zeroable::zeroed();
         let Pattern { rows, columns } = M::STRUCTURE.jacobian;
-        for ((row, column), entry) in rows.iter().zip(columns).zip(self.linear.jacobian.as_ref()) {
+        for ((row, column), entry) in rows.iter().zip(columns).zip(self.linearization.jacobian.as_ref()) {
             let (magnitude, points) = (magnitude.as_mut(), self.points.as_ref());
             let (Some(magnitude), Some(point)) =
                 (magnitude.get_mut(*row as usize), points.get(*column as usize))
@@ -196,7 +203,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 
     /// `y ← y − Δ`; the largest increment relative to the unknown, of which the largest stage
     /// counts.
-    fn update(&self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
+    fn subtract_dense_increment(&self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
         let mut largest = Increment { size: T::ZERO, unknown: 0 };
         for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.increment.as_ref()).enumerate() {
             let (mut size, mut change) = (T::ZERO, T::ZERO);
@@ -230,11 +237,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 }
             }
         }
-        self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);
+        self.linearization.solve((coefficients, self.inputs.time.step), &mut self.increment);
     }
 
     /// `y ← y + Δ`
-    fn take_back(&self, y: &mut ArrayK<M, [T; S]>) {
+    fn undo_increment(&self, y: &mut ArrayK<M, [T; S]>) {
         for (y, delta) in y.as_mut().iter_mut().zip(self.increment.as_ref()) {
             for (y, [delta]) in y.iter_mut().zip(delta) {
                 *y = *y + *delta;
@@ -244,13 +251,13 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 }
 
 /// Whether the increment that comes next is small enough, by how the last two shrank.
-fn is_settled<T: Real>(size: T, last: T, tolerance: T) -> bool {
+fn has_converged<T: Real>(size: T, last: T, tolerance: T) -> bool {
     let rate = size / last;
     // With the current Jacobian it will be less, but how much less differs from unknown to unknown.
-    let next = rate / (T::ONE - rate) * size;
+    let expected_next = rate / (T::ONE - rate) * size;
     // A rate near one says nothing about the next increment.
-    let shrinks = rate + rate < T::ONE;
-    shrinks && next <= tolerance || !shrinks && size <= T::from_f64(T::STAGNATION)
+    let contracts = rate + rate < T::ONE;
+    contracts && expected_next <= tolerance || !contracts && size <= T::from_f64(T::STAGNATION)
 }
 
 /// The largest increment of an iteration.

@@ -7,7 +7,7 @@
 use super::dense_fallback::unknown_name;
 use crate::error::Error;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
 use crate::scalar::{Real, Scalar};
@@ -17,13 +17,13 @@ use alloc::vec::Vec;
 
 /// So many more iterations of Newton's method are to lead to the other side of a fold: each leads
 /// there or back.
-const ITERATIONS: usize = 16;
+const MAX_SIGN_CHANGE_ITERATIONS: usize = 16;
 /// Bisections between a point on either side.
 const BISECTIONS: usize = 40;
 
 /// What complete pivoting finds out about `∂f/∂(ẋ, z)`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Elimination {
+pub(crate) struct PivotAnalysis {
     /// Whether the determinant is negative.
     pub negative: bool,
     /// The smallest pivot relative to the largest one, of `∂f_r/∂v_c v_c` relative to the largest
@@ -34,7 +34,7 @@ pub(crate) struct Elimination {
     pub unknown: Option<usize>,
 }
 
-impl Elimination {
+impl PivotAnalysis {
     /// A solution that is known to a few ε is `√ε` away from the other branch of a fold; the bound
     /// is twice as many digits away from that.
     pub fn is_singular<T: Real>(&self) -> bool {
@@ -42,7 +42,7 @@ impl Elimination {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// The error of a step, whose iteration led from some start values to `y`, with the algebraic
     /// state along which `∂f/∂(ẋ, z)` becomes singular between them.
     #[cold]
@@ -60,7 +60,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         if const { M::Shape::NZ == 0 } {
             return error;
         }
-        let singular = self.other_side(coefficients, step, start, y).and_then(|side| {
+        let singular = self.find_sign_change(coefficients, step, start, y).and_then(|side| {
             let (mut inside, mut outside) = (*start, *y);
             let mut found = None;
             for _ in 0..BISECTIONS {
@@ -70,7 +70,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 for (to, &other) in middle.as_mut().as_flattened_mut().iter_mut().zip(other) {
                     *to = half * (*to + other);
                 }
-                let elimination = self.eliminate_at(coefficients, step, &middle)?;
+                let elimination = self.analyse_pivots_at(coefficients, step, &middle)?;
                 *(if elimination.negative == side { &mut inside } else { &mut outside }) = middle;
                 found = elimination.unknown;
             }
@@ -81,17 +81,17 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 
     /// The sign of the determinant at the start values, if it has the other one at `y`, or where a
     /// few more iterations lead to from there.
-    fn other_side(
+    fn find_sign_change(
         &mut self,
         coefficients: &Coefficients<T, S>,
         (n, x): (usize, &ArrayX<M, T>),
         start: &ArrayK<M, [T; S]>,
         y: &mut ArrayK<M, [T; S]>,
     ) -> Option<bool> {
-        let side = self.eliminate_at(coefficients, (n, x), start)?.negative;
-        for iteration in 0..ITERATIONS {
-            if self.eliminate_at(coefficients, (n, x), y)?.negative != side {
-                return Some(side);
+        let start_is_negative = self.analyse_pivots_at(coefficients, (n, x), start)?.negative;
+        for iteration in 0..MAX_SIGN_CHANGE_ITERATIONS {
+            if self.analyse_pivots_at(coefficients, (n, x), y)?.negative != start_is_negative {
+                return Some(start_is_negative);
             }
             self.factor_dense(coefficients, n, iteration, &mut Statistics::default()).ok()?;
             self.solve_dense(coefficients);
@@ -105,28 +105,28 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     }
 
     /// `∂f/∂(ẋ, z)` at the last stage.
-    fn eliminate_at(
+    fn analyse_pivots_at(
         &mut self,
         coefficients: &Coefficients<T, S>,
         (n, x): (usize, &ArrayX<M, T>),
         y: &ArrayK<M, [T; S]>,
-    ) -> Option<Elimination> {
-        self.place(coefficients, n, x, y);
+    ) -> Option<PivotAnalysis> {
+        self.place_stages(coefficients, n, x, y);
         self.evaluate_jacobian();
-        let (entries, points) = (self.linear.jacobian.as_ref(), self.points.as_ref());
+        let (entries, points) = (self.linearization.jacobian.as_ref(), self.points.as_ref());
         let last =
             |of: &[[T; S]], at: usize| of.get(at).and_then(|of| of.last()).map_or(f64::NAN, |v| v.to_f64());
-        eliminate::<M>(|entry| last(entries, entry), |variable| last(points, variable))
+        analyse_pivots::<M>(|entry| last(entries, entry), |variable| last(points, variable))
     }
 }
 
 /// Eliminates `∂f/∂(ẋ, z)` of a model, whose Jacobian has these entries at these variables; nothing
 /// if they are not finite, or there is no memory.
 #[cold]
-pub(crate) fn eliminate<M: Dae>(
+pub(crate) fn analyse_pivots<M: Dae>(
     entry: impl Fn(usize) -> f64,
     variable: impl Fn(usize) -> f64,
-) -> Option<Elimination> {
+) -> Option<PivotAnalysis> {
     let (n, nx) = (M::Shape::NK, M::Shape::NX);
     let [mut matrix, mut terms] = [zeros(n * n)?, zeros(n)?];
     let Pattern { rows, columns } = M::STRUCTURE.jacobian;
@@ -162,7 +162,7 @@ fn zeros(count: usize) -> Option<Vec<f64>> {
 }
 
 /// The pivots, and the vector of length one in the last unknown.
-fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<Elimination> {
+fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<PivotAnalysis> {
     if a.iter().any(|a| !a.is_finite()) {
         return None;
     }
@@ -202,7 +202,7 @@ fn complete_pivoting(a: &mut [f64], n: usize, nx: usize) -> Option<Elimination> 
     }
     let algebraic = vector.iter().zip(&order).filter(|(_, unknown)| **unknown >= nx);
     let unknown = algebraic.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).map(|(_, unknown)| *unknown);
-    Some(Elimination { negative, smallest: smallest / largest, unknown })
+    Some(PivotAnalysis { negative, smallest: smallest / largest, unknown })
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::norm::{KinematicScales, Measure, larger_strand, part, part_mut};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kernels};
-use crate::plan::{Plan, Table};
+use super::norm::{KinematicScales, MeasureIncrement, larger_accumulator, unknowns_of, unknowns_of_mut};
+use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row, kernels};
+use crate::plan::{Plan, StructureTable};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 
@@ -18,14 +18,14 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        each_row::<A, _>(&mut self);
+        for_each_row::<A, _>(&mut self);
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::Unknowns.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize> RowVisitor for PlaceResidual<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::Unknowns.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
+    fn row_count(&self) -> usize {
         self.plan.nk()
     }
     const INSTRUCTIONS: usize = 2 * S;
@@ -76,7 +76,7 @@ kernels! {
 /// `y ← y − Δ`; the size of the increment, and zero if the next one is expected to be below the
 /// tolerance: otherwise one, and by how much the increment of an unknown is larger than its last
 /// one. (Two numbers are returned in registers, three are not.)
-pub(in crate::irk) struct Update<'a, M: Plan, E: Lanes, const S: usize> {
+pub(in crate::irk) struct UpdateUnknowns<'a, M: Plan, E: Lanes, const S: usize> {
     pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
     pub x: &'a M::X<E>,
@@ -88,12 +88,12 @@ pub(in crate::irk) struct Update<'a, M: Plan, E: Lanes, const S: usize> {
     pub h: E,
     pub floor: E,
     pub tolerance: E,
-    pub full: bool,
+    pub full_newton: bool,
     /// Whether weights are to be found, and nothing is known of the increment before.
-    pub measure: bool,
+    pub measures_sizes: bool,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for UpdateUnknowns<'_, M, E, S> {
     type Number = E;
     type Output = (E, E);
     #[inline(always)]
@@ -110,37 +110,38 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             h,
             floor,
             tolerance,
-            full,
-            measure,
+            full_newton: full,
+            measures_sizes: measure,
         } = self;
         let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
         if measure {
-            let (own_y, own) = (part_mut(plan, y.as_mut()), part_mut(plan, increment.as_mut()));
-            for (y, increment) in own_y.iter_mut().zip(own) {
-                subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
+            let (y_part, increment_part) =
+                (unknowns_of_mut(plan, y.as_mut()), unknowns_of_mut(plan, increment.as_mut()));
+            for (y, increment) in y_part.iter_mut().zip(increment_part) {
+                subtract_active(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
-            let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
+            let measure = MeasureIncrement { plan, scales, x, y, increment, weights, sizes, h, floor };
             return (measure.run::<A>(), one);
         }
         // Four unknowns side by side, and the rest one by one.
-        let (y, last_y) = part_mut(plan, y.as_mut()).as_chunks_mut::<4>();
-        let (increments, last) = part_mut(plan, increment.as_mut()).as_chunks_mut::<4>();
-        let (weights, last_weights) = part(plan, weights.as_ref()).as_chunks::<4>();
-        let (sizes, last_sizes) = part_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
-        let mut some = Increments::none(tolerance, full);
+        let (y, last_y) = unknowns_of_mut(plan, y.as_mut()).as_chunks_mut::<4>();
+        let (increments, last) = unknowns_of_mut(plan, increment.as_mut()).as_chunks_mut::<4>();
+        let (weights, last_weights) = unknowns_of(plan, weights.as_ref()).as_chunks::<4>();
+        let (sizes, last_sizes) = unknowns_of_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
+        let mut blocks_of_four = IncrementStatistics::with_tolerance(tolerance, full);
         for (((y, increments), weights), sizes) in y.iter_mut().zip(increments).zip(weights).zip(sizes) {
-            subtract(y, increments, active);
-            some.take(increments, weights, sizes);
+            subtract_active(y, increments, active);
+            blocks_of_four.include(increments, weights, sizes);
         }
-        let mut others = Increments::none(tolerance, full);
+        let mut remainder = IncrementStatistics::with_tolerance(tolerance, full);
         for (((y, increment), weight), size) in last_y.iter_mut().zip(last).zip(last_weights).zip(last_sizes)
         {
             let increment = core::array::from_mut(increment);
-            subtract(core::array::from_mut(y), increment, active);
-            others.take(increment, core::array::from_ref(weight), core::array::from_mut(size));
+            subtract_active(core::array::from_mut(y), increment, active);
+            remainder.include(increment, core::array::from_ref(weight), core::array::from_mut(size));
         }
-        let ([largest, excess, growth, sum], other) = (some.total(), others.total());
-        let size = larger_strand([[largest, sum], [other[0], other[3]]]);
+        let ([largest, excess, growth, sum], other) = (blocks_of_four.reduce(), remainder.reduce());
+        let size = larger_accumulator([[largest, sum], [other[0], other[3]]]);
         (size, E::select(E::le(excess.max(other[1]), zero), zero, one + growth.max(other[2])))
     }
 }
@@ -148,7 +149,7 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
 /// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A
 /// single lane is, or it would not be here.
 #[inline(always)]
-fn subtract<E: Lanes, const S: usize, const N: usize>(
+fn subtract_active<E: Lanes, const S: usize, const N: usize>(
     y: &mut [[E; S]; N],
     increments: &mut [[[E; 1]; S]; N],
     active: E::Mask,
@@ -168,7 +169,7 @@ fn subtract<E: Lanes, const S: usize, const N: usize>(
 }
 
 /// What is known of the increments of some unknowns, in `N` accumulators.
-struct Increments<E, const N: usize> {
+struct IncrementStatistics<E, const N: usize> {
     largest: [E; N],
     /// By how much one, and the one that is expected next, is too large; not positive if that is
     /// below the tolerance.
@@ -178,20 +179,25 @@ struct Increments<E, const N: usize> {
     /// The sum of what is not a number is not a number, which a maximum may lose.
     sum: [E; N],
     tolerance: E,
-    full: bool,
+    full_newton: bool,
 }
 
-impl<E: Lanes, const N: usize> Increments<E, N> {
+impl<E: Lanes, const N: usize> IncrementStatistics<E, N> {
     #[inline(always)]
-    fn none(tolerance: E, full: bool) -> Self {
+    fn with_tolerance(tolerance: E, full: bool) -> Self {
         let zero = E::from_f64(0.0);
         let (zeros, excess) = ([zero; N], [-tolerance; N]);
-        Self { largest: zeros, excess, growth: zeros, sum: zeros, tolerance, full }
+        Self { largest: zeros, excess, growth: zeros, sum: zeros, tolerance, full_newton: full }
     }
 
     /// Takes `N` unknowns into account, whose last increments had these sizes.
     #[inline(always)]
-    fn take<const S: usize>(&mut self, increments: &[[[E; 1]; S]; N], weights: &[E; N], sizes: &mut [E; N]) {
+    fn include<const S: usize>(
+        &mut self,
+        increments: &[[[E; 1]; S]; N],
+        weights: &[E; N],
+        sizes: &mut [E; N],
+    ) {
         let old = *sizes;
         let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
         // Stage by stage, so that what is done to unknowns is done to vectors.
@@ -207,30 +213,30 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
             new[n] = new[n] * weights[n];
         }
         // By how much increments grow: what they are asked is all of it.
-        let mut change = [E::from_f64(0.0); N];
+        let mut growth = [E::from_f64(0.0); N];
         for n in 0..N {
-            change[n] = new[n] - old[n];
+            growth[n] = new[n] - old[n];
         }
         // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only
         // where it must be.
-        if self.full {
+        if self.full_newton {
             for n in 0..N {
                 let rate = new[n] / old[n];
                 excess[n] = new[n] * rate * rate - self.tolerance;
             }
         } else {
             for n in 0..N {
-                excess[n] = new[n] * new[n] + self.tolerance * change[n];
+                excess[n] = new[n] * new[n] + self.tolerance * growth[n];
             }
         }
         for n in 0..N {
             // Where increments hardly shrink, nothing is expected but that the next one is as
             // large.
-            let expected = excess[n].max(new[n] + change[n]);
-            let own = new[n] - self.tolerance;
+            let expected = excess[n].max(new[n] + growth[n]);
+            let increment_part = new[n] - self.tolerance;
             // The smaller one.
-            self.excess[n] = (-(-own).max(-expected)).max(self.excess[n]);
-            self.growth[n] = change[n].max(self.growth[n]);
+            self.excess[n] = (-(-increment_part).max(-expected)).max(self.excess[n]);
+            self.growth[n] = growth[n].max(self.growth[n]);
             self.largest[n] = new[n].max(self.largest[n]);
         }
         *sizes = new;
@@ -238,7 +244,7 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
 
     /// The largest increment, the largest excess, the largest growth, the sum.
     #[inline(always)]
-    fn total(&self) -> [E; 4] {
+    fn reduce(&self) -> [E; 4] {
         let zero = E::from_f64(0.0);
         let [mut largest, mut excess, mut growth, mut sum] = [zero, -self.tolerance, zero, zero];
         for n in 0..N {

@@ -30,12 +30,12 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::convergence::{ConvergenceTest, IncrementKind, Status};
-use super::increment::{PlaceResidual, Update, largest, subtract_increment};
-use super::jacobian_policy::Policy;
-use super::norm::{KinematicScales, Measure};
-use super::rejection::grows_much;
+use super::increment::{PlaceResidual, UpdateUnknowns, largest, subtract_increment};
+use super::jacobian_policy::JacobianPolicy;
+use super::norm::{KinematicScales, MeasureIncrement};
+use super::rejection::exceeds_growth_bound;
 use crate::irk::coefficients::Coefficients;
-use crate::irk::workspace::{Linearization, Work};
+use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, OptionalPlace};
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -47,19 +47,19 @@ use crate::statistics::Statistics;
 use core::mem::take;
 
 /// Increments below this many ε are rounding errors.
-const ROUNDING: f64 = 1.0;
+const INCREMENT_ROUNDING: f64 = 1.0;
 /// Where sums over the steps are compensated, what an iteration leaves undone must not add up
 /// either: it has the same sign in every step.
-const COMPENSATED_ROUNDING: f64 = 1.0 / 64.0;
+const COMPENSATED_INCREMENT_ROUNDING: f64 = 1.0 / 64.0;
 
 /// Linear equations are refined so often if one iteration was not enough.
-const REFINEMENTS: usize = 4;
+const MAX_REFINEMENTS: usize = 4;
 
 /// The equations of the stages of a step.
 pub(crate) struct StageEquations<'a, M: Dae, E: Lanes, const S: usize, F: Fallback> {
     pub coefficients: &'a Coefficients<E, S>,
     /// Where the factors are that are valid, if that is not where new ones are made.
-    pub kept: Option<&'a Linearization<M, E, S, F>>,
+    pub stored_linearization: Option<&'a Linearization<M, E, S, F>>,
     /// Which step.
     pub n: usize,
     /// The state at its start.
@@ -68,14 +68,14 @@ pub(crate) struct StageEquations<'a, M: Dae, E: Lanes, const S: usize, F: Fallba
 copy!(['a, M: Dae, E: Lanes, const S: usize, F: Fallback] StageEquations<'a, M, E, S, F>);
 
 /// How an iteration ended.
-pub(crate) struct Solved<E: Lanes> {
+pub(crate) struct NewtonResult<E: Lanes> {
     /// Which lanes have converged.
     pub converged: E::Mask,
     /// It does not contract with the factors of the step before that it began with: the start
     /// values are to be set again.
-    pub stale: bool,
+    pub needs_restart: bool,
     /// Whether the factors that are there are those of the solution.
-    pub exact: bool,
+    pub factors_at_solution: bool,
     /// An unknown of linear equations that they do not determine, in some lane that has not
     /// converged for that.
     pub undetermined: Option<usize>,
@@ -90,7 +90,7 @@ struct Tolerances {
     rounding: f64,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Solves the stages of a step from the start values in `y`.
     pub(crate) fn newton(
         &mut self,
@@ -98,14 +98,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         options: &Options,
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
-    ) -> Solved<E> {
+    ) -> NewtonResult<E> {
         let StageEquations { coefficients, x, .. } = equations;
         let Newton { fixed_iterations, jacobian, .. } = options.newton;
         let solved = match fixed_iterations {
-            Some(count) if const { F::INTERVALS } => self.iterate(equations, jacobian, count, y, statistics),
-            _ => self.converge(equations, options, y, statistics),
+            Some(count) if const { F::INTERVALS } => {
+                self.iterate_fixed(equations, jacobian, count, y, statistics)
+            }
+            _ => self.iterate_until_converged(equations, options, y, statistics),
         };
-        self.reconstruct(coefficients, x, y);
+        self.reconstruct_kinematic(coefficients, x, y);
         if const { F::INTERVALS } && options.compensated {
             self.place_compensated(coefficients, x, y);
             self.reconstruct_compensated(y);
@@ -116,89 +118,104 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is
     /// computed before it is known whether it is needed.
     #[inline(never)]
-    fn converge(
+    fn iterate_until_converged(
         &mut self,
         equations: StageEquations<'_, M, E, S, F>,
         options: &Options,
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
-    ) -> Solved<E> {
-        let (StageEquations { coefficients, mut kept, .. }, newton) = (equations, &options.newton);
-        let exact = M::STRUCTURE.linear_in_state;
-        let rounding = if options.compensated { COMPENSATED_ROUNDING } else { ROUNDING } * E::EPSILON;
+    ) -> NewtonResult<E> {
+        let (StageEquations { coefficients, stored_linearization: mut kept, .. }, newton) =
+            (equations, &options.newton);
+        let linear = M::STRUCTURE.linear_in_state;
+        let rounding = if options.compensated { COMPENSATED_INCREMENT_ROUNDING } else { INCREMENT_ROUNDING }
+            * E::EPSILON;
         let tolerances = Tolerances { tolerance: newton.tolerance.max(rounding), rounding };
-        let may_share = const { Self::SHARES } && newton.jacobian.is_adaptive() && !exact;
-        let basis = coefficients.basis.as_ref().filter(|_| may_share);
-        let mut policy = Policy::<M, E, S>::start(newton.jacobian, basis.is_some(), self.validity, self.near);
-        let mut test = ConvergenceTest::<E>::start(tolerances.tolerance, self.validity.rate, exact);
+        let may_share = const { Self::MAY_SHARE_JACOBIAN } && newton.jacobian.is_adaptive() && !linear;
+        let basis = coefficients.eigenbasis.as_ref().filter(|_| may_share);
+        let mut policy = JacobianPolicy::<M, E, S>::start(
+            newton.jacobian,
+            basis.is_some(),
+            self.validity,
+            self.start_near_solution,
+        );
+        let mut test = ConvergenceTest::<E>::start(tolerances.tolerance, self.validity.rate, linear);
         let mut status = Status::default();
-        let mut first = E::from_f64(0.0);
+        let mut first_residual = E::from_f64(0.0);
         let mut iteration = 0;
         // Whether nothing is known of an increment before.
-        let mut anew = true;
+        let mut no_previous_increment = true;
         // Nothing will be written where states are kinematic.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
-        let mut missing = self.is_missing(policy.renew);
+        let mut omits_kinematic = self.omits_kinematic(policy.renew);
         loop {
             // The first iteration of nonlinear equations is far away in any case.
-            let compensate = options.compensated && (iteration > 0 || exact);
-            self.place_iterate(equations, y, missing, compensate);
-            let asked = policy.asks && iteration == 1;
-            if asked || !policy.renew {
+            let compensate = options.compensated && (iteration > 0 || linear);
+            self.place_iterate(equations, y, omits_kinematic, compensate);
+            let checks_residual = policy.may_refresh_early && iteration == 1;
+            if checks_residual || !policy.renew {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             }
-            let early = asked && policy.leaves_much(self.largest_residual() / first, tolerances.tolerance);
-            if policy.renew || early {
+            let renews_early = checks_residual
+                && policy
+                    .contraction_too_slow(self.largest_residual() / first_residual, tolerances.tolerance);
+            if policy.renew || renews_early {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
-                policy.renewed();
-                let in_middle = policy.shared && !options.compensated;
-                self.evaluate_jacobian_of(equations, y, in_middle, asked);
+                policy.on_renewal();
+                let at_midpoint = policy.shared && !options.compensated;
+                self.evaluate_iterate_jacobian(equations, y, at_midpoint, checks_residual);
                 if !(policy.shared && self.factor_shared(basis)) {
                     kept = None;
-                    self.factor(coefficients);
+                    self.factor_stages(coefficients);
                 }
             }
-            if policy.asks && iteration == 0 {
-                first = self.largest_residual();
+            if policy.may_refresh_early && iteration == 0 {
+                first_residual = self.largest_residual();
             }
-            self.complete_residual(coefficients, take(&mut missing), compensate);
-            if exact
+            self.complete_residual(coefficients, take(&mut omits_kinematic), compensate);
+            if linear
                 && iteration > 0
-                && let Some(solved) = self.solved_linear(equations, y, iteration, policy.factored)
+                && let Some(solved) = self.linear_result(equations, y, iteration, policy.renewed_in_step)
             {
                 return solved;
             }
             // The first increments of what begins far away may grow.
-            if !exact && iteration > 2 && status.stuck {
-                test.accept(self.is_satisfied());
+            if !linear && iteration > 2 && status.stagnates {
+                test.accept_satisfied(self.residual_is_rounding());
                 if !E::any(test.active) {
-                    return self.solved(&test, policy.shared);
+                    return self.newton_result(&test, policy.shared);
                 }
             }
             iteration += 1;
             statistics.iterations += 1;
             if !(policy.shared && self.solve_shared(basis)) {
                 self.place_residual();
-                kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
+                kept.unwrap_or(&self.linearization).factors.solve(&mut self.increment);
             }
             let next;
-            (status, next) = self.apply_increment(equations, y, &mut test, &policy, tolerances, anew);
+            (status, next) =
+                self.apply_increment(equations, y, &mut test, &policy, tolerances, no_previous_increment);
             if !status.active {
-                return self.solved(&test, policy.shared);
+                return self.newton_result(&test, policy.shared);
             }
-            let rejected = grows_much(next)
-                && !(exact || policy.renew || early)
-                && self.is_rejected(y, next, policy.factored);
-            let stale = rejected && !policy.factored;
-            if stale || iteration == newton.max_iterations {
+            let rejected = exceeds_growth_bound(next)
+                && !(linear || policy.renew || renews_early)
+                && self.reject_growing_increments(y, next, policy.renewed_in_step);
+            let needs_restart = rejected && !policy.renewed_in_step;
+            if needs_restart || iteration == newton.max_iterations {
                 (self.validity.factors, self.validity.shared) = (false, false);
-                return Solved { converged: test.converged, stale, exact: false, undetermined: None };
+                return NewtonResult {
+                    converged: test.converged,
+                    needs_restart,
+                    factors_at_solution: false,
+                    undetermined: None,
+                };
             }
-            policy.after(&status, iteration, early);
+            policy.after_iteration(&status, iteration, renews_early);
             policy.renew |= rejected;
-            anew = rejected;
+            no_previous_increment = rejected;
         }
     }
 
@@ -208,16 +225,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         &mut self,
         StageEquations { coefficients, n, x, .. }: StageEquations<'_, M, E, S, F>,
         y: &mut ArrayK<M, [E; S]>,
-        missing: bool,
+        omits_kinematic: bool,
         compensate: bool,
     ) {
-        if missing {
-            self.place(coefficients, n, x, y);
+        if omits_kinematic {
+            self.place_stages(coefficients, n, x, y);
         } else {
             self.place_unknowns(coefficients, n, x, y);
         }
         if const { F::INTERVALS } && compensate {
-            self.reconstruct(coefficients, x, y);
+            self.reconstruct_kinematic(coefficients, x, y);
             self.place_compensated(coefficients, x, y);
             self.reconstruct_compensated(y);
             self.place_compensated(coefficients, x, y);
@@ -226,15 +243,15 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// The residual, which may be there, and the Jacobian: at all stages, or in their middle.
     #[inline(always)]
-    fn evaluate_jacobian_of(
+    fn evaluate_iterate_jacobian(
         &mut self,
         StageEquations { coefficients, n, x, .. }: StageEquations<'_, M, E, S, F>,
         y: &ArrayK<M, [E; S]>,
-        in_middle: bool,
+        at_midpoint: bool,
         residual: bool,
     ) {
-        if in_middle {
-            self.evaluate_middle(coefficients, n, x, y, residual);
+        if at_midpoint {
+            self.evaluate_midpoint_jacobian(coefficients, n, x, y, residual);
         } else {
             self.evaluate_jacobian();
         }
@@ -242,13 +259,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// What the residual has beside the values of the model.
     #[inline(always)]
-    fn complete_residual(&mut self, coefficients: &Coefficients<E, S>, missing: bool, compensate: bool) {
-        if missing {
-            self.eliminate_missing(coefficients);
+    fn complete_residual(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        omits_kinematic: bool,
+        compensate: bool,
+    ) {
+        if omits_kinematic {
+            self.eliminate_omitted(coefficients);
         }
         if const { F::INTERVALS } && compensate {
             self.correct_residual();
-            self.eliminate_rounded(coefficients);
+            self.eliminate_rounding(coefficients);
         }
     }
 
@@ -261,16 +283,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The end of linear equations, if their residual says so: one iteration solves them, but for
     /// digits that were lost.
     #[inline(always)]
-    fn solved_linear(
+    fn linear_result(
         &mut self,
         StageEquations { coefficients, n, x, .. }: StageEquations<'_, M, E, S, F>,
         y: &mut ArrayK<M, [E; S]>,
         iteration: usize,
         factored: bool,
-    ) -> Option<Solved<E>> {
+    ) -> Option<NewtonResult<E>> {
         self.validity.factors = true;
-        let mut satisfied = self.is_satisfied();
-        if !(E::all(satisfied) || iteration == REFINEMENTS) {
+        let mut satisfied = self.residual_is_rounding();
+        if !(E::all(satisfied) || iteration == MAX_REFINEMENTS) {
             return None;
         }
         let mut undetermined = None;
@@ -279,7 +301,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let (determined, unknown) = self.is_determined(coefficients, n, x, y);
             (satisfied, undetermined) = (E::and(satisfied, determined), unknown);
         }
-        Some(Solved { converged: satisfied, stale: false, exact: true, undetermined })
+        Some(NewtonResult {
+            converged: satisfied,
+            needs_restart: false,
+            factors_at_solution: true,
+            undetermined,
+        })
     }
 
     /// `y ← y − Δ`, and what the convergence test says about the increment.
@@ -289,19 +316,19 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         StageEquations { coefficients, x, .. }: StageEquations<'_, M, E, S, F>,
         y: &mut ArrayK<M, [E; S]>,
         test: &mut ConvergenceTest<E>,
-        policy: &Policy<M, E, S>,
+        policy: &JacobianPolicy<M, E, S>,
         Tolerances { tolerance, rounding }: Tolerances,
-        anew: bool,
+        no_previous_increment: bool,
     ) -> (Status, E) {
         let h = self.inputs.time.step;
         let floor = E::from_f64(rounding / tolerance);
-        let Self { linear, points, increment, weights, sizes, .. } = self;
+        let Self { linearization: linear, points, increment, weights, increment_sizes: sizes, .. } = self;
         let (jacobian, points) = (F::Plan::<M>::jacobian(&linear.jacobian), F::Plan::<M>::v(points));
         let scales = &KinematicScales::<F::Plan<M>, E, S> { jacobian, points, a: &coefficients.a };
         let (plan, x, y) = (F::plan::<M>(), F::Plan::<M>::x(x), F::Plan::<M>::k_mut(y));
         let increment = F::Plan::<M>::k_mut(increment);
         let (weights, sizes) = (F::Plan::<M>::k_mut(weights), F::Plan::<M>::k_mut(sizes));
-        let (size, next) = dispatch(Update {
+        let (size, next) = dispatch(UpdateUnknowns {
             plan,
             scales,
             x,
@@ -313,41 +340,49 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             h,
             floor,
             tolerance: E::from_f64(tolerance),
-            full: policy.full,
-            measure: anew,
+            full_newton: policy.full_newton,
+            measures_sizes: no_previous_increment,
         });
-        let kind = if anew { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
-        let status = test.take(kind, size, next);
-        if status.changed && status.moved && !M::STRUCTURE.linear_in_state && !anew {
-            let measure = Measure { plan, scales, x, y, increment, weights, sizes, h, floor };
+        let increment_kind = if no_previous_increment {
+            IncrementKind::First { new_factors: policy.renew }
+        } else {
+            IncrementKind::Subsequent
+        };
+        let status = test.update(increment_kind, size, next);
+        if status.lane_stopped
+            && status.sizes_outdated
+            && !M::STRUCTURE.linear_in_state
+            && !no_previous_increment
+        {
+            let measure = MeasureIncrement { plan, scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
-            return (test.take(IncrementKind::Again, again, again), next);
+            return (test.update(IncrementKind::Remeasured, again, again), next);
         }
         (status, next)
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// So many iterations, whose increments nobody asks for: on a processor without an FPU for
     /// double precision they take no operation of it.
-    fn iterate(
+    fn iterate_fixed(
         &mut self,
         equations: StageEquations<'_, M, E, S, F>,
         jacobian: Jacobian,
         count: usize,
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
-    ) -> Solved<E> {
-        let StageEquations { coefficients, mut kept, .. } = equations;
-        let valid = self.validity.factors
+    ) -> NewtonResult<E> {
+        let StageEquations { coefficients, stored_linearization: mut kept, .. } = equations;
+        let factors_valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
         // Nothing will be written where states are kinematic.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         for iteration in 0..count {
-            let missing = self.is_missing(!valid);
-            self.place_iterate(equations, y, missing, false);
-            if valid || iteration > 0 && jacobian == Jacobian::Frozen {
+            let omits_kinematic = self.omits_kinematic(!factors_valid);
+            self.place_iterate(equations, y, omits_kinematic, false);
+            if factors_valid || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             } else {
@@ -355,29 +390,40 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
                 kept = None;
-                self.factor(coefficients);
+                self.factor_stages(coefficients);
             }
-            self.complete_residual(coefficients, missing, false);
+            self.complete_residual(coefficients, omits_kinematic, false);
             statistics.iterations += 1;
             self.place_residual();
-            kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
+            kept.unwrap_or(&self.linearization).factors.solve(&mut self.increment);
             subtract_increment(y.as_mut(), self.increment.as_ref());
         }
         let zero = E::from_f64(0.0);
-        Solved { converged: E::le(zero, zero), stale: false, exact: false, undetermined: None }
+        NewtonResult {
+            converged: E::le(zero, zero),
+            needs_restart: false,
+            factors_at_solution: false,
+            undetermined: None,
+        }
     }
 
     /// Whether stages may share a Jacobian: of one stage or two there is no eigenbasis. A single
     /// step starts near its solution, where that saves little in small models.
-    const SHARES: bool = S > 2 && F::HAS_MEMORY && (F::INTERVALS || !Policy::<M, E, S>::EXACT);
+    const MAY_SHARE_JACOBIAN: bool =
+        S > 2 && F::HAS_MEMORY && (F::INTERVALS || !JacobianPolicy::<M, E, S>::STAGE_FACTORS_ARE_CHEAP);
 
     /// Factors of the shared Jacobian, if there is memory for them.
     #[inline(always)]
     fn factor_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
-        if const { Self::SHARES }
+        if const { Self::MAY_SHARE_JACOBIAN }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
-            factors.factor::<F>(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
+            factors.factor::<F>(
+                &self.linearization.jacobian,
+                self.first_stage_only,
+                basis,
+                self.inputs.time.step,
+            );
             return true;
         }
         false
@@ -386,7 +432,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Solves with them.
     #[inline(always)]
     fn solve_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
-        if const { Self::SHARES }
+        if const { Self::MAY_SHARE_JACOBIAN }
             && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
             factors.solve::<F>(basis, &self.f, &mut self.increment);
@@ -396,8 +442,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// Factors by blocks.
-    fn factor(&mut self, coefficients: &Coefficients<E, S>) {
-        let (Linearization { jacobian, factors }, h) = (&mut self.linear, self.inputs.time.step);
+    fn factor_stages(&mut self, coefficients: &Coefficients<E, S>) {
+        let (Linearization { jacobian, factors }, h) = (&mut self.linearization, self.inputs.time.step);
         factors.factor_by_plan(jacobian, &coefficients.a, h);
     }
 
@@ -408,10 +454,15 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// After the last iteration: no lane is active any more.
-    fn solved(&mut self, test: &ConvergenceTest<E>, shared: bool) -> Solved<E> {
+    fn newton_result(&mut self, test: &ConvergenceTest<E>, shared: bool) -> NewtonResult<E> {
         self.validity.rate = test.slowest_rate();
-        let any = E::any(test.converged);
-        (self.validity.factors, self.validity.shared) = (any && !shared, any && shared);
-        Solved { converged: test.converged, stale: false, exact: false, undetermined: None }
+        let any_converged = E::any(test.converged);
+        (self.validity.factors, self.validity.shared) = (any_converged && !shared, any_converged && shared);
+        NewtonResult {
+            converged: test.converged,
+            needs_restart: false,
+            factors_at_solution: false,
+            undetermined: None,
+        }
     }
 }

@@ -2,13 +2,13 @@
 //! kinematic states.
 
 use crate::irk::kinematic::minus_c;
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row};
-use crate::plan::{Plan, Table};
+use crate::linalg::{Arithmetic, Kernel, RowVisitor, for_each_row};
+use crate::plan::{Plan, StructureTable};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::Plain;
 
 /// The size of an increment relative to the unknowns as they are now.
-pub(in crate::irk) struct Measure<'a, M: Plan, E: Plain, const S: usize> {
+pub(in crate::irk) struct MeasureIncrement<'a, M: Plan, E: Plain, const S: usize> {
     pub plan: M,
     pub scales: &'a KinematicScales<'a, M, E, S>,
     pub x: &'a M::X<E>,
@@ -20,7 +20,7 @@ pub(in crate::irk) struct Measure<'a, M: Plan, E: Plain, const S: usize> {
     pub floor: E,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for MeasureIncrement<'_, M, E, S> {
     type Number = E;
     type Output = E;
     #[inline(always)]
@@ -28,26 +28,26 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
         let Self { plan, scales, x, y, increment, weights, sizes, h, floor } = self;
         let zero = E::from_f64(0.0);
         // A change of ẋ below this much of x/h rounds to none in x.
-        let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
+        let change_per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
         // Four unknowns side by side, and the rest one by one.
-        let (ys, last_ys) = part(plan, y.as_ref()).as_chunks::<4>();
-        let (increments, last) = part(plan, increment.as_ref()).as_chunks::<4>();
-        let (own_weights, last_weights) = part_mut(plan, weights.as_mut()).as_chunks_mut::<4>();
-        let (own_sizes, last_sizes) = part_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
-        let mut states = x.as_ref().get(plan.facts().unknowns.0..).unwrap_or_default();
-        let mut some = Relative { largest: [zero; 4], sum: [zero; 4], per_step };
+        let (ys, last_ys) = unknowns_of(plan, y.as_ref()).as_chunks::<4>();
+        let (increments, last) = unknowns_of(plan, increment.as_ref()).as_chunks::<4>();
+        let (own_weights, last_weights) = unknowns_of_mut(plan, weights.as_mut()).as_chunks_mut::<4>();
+        let (own_sizes, last_sizes) = unknowns_of_mut(plan, sizes.as_mut()).as_chunks_mut::<4>();
+        let mut states = x.as_ref().get(plan.facts().non_kinematic_range.0..).unwrap_or_default();
+        let mut blocks_of_four = RelativeIncrements { largest: [zero; 4], sum: [zero; 4], change_per_step };
         for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
-            some.take(&mut states, y, increments, weights, sizes);
+            blocks_of_four.include(&mut states, y, increments, weights, sizes);
         }
-        let mut others = Relative { largest: [zero], sum: [zero], per_step };
+        let mut remainder = RelativeIncrements { largest: [zero], sum: [zero], change_per_step };
         for (((y, increment), weight), size) in last_ys.iter().zip(last).zip(last_weights).zip(last_sizes) {
             let (y, increment) = (core::array::from_ref(y), core::array::from_ref(increment));
             let (weight, size) = (core::array::from_mut(weight), core::array::from_mut(size));
-            others.take(&mut states, y, increment, weight, size);
+            remainder.include(&mut states, y, increment, weight, size);
         }
-        let most = larger_strand([some.total(), others.total()]);
-        if const { !Table::Kinematic.may_have::<M>() } {
-            return most;
+        let largest = larger_accumulator([blocks_of_four.reduce(), remainder.reduce()]);
+        if const { !StructureTable::Kinematic.may_have_rows::<M>() } {
+            return largest;
         }
         let mut norm = zero;
         for a in scales.a {
@@ -57,25 +57,35 @@ impl<M: Plan, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             }
             norm = sum.max(norm);
         }
-        let norm = E::from_f64(TYPICAL) * norm * h.abs();
-        let mut velocities = Velocities { plan, scales, x, increment, weights, sizes, per_step, norm, most };
-        each_row::<A, _>(&mut velocities);
-        velocities.most
+        let norm = E::from_f64(TYPICAL_KINEMATIC_RATIO) * norm * h.abs();
+        let mut velocities = VelocityIncrements {
+            plan,
+            scales,
+            x,
+            increment,
+            weights,
+            sizes,
+            change_per_step,
+            tableau_norm: norm,
+            largest,
+        };
+        for_each_row::<A, _>(&mut velocities);
+        velocities.largest
     }
 }
 
 /// What is known of the relative size of the increments of some unknowns, in `N` accumulators.
-struct Relative<E, const N: usize> {
+struct RelativeIncrements<E, const N: usize> {
     largest: [E; N],
     /// What is not a number is not lost in a sum.
     sum: [E; N],
-    per_step: E,
+    change_per_step: E,
 }
 
-impl<E: Lanes, const N: usize> Relative<E, N> {
+impl<E: Lanes, const N: usize> RelativeIncrements<E, N> {
     /// Takes `N` unknowns into account, of which those that are derivatives have these states.
     #[inline(always)]
-    fn take<const S: usize>(
+    fn include<const S: usize>(
         &mut self,
         states: &mut &[E],
         y: &[[E; S]; N],
@@ -93,7 +103,7 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
             }
         }
         for scale in &mut scale {
-            *scale = (scale.abs() * self.per_step).max(smallest);
+            *scale = (scale.abs() * self.change_per_step).max(smallest);
         }
         // Stage by stage, so that what is done to unknowns is done to vectors.
         #[allow(clippy::needless_range_loop)]
@@ -115,7 +125,7 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
 
     /// The largest, and the sum.
     #[inline(always)]
-    fn total(&self) -> [E; 2] {
+    fn reduce(&self) -> [E; 2] {
         let (mut largest, mut sum) = (E::from_f64(0.0), E::from_f64(0.0));
         for n in 0..N {
             (largest, sum) = (self.largest[n].max(largest), sum + self.sum[n]);
@@ -126,44 +136,46 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
 
 /// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
 /// change within the step.
-struct Velocities<'a, M: Plan, E: Plain, const S: usize> {
+struct VelocityIncrements<'a, M: Plan, E: Plain, const S: usize> {
     plan: M,
     scales: &'a KinematicScales<'a, M, E, S>,
     x: &'a M::X<E>,
     increment: &'a M::K<[[E; 1]; S]>,
     weights: &'a mut M::K<E>,
     sizes: &'a mut M::K<E>,
-    per_step: E,
+    change_per_step: E,
     /// `h ‖A‖`
-    norm: E,
+    tableau_norm: E,
     /// The largest increment.
-    most: E,
+    largest: E,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize> RowVisitor for VelocityIncrements<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::Kinematic.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Kinematic.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Kinematic.row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 8;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let KinematicScales { jacobian, points, .. } = self.scales;
-        let Some(of) = self.plan.kinematic(state) else { return };
-        let (Some(own), Some(minus_c)) = (self.plan.velocity(of), minus_c(of, jacobian.as_ref())) else {
+        let Some(kinematic) = self.plan.kinematic(state) else { return };
+        let (Some(own), Some(minus_c)) =
+            (self.plan.velocity(kinematic), minus_c(kinematic, jacobian.as_ref()))
+        else {
             return;
         };
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
         let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
-        let bound = self.norm * minus_c.abs();
+        let bound = self.tableau_norm * minus_c.abs();
         // At one stage it is large enough nearly always.
         if !E::any(E::lt(*weight * k[0].abs(), bound)) {
             return;
         }
         let smallest = E::from_f64(E::SMALLEST);
         let mut size = match self.x.as_ref().get(state) {
-            Some(x) => (x.abs() * self.per_step).max(smallest),
+            Some(x) => (x.abs() * self.change_per_step).max(smallest),
             None => smallest,
         };
         for k in k {
@@ -176,14 +188,14 @@ impl<M: Plan, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
                 largest = delta.abs().max(largest);
             }
             *to = largest * *weight;
-            self.most = to.max(self.most);
+            self.largest = to.max(self.largest);
         }
     }
 }
 
 /// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to
 /// half of the largest `Σ_j |a_ij| |Δ_j|` if they have one sign at all stages, and less if not.
-const TYPICAL: f64 = 0.25;
+const TYPICAL_KINEMATIC_RATIO: f64 = 0.25;
 
 /// What increments of velocities are measured by too: `k_q` of [kinematic](crate::irk::kinematic)
 /// states.
@@ -196,20 +208,20 @@ pub(in crate::irk) struct KinematicScales<'a, M: Plan, E: Plain, const S: usize>
 
 /// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
 #[inline(always)]
-pub(in crate::irk) fn part<M: Plan, T>(plan: M, of: &[T]) -> &[T] {
-    let (first, end) = plan.facts().unknowns;
+pub(in crate::irk) fn unknowns_of<M: Plan, T>(plan: M, of: &[T]) -> &[T] {
+    let (first, end) = plan.facts().non_kinematic_range;
     of.get(first..end).unwrap_or_default()
 }
 
 #[inline(always)]
-pub(in crate::irk) fn part_mut<M: Plan, T>(plan: M, of: &mut [T]) -> &mut [T] {
-    let (first, end) = plan.facts().unknowns;
+pub(in crate::irk) fn unknowns_of_mut<M: Plan, T>(plan: M, of: &mut [T]) -> &mut [T] {
+    let (first, end) = plan.facts().non_kinematic_range;
     of.get_mut(first..end).unwrap_or_default()
 }
 
 /// The largest of two accumulators, or what is not a number.
 #[inline(always)]
-pub(super) fn larger_strand<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
+pub(super) fn larger_accumulator<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
     let total = sum + other;
     E::select(E::le(total.abs(), E::from_f64(f64::MAX)), a.max(b), total)
 }

@@ -10,30 +10,35 @@
 //! It is asked unknown by unknown: linear ones are corrected at once, and would outweigh the
 //! growing increments of a nonlinear one.
 
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 
 /// An increment that grows by less than this part of its unknown may follow from those of others.
-const LITTLE_GROWTH: f64 = 1.0 / 1024.0;
+const MAX_GROWTH: f64 = 1.0 / 1024.0;
 
 /// Whether the increments of an unknown grow, in any lane, by what
 /// [`Update`](super::increment::Update) says of the `next` one.
 #[inline(always)]
-pub(super) fn grows_much<E: Lanes>(next: E) -> bool {
-    E::any(E::lt(E::from_f64(1.0 + LITTLE_GROWTH), next))
+pub(super) fn exceeds_growth_bound<E: Lanes>(next: E) -> bool {
+    E::any(E::lt(E::from_f64(1.0 + MAX_GROWTH), next))
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Takes back the increment in lanes where it grows, unless their residual is a rounding error;
     /// whether there are any. Without factors of this step `y` is left where it is.
     #[cold]
     #[inline(never)]
-    pub(super) fn is_rejected(&mut self, y: &mut ArrayK<M, [E; S]>, next: E, factored: bool) -> bool {
-        let grows = E::lt(E::from_f64(1.0 + LITTLE_GROWTH), next);
-        let rejected = E::and(grows, E::not(self.is_satisfied()));
-        if factored {
+    pub(super) fn reject_growing_increments(
+        &mut self,
+        y: &mut ArrayK<M, [E; S]>,
+        next: E,
+        renewed_in_step: bool,
+    ) -> bool {
+        let grows = E::lt(E::from_f64(1.0 + MAX_GROWTH), next);
+        let rejected = E::and(grows, E::not(self.residual_is_rounding()));
+        if renewed_in_step {
             for (y, increment) in y.as_mut().iter_mut().zip(self.increment.as_ref()) {
                 for (y, [delta]) in y.iter_mut().zip(increment) {
                     *y = E::select(rejected, *y + *delta, *y);

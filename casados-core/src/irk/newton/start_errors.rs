@@ -5,25 +5,27 @@ use crate::error::{Error, Started};
 use crate::finite::find_non_finite;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::stages::initial_guess::InitialGuess;
-use crate::irk::workspace::Work;
+use crate::irk::workspace::StageWorkspace;
 use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::scalar::Real;
 use crate::shape::Shape;
 
 /// Values of an algebraic state at which an equation is tried that has none.
-const TRIED: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
+const TRIAL_VALUES: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
 
-impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
-    /// The error of the first step, as [`Work::explain_from`] says; with a warm start as it is.
-    pub(in crate::irk) fn explain_start(&mut self, error: Error, from: &InitialGuess<'_, M, T, S>) -> Error {
-        let given = self.given;
-        match from {
-            InitialGuess::Nominal => self.explain_from(error, &|unknown| M::START.get(unknown).copied()),
-            InitialGuess::Given => {
-                self.explain_from(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
+    /// The error of the first step, as [`Work::explain_with_start`] says; with a warm start as it is.
+    pub(in crate::irk) fn explain_start(&mut self, error: Error, guess: &InitialGuess<'_, M, T, S>) -> Error {
+        let given = self.start_values;
+        match guess {
+            InitialGuess::Nominal => {
+                self.explain_with_start(error, &|unknown| M::START.get(unknown).copied())
             }
-            InitialGuess::Zero => self.explain_from(error, &|_| None),
+            InitialGuess::Given => {
+                self.explain_with_start(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+            }
+            InitialGuess::Zero => self.explain_with_start(error, &|_| None),
             InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
         }
     }
@@ -31,7 +33,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// The error, with the algebraic state that led to it and its start value, which is zero if
     /// there is none; of a model without any such state as it is.
     #[cold]
-    pub(in crate::irk) fn explain_from(
+    pub(in crate::irk) fn explain_with_start(
         &mut self,
         error: Error,
         start: &dyn Fn(usize) -> Option<f64>,
@@ -44,8 +46,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             |unknown| Started { unknown: unknown_name::<M>(unknown), value: start(unknown).unwrap_or(0.0) };
         match error {
             Error::NonFiniteModel { quantity, equation, value, at } => {
-                let Some(to_blame) = self.without_value(equation) else { return error };
-                let started = started(to_blame);
+                let Some(unknown) = self.find_undefined_state(equation) else { return error };
+                let started = started(unknown);
                 Error::NonFiniteStart { quantity, equation, value, started, at }
             }
             Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
@@ -59,12 +61,12 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     }
 
     /// The first algebraic state of an equation, as an unknown, of which something holds.
-    fn find_algebraic(equation: usize, holds: &mut dyn FnMut(usize) -> bool) -> Option<usize> {
+    fn find_algebraic(equation: usize, predicate: &mut dyn FnMut(usize) -> bool) -> Option<usize> {
         let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
         for entry in begin..end {
             let Some((row, column)) = M::STRUCTURE.jacobian.get(entry) else { continue };
             let unknown = column.saturating_sub(M::Shape::NX);
-            if row == equation && holds(unknown) {
+            if row == equation && predicate(unknown) {
                 return Some(unknown);
             }
         }
@@ -73,27 +75,27 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 
     /// The algebraic state for whose value an equation has none: with another one it has. The
     /// points of the stages are left anywhere.
-    fn without_value(&mut self, equation: usize) -> Option<usize> {
+    fn find_undefined_state(&mut self, equation: usize) -> Option<usize> {
         Self::find_algebraic(equation, &mut |unknown| {
             let variable = unknown + M::Shape::NX;
             let Some(start) = self.points.as_ref().get(variable).copied() else { return false };
             let mut has_value = false;
-            for value in TRIED {
-                self.place_point(variable, [T::from_f64(value); S]);
+            for value in TRIAL_VALUES {
+                self.set_perturbed_stage_variable(variable, [T::from_f64(value); S]);
                 self.evaluate_jacobian();
-                has_value = self.has_value(equation);
+                has_value = self.is_equation_finite(equation);
                 if has_value {
                     break;
                 }
             }
-            self.place_point(variable, start);
+            self.set_perturbed_stage_variable(variable, start);
             has_value
         })
     }
 
     /// Whether the residual of an equation and its row of the Jacobian are finite.
-    fn has_value(&self, equation: usize) -> bool {
-        let jacobian = self.linear.jacobian.as_ref();
+    fn is_equation_finite(&self, equation: usize) -> bool {
+        let jacobian = self.linearization.jacobian.as_ref();
         for (row, _, values) in entries::<M, _>(jacobian) {
             if row == equation && find_non_finite(values).is_some() {
                 return false;
@@ -102,7 +104,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         self.f.as_ref().get(equation).is_some_and(|f| find_non_finite(f).is_none())
     }
 
-    fn place_point(&mut self, variable: usize, value: [T; S]) {
+    fn set_perturbed_stage_variable(&mut self, variable: usize, value: [T; S]) {
         if let Some(point) = self.points.as_mut().get_mut(variable) {
             *point = value;
         }

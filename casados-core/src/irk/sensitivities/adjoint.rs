@@ -1,7 +1,7 @@
 //! Adjoint sensitivities as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
+use crate::finite::check_model_input;
 use crate::irk::driver::Arguments;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithAdjoint};
@@ -39,7 +39,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<1>,
     {
-        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), None)
+        self.solve_adjoint(&Arguments { x0, u, h }, lambda.as_slice(), None)
     }
 
     /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
@@ -56,40 +56,40 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        self.backward(&Arguments { x0, u, h }, lambdas.as_slice(), None)
+        self.solve_adjoint(&Arguments { x0, u, h }, lambdas.as_slice(), None)
     }
 
-    pub(in crate::irk) fn backward<const C: usize>(
+    pub(in crate::irk) fn solve_adjoint<const C: usize>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         seeds: &[T],
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T, C>, Error>
     where
         W: WithAdjoint<C>,
     {
-        self.run.needs(check_named::<M, T>(Argument::Lambda, seeds))?;
-        reset_integrand(&mut along);
-        let memory = self.run.needs(W::adjoint(&mut self.adjoint))?;
+        self.run.invalidate_solution_on_error(check_model_input::<M, T>(Argument::Lambda, seeds))?;
+        reset_integrand(&mut integrand);
+        let memory = self.run.invalidate_solution_on_error(W::adjoint(&mut self.adjoint))?;
         let count = self.run.options.steps;
         // On the way forth only the last step is linearised: it is where the way back begins.
-        let mut parts = self.run.steps(arguments, |parts, n, step, exact| {
-            if let Some(integrand) = &mut along {
-                parts.work.along_value(parts.coefficients, n, step, &mut **integrand)?;
+        let mut context = self.run.run_steps(arguments, |parts, n, step, exact| {
+            if let Some(integrand) = &mut integrand {
+                parts.workspace.add_integrand_value(parts.coefficients, n, step, &mut **integrand)?;
             }
             if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
         })?;
-        memory.backward.start(seeds, &[]);
-        for (n, step) in parts.steps.iter().enumerate().rev() {
+        memory.backward.set_seeds(seeds, &[]);
+        for (n, step) in context.steps.iter().enumerate().rev() {
             if n + 1 < count {
-                parts.linearize(n, step, false)?;
+                context.linearize(n, step, false)?;
             }
-            memory.backward.step(&mut parts, &mut None, n, step, &mut along)?;
+            memory.backward.step_backwards(&mut context, &mut None, n, step, &mut integrand)?;
         }
-        memory.finish(parts.work)?;
-        finish_integrand(&mut along)?;
-        self.sweep = None;
-        self.run.keep()?;
+        memory.finish(context.workspace)?;
+        finish_integrand(&mut integrand)?;
+        self.differentiated_step = None;
+        self.run.commit()?;
         Ok(&memory.result)
     }
 }

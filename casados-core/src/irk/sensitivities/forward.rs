@@ -1,11 +1,11 @@
 //! Forward sensitivities, in all directions or in given ones, as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
-use crate::irk::dense_output::Point;
-use crate::irk::driver::{Arguments, Parts};
-use crate::irk::forward::gradient::gradient;
-use crate::irk::forward::memory::{ForwardMemory, StepOf};
+use crate::finite::check_model_input;
+use crate::irk::dense_output::StepPoint;
+use crate::irk::driver::{Arguments, CallContext};
+use crate::irk::forward::gradient::checked_gradient;
+use crate::irk::forward::memory::{ForwardMemory, StepIndex};
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithDirectional, WithForward};
 use crate::model::{Dae, VectorU, VectorX};
@@ -37,7 +37,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
-        self.keep_forward()
+        self.commit_forward()
     }
 
     /// [`Integrator::forward`] into a result elsewhere, which is no result if there is an error.
@@ -51,7 +51,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         self.differentiate::<false>(arguments, None, Some(to))?;
-        self.keep_forward().map(|_| ())
+        self.commit_forward().map(|_| ())
     }
 
     /// As [`Integrator::forward`], with an integrand, and with derivatives refined where digits
@@ -62,13 +62,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
     {
-        self.differentiate::<true>(&Arguments { x0, u, h }, along, None)?;
-        self.keep_forward()
+        self.differentiate::<true>(&Arguments { x0, u, h }, integrand, None)?;
+        self.commit_forward()
     }
 
     /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the
@@ -86,10 +86,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda.as_slice()))?;
+        self.run
+            .invalidate_solution_on_error(check_model_input::<M, T>(Argument::Lambda, lambda.as_slice()))?;
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
-        gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
-        self.keep_forward()?;
+        checked_gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
+        self.commit_forward()?;
         Ok(&W::forward(&mut self.forward)?.result)
     }
 
@@ -105,10 +106,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda))?;
+        self.run.invalidate_solution_on_error(check_model_input::<M, T>(Argument::Lambda, lambda))?;
         self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
-        gradient(to, lambda)?;
-        self.keep_forward().map(|_| ())
+        checked_gradient(to, lambda)?;
+        self.commit_forward().map(|_| ())
     }
 
     /// Derivatives, written to the memory of `forward` or elsewhere. Not optimised once more with
@@ -117,37 +118,38 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     pub(in crate::irk) fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
         to: Option<&mut Forward<M, T>>,
     ) -> Result<(), Error>
     where
         W: WithForward,
     {
-        self.sweep = None;
-        reset_integrand(&mut along);
-        let ForwardMemory { result, pass, .. } = self.run.needs(W::forward(&mut self.forward))?;
-        let distant = to.is_some();
+        self.differentiated_step = None;
+        reset_integrand(&mut integrand);
+        let ForwardMemory { result, pass, .. } =
+            self.run.invalidate_solution_on_error(W::forward(&mut self.forward))?;
+        let prefetch_output = to.is_some();
         let to = to.unwrap_or(&mut result.forward);
         let count = self.run.options.steps;
-        let parts = self.run.steps(arguments, |parts, n, step, exact| {
+        let context = self.run.run_steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            pass.step::<_, REFINED>(parts, StepOf { n, count, distant }, None, to)?;
-            match &mut along {
-                Some(integrand) => parts.along_forward(n, step, &pass.sweep, false, &mut **integrand),
+            pass.step::<_, REFINED>(parts, StepIndex { n, count, prefetch_output }, None, to)?;
+            match &mut integrand {
+                Some(integrand) => parts.add_integrand_forward(n, step, &pass.sweep, false, &mut **integrand),
                 None => Ok(()),
             }
         })?;
-        pass.finish::<W::Fallback>(&parts.work.result, count - 1, to)?;
-        finish_integrand(&mut along)
+        pass.finish::<W::Fallback>(&context.workspace.result, count - 1, to)?;
+        finish_integrand(&mut integrand)
     }
 
     /// After a successful call, whose stages and their derivatives are kept.
-    pub(in crate::irk) fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
+    pub(in crate::irk) fn commit_forward(&mut self) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
     {
-        self.run.keep()?;
-        self.sweep = Some(self.run.options.steps - 1);
+        self.run.commit()?;
+        self.differentiated_step = Some(self.run.options.steps - 1);
         Ok(&W::forward(&mut self.forward)?.result.forward)
     }
 
@@ -157,7 +159,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// [`Error::NoResult`]
     #[cfg(feature = "alloc")]
-    pub(crate) fn slopes(
+    pub(crate) fn slope_derivatives(
         &mut self,
         weights: &[f64],
         to: &mut crate::model::ArrayW<M, crate::model::ArrayX<M, T>>,
@@ -166,7 +168,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         let weights: &[f64; S] = weights.first_chunk().ok_or(Error::NoResult)?;
-        W::forward(&mut self.forward)?.pass.slopes(&weights.map(T::from_f64), to);
+        W::forward(&mut self.forward)?.pass.slope_derivatives(&weights.map(T::from_f64), to);
         Ok(())
     }
 
@@ -183,26 +185,27 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         let forward = W::forward(&mut self.forward)?;
-        let last = self.run.last()?;
-        let point = Point::new(t, &last.work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
-        let done = self.sweep.take().filter(|done| *done <= point.step);
+        let last = self.run.last_call()?;
+        let point =
+            StepPoint::new(t, &last.workspace.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
+        let differentiated = self.differentiated_step.take().filter(|done| *done <= point.step);
         // Those of the last call stay what they are.
         let mut statistics = Statistics::default();
-        let mut parts = Parts { statistics: &mut statistics, ..last };
-        parts.work.inputs = parts.work.last_inputs;
+        let mut context = CallContext { statistics: &mut statistics, ..last };
+        context.workspace.inputs = context.workspace.last_inputs;
         // Factors that are there may be those of a call that failed.
-        parts.work.begin();
-        let first = done.map_or(0, |done| done + 1);
-        for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
-            parts.linearize(n, step, false)?;
+        context.workspace.begin_call();
+        let first = differentiated.map_or(0, |done| done + 1);
+        for (n, step) in context.steps.iter().enumerate().take(point.step + 1).skip(first) {
+            context.linearize(n, step, false)?;
             let ForwardMemory { result, pass, .. } = &mut *forward;
             // None of them is the last one: there is a result already.
-            let at = StepOf { n, count: usize::MAX, distant: false };
-            pass.step::<_, false>(&mut parts, at, None, &mut result.forward)?;
+            let at = StepIndex { n, count: usize::MAX, prefetch_output: false };
+            pass.step::<_, false>(&mut context, at, None, &mut result.forward)?;
         }
-        self.sweep = Some(point.step);
-        let h = parts.work.last_inputs.time.step;
-        if let Some(step) = parts.steps.get(point.step) {
+        self.differentiated_step = Some(point.step);
+        let h = context.workspace.last_inputs.time.step;
+        if let Some(step) = context.steps.get(point.step) {
             point.evaluate(step, h, &mut forward.dense.dense)?;
         }
         point.differentiate::<_, W::Fallback>(h, forward)?;
@@ -237,19 +240,22 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithDirectional<C>,
     {
-        self.run.needs(check_named::<M, T>(Argument::SeedX, seeds.x0.as_slice()))?;
-        self.run.needs(check_named::<M, T>(Argument::SeedU, seeds.u.as_slice()))?;
-        self.run.needs(check_named::<M, T>(Argument::SeedP, seeds.p.as_slice()))?;
-        let memory = self.run.needs(W::directional(&mut self.directional))?;
-        memory.seed(seeds);
+        self.run
+            .invalidate_solution_on_error(check_model_input::<M, T>(Argument::SeedX, seeds.x0.as_slice()))?;
+        self.run
+            .invalidate_solution_on_error(check_model_input::<M, T>(Argument::SeedU, seeds.u.as_slice()))?;
+        self.run
+            .invalidate_solution_on_error(check_model_input::<M, T>(Argument::SeedP, seeds.p.as_slice()))?;
+        let memory = self.run.invalidate_solution_on_error(W::directional(&mut self.directional))?;
+        memory.set_seeds(seeds);
         let count = self.run.options.steps;
-        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+        let context = self.run.run_steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             memory.step(parts, n, count)
         })?;
-        memory.finish(parts.work, count - 1)?;
-        self.sweep = None;
-        self.run.keep()?;
+        memory.finish(context.workspace, count - 1)?;
+        self.differentiated_step = None;
+        self.run.commit()?;
         Ok(&memory.result)
     }
 
@@ -265,18 +271,18 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithDirectional<1>,
     {
         let memory = W::directional(&mut self.directional)?;
-        memory.seed(seeds);
+        memory.set_seeds(seeds);
         let count = self.run.options.steps;
-        self.run.steps(arguments, |parts, n, step, exact| {
+        self.run.run_steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             memory.step(parts, n, count)?;
             let to = to.get_mut(n).map_or(&mut [][..], |to| to.as_mut().as_flattened_mut());
-            for (to, &derivative) in to.iter_mut().zip(memory.stages()) {
+            for (to, &derivative) in to.iter_mut().zip(memory.stage_derivatives()) {
                 *to = *to + derivative;
             }
             Ok(())
         })?;
-        self.sweep = None;
-        self.run.keep().map(|_| ())
+        self.differentiated_step = None;
+        self.run.commit().map(|_| ())
     }
 }

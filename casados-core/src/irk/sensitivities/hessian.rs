@@ -1,10 +1,10 @@
 //! Second-order sensitivities as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_named;
+use crate::finite::check_model_input;
 use crate::irk::driver::Arguments;
-use crate::irk::forward::memory::StepOf;
-use crate::irk::hessian::pass::HessianMemory;
+use crate::irk::forward::memory::StepIndex;
+use crate::irk::hessian::backward_pass::HessianMemory;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithHessian};
 use crate::model::{Dae, VectorU, VectorX, VectorZ};
@@ -86,12 +86,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
         nu: &[T],
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,
     {
-        self.hessian_to(&Arguments { x0, u, h }, lambda.as_slice(), nu, along, None)?;
+        self.hessian_to(&Arguments { x0, u, h }, lambda.as_slice(), nu, integrand, None)?;
         Ok(&W::hessian(&mut self.hessian)?.result)
     }
 
@@ -102,41 +102,42 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         arguments: &Arguments<'_, M, T>,
         lambda: &[T],
         nu: &[T],
-        mut along: OptionalIntegrand<'_, '_, M, T>,
+        mut integrand: OptionalIntegrand<'_, '_, M, T>,
         to: Option<&mut Hessian<M, T>>,
     ) -> Result<(), Error>
     where
         W: WithHessian,
     {
-        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda))?;
-        self.run.needs(check_named::<M, T>(Argument::Nu, nu))?;
-        reset_integrand(&mut along);
-        self.sweep = None;
+        self.run.invalidate_solution_on_error(check_model_input::<M, T>(Argument::Lambda, lambda))?;
+        self.run.invalidate_solution_on_error(check_model_input::<M, T>(Argument::Nu, nu))?;
+        reset_integrand(&mut integrand);
+        self.differentiated_step = None;
         let count = self.run.options.steps;
-        let forward = &mut self.run.needs(W::forward(&mut self.forward))?.pass;
-        let HessianMemory { result, pass } = self.run.needs(W::hessian(&mut self.hessian))?;
-        let distant = to.is_some();
+        let forward = &mut self.run.invalidate_solution_on_error(W::forward(&mut self.forward))?.pass;
+        let HessianMemory { result, pass } =
+            self.run.invalidate_solution_on_error(W::hessian(&mut self.hessian))?;
+        let prefetch_output = to.is_some();
         let to = to.unwrap_or(result);
-        let kept = self.run.needs(W::hessian_tape(&mut self.hessian_tape, count))?;
-        let parts = self.run.steps(arguments, |parts, n, step, exact| {
+        let tape = self.run.invalidate_solution_on_error(W::hessian_tape(&mut self.hessian_tape, count))?;
+        let context = self.run.run_steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            let Some(kept) = kept.get_mut(n) else { return Ok(()) };
-            let (at, to) = (StepOf { n, count, distant }, &mut to.first.forward);
-            forward.step::<_, false>(parts, at, Some(kept.curved()), to)?;
-            if let Some(integrand) = &mut along {
-                parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
+            let Some(kept) = tape.get_mut(n) else { return Ok(()) };
+            let (at, to) = (StepIndex { n, count, prefetch_output }, &mut to.first.forward);
+            forward.step::<_, false>(parts, at, Some(kept.stage_sensitivities_mut()), to)?;
+            if let Some(integrand) = &mut integrand {
+                parts.add_integrand_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
             // That of the last step is still there on the way back.
             if n + 1 < count {
-                kept.remember(parts.work);
+                kept.store_linearization(parts.workspace);
             }
             Ok(())
         })?;
-        forward.finish::<W::Fallback>(&parts.work.result, count - 1, &mut to.first.forward)?;
-        finish_integrand(&mut along)?;
-        let ahead = if distant { to.h_xx.as_slice() } else { &[] };
-        pass.run(parts, kept, [lambda, nu], ahead, reborrow(&mut along))?;
-        pass.finish::<W::Fallback>(along.as_ref().and_then(|integrand| integrand.second()), to)?;
-        self.keep_forward().map(|_| ())
+        forward.finish::<W::Fallback>(&context.workspace.result, count - 1, &mut to.first.forward)?;
+        finish_integrand(&mut integrand)?;
+        let prefetch = if prefetch_output { to.h_xx.as_slice() } else { &[] };
+        pass.run_backwards(context, tape, [lambda, nu], prefetch, reborrow(&mut integrand))?;
+        pass.finish::<W::Fallback>(integrand.as_ref().and_then(|integrand| integrand.hessian_sum()), to)?;
+        self.commit_forward().map(|_| ())
     }
 }

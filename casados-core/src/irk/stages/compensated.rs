@@ -18,14 +18,14 @@
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::irk::jacobian_entries::entries;
-use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, dispatch, displaced, dot_compensated, kernels, two_product};
+use crate::irk::workspace::StageWorkspace;
+use crate::linalg::{Arithmetic, Kernel, axpy_compensated, dispatch, dot_compensated, kernels, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
 use crate::shape::Shape;
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Writes `ξ_i`, and keeps `δ_i`, for [`correct_residual`](Self::correct_residual).
     pub(crate) fn place_compensated(
         &mut self,
@@ -34,10 +34,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         y: &ArrayK<M, [E; S]>,
     ) {
         let states = M::Shape::NX..2 * M::Shape::NX;
-        let [beyond, _] = &mut self.probe;
-        dispatch(Place {
+        let [beyond, _] = &mut self.variable_scratch;
+        dispatch(PlaceCompensated {
             points: self.points.as_mut().get_mut(states.clone()).unwrap_or_default(),
-            beyond: beyond.as_mut().get_mut(states).unwrap_or_default(),
+            stage_compensation: beyond.as_mut().get_mut(states).unwrap_or_default(),
             x: x.as_ref(),
             compensation: self.compensation.as_ref(),
             y: y.as_ref(),
@@ -51,7 +51,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// `f ← f + f_x δ`, with the Jacobian that is there.
     pub(crate) fn correct_residual(&mut self) {
         let (begin, end) = (M::Shape::NX, 2 * M::Shape::NX);
-        let (jacobian, [beyond, _]) = (self.linear.jacobian.as_ref(), &self.probe);
+        let (jacobian, [beyond, _]) = (self.linearization.jacobian.as_ref(), &self.variable_scratch);
         for (r, c, values) in entries::<M, _>(jacobian) {
             if !(begin..end).contains(&c) {
                 continue;
@@ -65,9 +65,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
-struct Place<'a, E, const S: usize> {
+struct PlaceCompensated<'a, E, const S: usize> {
     points: &'a mut [[E; S]],
-    beyond: &'a mut [[E; S]],
+    stage_compensation: &'a mut [[E; S]],
     x: &'a [E],
     compensation: &'a [E],
     y: &'a [[E; S]],
@@ -77,18 +77,19 @@ struct Place<'a, E, const S: usize> {
     h: E,
 }
 
-impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
+impl<E: Field, const S: usize> Kernel for PlaceCompensated<'_, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { points, beyond, x, compensation, y, a, b, symplectic, h } = self;
-        let more = if symplectic { conjugate::<A, E, S>(a, b) } else { [[E::from_f64(0.0); S]; S] };
+        let Self { points, stage_compensation: beyond, x, compensation, y, a, b, symplectic, h } = self;
+        let correction =
+            if symplectic { symplectic_correction::<A, E, S>(a, b) } else { [[E::from_f64(0.0); S]; S] };
         let states = x.iter().zip(compensation).zip(y);
         for ((xi, beyond), ((&x, &compensation), k)) in points.iter_mut().zip(beyond).zip(states) {
-            for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&more)) {
+            for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&correction)) {
                 let [sum, lost] = dot_compensated::<A, E>(a.iter().zip(k));
-                [*xi, *beyond] = displaced::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
+                [*xi, *beyond] = axpy_compensated::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
             }
         }
     }
@@ -96,8 +97,11 @@ impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
 
 /// What `A` needs beyond its digits for `b_i a_ij + b_j a_ji = b_i b_j`.
 #[inline(always)]
-fn conjugate<A: Arithmetic, E: Field, const S: usize>(a: &[[E; S]; S], b: &[E; S]) -> [[E; S]; S] {
-    let mut more = [[E::from_f64(0.0); S]; S];
+fn symplectic_correction<A: Arithmetic, E: Field, const S: usize>(
+    a: &[[E; S]; S],
+    b: &[E; S],
+) -> [[E; S]; S] {
+    let mut correction = [[E::from_f64(0.0); S]; S];
     for i in 0..S {
         for j in 0..=i {
             let [whole, rest] = two_product::<A, E>(b[i], b[j]);
@@ -106,11 +110,11 @@ fn conjugate<A: Arithmetic, E: Field, const S: usize>(a: &[[E; S]; S], b: &[E; S
             let [part, lost] = two_sum(whole, -above);
             let missing = (part - below) + (lost + (rest - rest_above - rest_below));
             let half = missing * E::from_f64(0.5);
-            more[i][j] = half / b[i];
-            more[j][i] = half / b[j];
+            correction[i][j] = half / b[i];
+            correction[j][i] = half / b[j];
         }
     }
-    more
+    correction
 }
 
 kernels! {
@@ -123,7 +127,7 @@ kernels! {
         h: E,
     ) {
         for ((x, compensation), k) in x.iter_mut().zip(compensation).zip(y) {
-            [*x, *compensation] = displaced::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
+            [*x, *compensation] = axpy_compensated::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
         }
     }
 }

@@ -5,17 +5,17 @@
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::stage_values;
-use crate::irk::kinematic::{self, are_together, derivative};
-use crate::irk::stage_array::Stages;
-use crate::irk::workspace::{Times, Work};
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, dispatch, each_row, kernels, minus_ha};
+use crate::irk::kinematic::{self, has_no_kinematic_unknowns, kinematic_derivative};
+use crate::irk::stage_array::StageArray;
+use crate::irk::workspace::{IntervalTimes, StageWorkspace};
+use crate::linalg::{Arithmetic, Block, Kernel, RowVisitor, dispatch, for_each_row, kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::{Lanes, SideBySide, Strided};
 use crate::shape::{Matrix, Plain, Shape};
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Writes `u` and `p`, which are the same at all points of an interval.
     pub(crate) fn place_inputs(&mut self) {
         let u = 2 * M::Shape::NX + M::Shape::NZ;
@@ -27,14 +27,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// Writes `(k_i, ξ_i, z_i, t_i)` with `ξ_i = x + h Σ_j a_ij k_j`.
     #[inline]
-    pub(crate) fn place(
+    pub(crate) fn place_stages(
         &mut self,
         coefficients: &Coefficients<E, S>,
         step: usize,
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        self.place_at::<false>(coefficients, step, x, y);
+        self.dispatch_place::<false>(coefficients, step, x, y);
     }
 
     /// The same, with the `k_i` of [kinematic](crate::irk::kinematic) states as they follow from
@@ -47,24 +47,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        if const { !kinematic::is_any::<M>() } {
-            return self.place(coefficients, step, x, y);
+        if const { !kinematic::has_kinematic_states::<M>() } {
+            return self.place_stages(coefficients, step, x, y);
         }
-        self.place_at::<true>(coefficients, step, x, y);
+        self.dispatch_place::<true>(coefficients, step, x, y);
     }
 
     #[inline(always)]
-    fn place_at<const UNKNOWNS: bool>(
+    fn dispatch_place<const UNKNOWNS: bool>(
         &mut self,
         coefficients: &Coefficients<E, S>,
         step: usize,
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        dispatch(Place::<_, E, S, UNKNOWNS> {
+        dispatch(PlaceStages::<_, E, S, UNKNOWNS> {
             plan: F::plan::<M>(),
             points: F::Plan::<M>::v_mut(&mut self.points),
-            jacobian: F::Plan::<M>::jacobian(&self.linear.jacobian),
+            jacobian: F::Plan::<M>::jacobian(&self.linearization.jacobian),
             x: F::Plan::<M>::x(x),
             y: F::Plan::<M>::k(y),
             a: &coefficients.a,
@@ -82,13 +82,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The residual and the Jacobian at all stages.
     pub(crate) fn evaluate_jacobian(&mut self) {
         self.evaluate::<true>();
-        self.complete();
+        self.replicate_jacobian();
     }
 
     /// The residual at all stages, which may be there, and one Jacobian for all of them: that in
     /// their middle. Of a single lane it is that of each, as its stages are evaluated side by side
     /// where a machine can: the mean of those is taken.
-    pub(crate) fn evaluate_middle(
+    pub(crate) fn evaluate_midpoint_jacobian(
         &mut self,
         coefficients: &Coefficients<E, S>,
         step: usize,
@@ -96,58 +96,58 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         y: &ArrayK<M, [E; S]>,
         residual: bool,
     ) {
-        if const { E::LANES == 1 } || self.alike {
+        if const { E::LANES == 1 } || self.identical_stages {
             self.evaluate::<true>();
             if const { E::LANES == 1 } {
-                self.complete();
+                self.replicate_jacobian();
             }
             return;
         }
         to_middle(self.points.as_mut(), 2 * M::Shape::NX + M::Shape::NZ);
-        self.at_stage::<true>(0);
-        self.first_only = true;
+        self.evaluate_stage::<true>(0);
+        self.first_stage_only = true;
         self.place_unknowns(coefficients, step, x, y);
         if residual {
-            self.at_stage::<false>(0);
+            self.evaluate_stage::<false>(0);
         } else {
             self.evaluate_residual();
         }
     }
 
     /// The Jacobian at all stages, if it is there for the first one only.
-    pub(crate) fn complete(&mut self) {
-        if core::mem::take(&mut self.first_only) {
-            spread(self.linear.jacobian.as_mut());
+    pub(crate) fn replicate_jacobian(&mut self) {
+        if core::mem::take(&mut self.first_stage_only) {
+            spread(self.linearization.jacobian.as_mut());
         }
     }
 
     #[inline(always)]
     fn evaluate<const JACOBIAN: bool>(&mut self) {
         // Of stages that are all alike one is evaluated.
-        let alike = core::mem::take(&mut self.alike);
-        let Self { points, f, linear, first_only, .. } = self;
+        let alike = core::mem::take(&mut self.identical_stages);
+        let Self { points, f, linearization: linear, first_stage_only: first_only, .. } = self;
         if JACOBIAN {
             *first_only = false;
         }
         let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian };
         if E::side_by_side(call).is_err() {
             for i in 0..if alike { 1 } else { S } {
-                self.at_stage::<JACOBIAN>(i);
+                self.evaluate_stage::<JACOBIAN>(i);
             }
             if alike {
                 spread(self.f.as_mut());
-                self.first_only |= JACOBIAN;
+                self.first_stage_only |= JACOBIAN;
             }
         }
     }
 
     /// The residual, and the Jacobian if it is asked for, at a stage.
     #[inline(always)]
-    fn at_stage<const JACOBIAN: bool>(&mut self, i: usize) {
-        let Self { points, f, linear, .. } = self;
-        let (point, f) = (points.seen_from(i), f.seen_from_mut(i));
+    fn evaluate_stage<const JACOBIAN: bool>(&mut self, i: usize) {
+        let Self { points, f, linearization: linear, .. } = self;
+        let (point, f) = (points.stage_view(i), f.stage_view_mut(i));
         if JACOBIAN {
-            M::residual_jacobian::<Strided<E, S>>(point, f, linear.jacobian.seen_from_mut(i));
+            M::residual_jacobian::<Strided<E, S>>(point, f, linear.jacobian.stage_view_mut(i));
         } else {
             M::residual::<Strided<E, S>>(point, f);
         }
@@ -159,13 +159,13 @@ kernels! {
     /// are the same at all of them.)
     fn to_middle [E: Lanes, const S: usize] [E, S] <A>(points: &'k mut [[E; S]], inputs: usize) {
         let (own, rest) = points.split_at_mut(inputs.min(points.len()));
-        let share = E::from_f64(const { 1.0 / S as f64 });
+        let stage_weight = E::from_f64(const { 1.0 / S as f64 });
         for stages in own.iter_mut().chain(rest.last_mut()) {
             let mut total = stages[0];
             for &stage in &stages[1..] {
                 total = total + stage;
             }
-            stages[0] = share * total;
+            stages[0] = stage_weight * total;
         }
     }
 }
@@ -181,9 +181,9 @@ kernels! {
 
 /// `f`, and its Jacobian if it is asked for, at all stages in one call.
 struct Evaluate<'a, M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> {
-    points: &'a Stages<ArrayV<M, [E; S]>, E, S>,
-    f: &'a mut Stages<ArrayK<M, [E; S]>, E, S>,
-    jacobian: &'a mut Stages<M::Jacobian<[E; S]>, E, S>,
+    points: &'a StageArray<ArrayV<M, [E; S]>, E, S>,
+    f: &'a mut StageArray<ArrayK<M, [E; S]>, E, S>,
+    jacobian: &'a mut StageArray<M::Jacobian<[E; S]>, E, S>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
@@ -200,7 +200,7 @@ impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
 }
 
 /// See [`Work::place`] and [`Work::place_unknowns`].
-struct Place<'a, M: Plan, E: Plain, const S: usize, const UNKNOWNS: bool> {
+struct PlaceStages<'a, M: Plan, E: Plain, const S: usize, const UNKNOWNS: bool> {
     plan: M,
     points: &'a mut M::V<[E; S]>,
     jacobian: &'a M::Jacobian<[E; S]>,
@@ -208,11 +208,11 @@ struct Place<'a, M: Plan, E: Plain, const S: usize, const UNKNOWNS: bool> {
     y: &'a M::K<[E; S]>,
     a: &'a [[E; S]; S],
     c: &'a [E; S],
-    time: Times<E>,
+    time: IntervalTimes<E>,
     step: usize,
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_, M, E, S, UNKNOWNS> {
+impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for PlaceStages<'_, M, E, S, UNKNOWNS> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -232,22 +232,23 @@ impl<M: Plan, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'
         let minus_ha = minus_ha(a, h);
         // Of kinematic states, which are most often the first or the last, there is nothing to
         // copy.
-        let (first, end) = if UNKNOWNS { plan.facts().unknowns } else { (0, y.len()) };
-        let k = first..nx.min(end).max(first);
+        let (first, end) = if UNKNOWNS { plan.facts().non_kinematic_range } else { (0, y.len()) };
+        let states = first..nx.min(end).max(first);
         let (xdot, rest) = points.split_at_mut(nx);
         let (xi, rest) = rest.split_at_mut(nx);
         rest[..y.len() - nx].copy_from_slice(&y[nx..]);
-        let own_x = x.get(k.clone()).unwrap_or_default().iter();
-        let (own_xdot, own_xi) = (xdot.get_mut(k.clone()), xi.get_mut(k.clone()));
+        let own_x = x.get(states.clone()).unwrap_or_default().iter();
+        let (own_xdot, own_xi) = (xdot.get_mut(states.clone()), xi.get_mut(states.clone()));
         let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
-        let own_y = y.get(k.clone()).unwrap_or_default();
-        for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
-            if !(UNKNOWNS && (const { !are_together::<M>() }) && plan.kinematic(state).is_some()) {
+        let own_y = y.get(states.clone()).unwrap_or_default();
+        for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(states).zip(own_y) {
+            if !(UNKNOWNS && (const { !has_no_kinematic_unknowns::<M>() }) && plan.kinematic(state).is_some())
+            {
                 (*xdot, *xi) = (*k, stage_values::<A, E, S>(x, &minus_ha, k));
             }
         }
         if UNKNOWNS {
-            each_row::<A, _>(&mut Reconstruct { plan, points, jacobian, x, minus_ha });
+            for_each_row::<A, _>(&mut Reconstruct { plan, points, jacobian, x, minus_ha });
         }
     }
 }
@@ -261,16 +262,16 @@ struct Reconstruct<'a, M, E, const S: usize> {
     minus_ha: Block<E, S>,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
-    const ROWS: Option<usize> = Table::Kinematic.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize> RowVisitor for Reconstruct<'_, M, E, S> {
+    const ROWS: Option<usize> = StructureTable::Kinematic.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Kinematic.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Kinematic.row_count(self.plan.structure())
     }
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Some(k) = derivative(self.plan, state, self.jacobian, self.points) else { return };
+        let Some(k) = kinematic_derivative(self.plan, state, self.jacobian, self.points) else { return };
         let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
         *xdot = k;
         if let Some(xi) = self.points.get_mut(self.plan.nx() + state) {

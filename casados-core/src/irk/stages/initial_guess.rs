@@ -1,7 +1,7 @@
 //! Where Newton's method starts: the unknowns of the stages before its first iteration.
 
 use crate::irk::coefficients::{Coefficients, stage_values};
-use crate::irk::workspace::{Step, Work};
+use crate::irk::workspace::{StageWorkspace, Step};
 use crate::linalg::{kernels, minus_ha};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
@@ -19,19 +19,19 @@ pub(crate) enum InitialGuess<'a, M: Dae, E: Lanes, const S: usize> {
     Solution(&'a [Step<M, E, S>]),
 }
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
     /// Start values of the stages of step `n`: after the first one the polynomial of the step
     /// before, continued, or if that is not worth much its algebraic states.
-    pub(crate) fn start(
+    pub(crate) fn set_initial_guess(
         &mut self,
         coefficients: &Coefficients<E, S>,
-        from: &InitialGuess<'_, M, E, S>,
+        guess: &InitialGuess<'_, M, E, S>,
         n: usize,
-        before: Option<&Step<M, E, S>>,
+        previous: Option<&Step<M, E, S>>,
         y: &mut ArrayK<M, [E; S]>,
     ) {
-        self.alike = false;
-        match (from, before, &coefficients.next) {
+        self.identical_stages = false;
+        match (guess, previous, &coefficients.lagrange_next) {
             (InitialGuess::Previous(steps) | InitialGuess::Solution(steps), ..) => {
                 if let Some(step) = steps.get(n) {
                     copy_into(y, &step.y);
@@ -42,34 +42,34 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             (InitialGuess::Nominal | InitialGuess::Zero, ..) => {
                 y.as_mut().fill([E::from_f64(0.0); S]);
-                self.alike = M::STRUCTURE.autonomous;
-                if matches!(from, InitialGuess::Nominal) {
+                self.identical_stages = M::STRUCTURE.autonomous;
+                if matches!(guess, InitialGuess::Nominal) {
                     for (y, start) in y.as_mut().iter_mut().zip(M::START) {
                         *y = [E::from_f64(*start); S];
                     }
-                    self.alike &= const { starts_at_rest::<M>() };
+                    self.identical_stages &= const { starts_at_rest::<M>() };
                 }
             }
             (InitialGuess::Given, ..) => {
-                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
+                for (y, given) in y.as_mut().iter_mut().zip(self.start_values.as_ref()) {
                     *y = [*given; S];
                 }
             }
         }
-        if coefficients.next.is_none()
-            && !matches!(from, InitialGuess::Previous(_) | InitialGuess::Solution(_))
+        if coefficients.lagrange_next.is_none()
+            && !matches!(guess, InitialGuess::Previous(_) | InitialGuess::Solution(_))
         {
-            stay(before, y);
+            copy_algebraic_states(previous, y);
         }
     }
 }
 
 /// Algebraic states as at the last stage of the step before: on its branch.
-pub(in crate::irk) fn stay<M: Dae, E: Lanes, const S: usize>(
-    before: Option<&Step<M, E, S>>,
+pub(in crate::irk) fn copy_algebraic_states<M: Dae, E: Lanes, const S: usize>(
+    previous: Option<&Step<M, E, S>>,
     y: &mut ArrayK<M, [E; S]>,
 ) {
-    let Some(before) = before else { return };
+    let Some(before) = previous else { return };
     for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
         if let Some(&last) = before.last() {
             *y = [last; S];

@@ -72,9 +72,9 @@ pub trait Arithmetic {
 }
 
 /// Rounded twice.
-pub struct Separate;
+pub struct Unfused;
 
-impl Arithmetic for Separate {
+impl Arithmetic for Unfused {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t - a * b
@@ -102,26 +102,26 @@ impl<const WIDE: bool, const UNROLLED: bool> Arithmetic for Fused<WIDE, UNROLLED
         left: &Block<E, S>,
         right: &Block<E, S>,
     ) {
-        E::subtract_blocks(target, left, right, Known::<WIDE>::here());
+        E::subtract_blocks(target, left, right, Known::<WIDE>::assume_detected());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
-        E::subtract_columns(target, block, x, Known::<WIDE>::here());
+        E::subtract_columns(target, block, x, Known::<WIDE>::assume_detected());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
-        E::subtract_row(target, factor, row, Known::<WIDE>::here());
+        E::subtract_row(target, factor, row, Known::<WIDE>::assume_detected());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
-        E::write_block(target, block, Known::<WIDE>::here());
+        E::write_block(target, block, Known::<WIDE>::assume_detected());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
-        E::transposed(rows, Known::<WIDE>::here())
+        E::transposed(rows, Known::<WIDE>::assume_detected())
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
-        E::subtract_products(target, a, b, Known::<WIDE>::here());
+        E::subtract_products(target, a, b, Known::<WIDE>::assume_detected());
     }
 }

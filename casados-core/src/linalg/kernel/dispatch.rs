@@ -8,7 +8,7 @@
 use super::arithmetic::Arithmetic;
 #[cfg(target_arch = "aarch64")]
 use super::arithmetic::Fused;
-use super::arithmetic::Separate;
+use super::arithmetic::Unfused;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level, may_be};
 #[cfg(target_arch = "x86_64")]
@@ -67,7 +67,7 @@ pub(crate) use kernels;
 /// is compiled: where that is more than kernels could save.
 #[inline(always)]
 pub fn run_plain<K: Kernel>(kernel: K) -> K::Output {
-    if const { align_of::<K::Number>() < 32 } { kernel.run::<Separate>() } else { dispatch(kernel) }
+    if const { align_of::<K::Number>() < 32 } { kernel.run::<Unfused>() } else { dispatch(kernel) }
 }
 
 /// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
@@ -80,7 +80,7 @@ pub fn run_plain<K: Kernel>(kernel: K) -> K::Output {
 #[allow(unsafe_code)]
 mod compiled {
     pub mod base {
-        use super::super::{Kernel, Separate};
+        use super::super::{Kernel, Unfused};
         use core::mem::ManuallyDrop;
 
         // Never inlined beside others, so that callers are small. Where it is the only one, the
@@ -91,7 +91,7 @@ mod compiled {
         #[cfg_attr(not(feature = "std"), inline(always))]
         pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
             // SAFETY: the caller's promise; and nobody drops it.
-            unsafe { ManuallyDrop::take(kernel) }.run::<Separate>()
+            unsafe { ManuallyDrop::take(kernel) }.run::<Unfused>()
         }
     }
 
@@ -128,26 +128,26 @@ mod compiled {
 /// may run the program. They are constants, so that the compiler looks into no others: of functions
 /// behind `if const` it looks into all.
 #[cfg(target_arch = "x86_64")]
-struct Entries<K>(PhantomData<K>);
+struct EntryPoints<K>(PhantomData<K>);
 
 /// It takes the kernel, which nobody may do after it.
 #[cfg(target_arch = "x86_64")]
-type Entry<K> = unsafe fn(&mut ManuallyDrop<K>) -> <K as Kernel>::Output;
+type EntryPoint<K> = unsafe fn(&mut ManuallyDrop<K>) -> <K as Kernel>::Output;
 
 #[cfg(target_arch = "x86_64")]
-impl<K: Kernel> Entries<K> {
+impl<K: Kernel> EntryPoints<K> {
     /// Whether its numbers are single, and fast. Unoptimised programs, where each copy of a kernel
     /// is much to compile and none is fast, have the one copy that runs everywhere.
-    const SINGLE: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
-    const IN_AVX512: Entry<K> =
+    const ARE_FAST_SCALARS: bool = align_of::<K::Number>() < 32 && !cfg!(debug_assertions);
+    const IN_AVX512: EntryPoint<K> =
         if K::WIDE { compiled::avx512::run::<K, false> } else { compiled::avx512::run::<K, true> };
-    const IN_AVX2: Entry<K> =
+    const IN_AVX2: EntryPoint<K> =
         if K::WIDE { compiled::avx2::run::<K, false> } else { compiled::avx2::run::<K, true> };
     /// Short kernels are faster without AVX-512.
-    const AVX512: Option<Entry<K>> =
-        if Self::SINGLE && K::WIDE && may_be(Level::Avx512) { Some(Self::IN_AVX512) } else { None };
-    const AVX2: Option<Entry<K>> =
-        if Self::SINGLE && (may_be(Level::Avx2) || !K::WIDE && may_be(Level::Avx512)) {
+    const AVX512_ENTRY: Option<EntryPoint<K>> =
+        if Self::ARE_FAST_SCALARS && K::WIDE && may_be(Level::Avx512) { Some(Self::IN_AVX512) } else { None };
+    const AVX2_ENTRY: Option<EntryPoint<K>> =
+        if Self::ARE_FAST_SCALARS && (may_be(Level::Avx2) || !K::WIDE && may_be(Level::Avx512)) {
             Some(Self::IN_AVX2)
         } else {
             None
@@ -155,7 +155,7 @@ impl<K: Kernel> Entries<K> {
     /// Where the machine has neither, or the kernel. Numbers that are registers, which are aligned
     /// to themselves, need what these are made of. Where the build names more than every machine
     /// has, nobody gets here.
-    const OTHERWISE: Entry<K> = match (align_of::<K::Number>(), Self::AVX2, Self::AVX512) {
+    const FALLBACK: EntryPoint<K> = match (align_of::<K::Number>(), Self::AVX2_ENTRY, Self::AVX512_ENTRY) {
         (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be(Level::Base) => run,
         (0..32, ..) => compiled::base::run::<K>,
         (32, ..) => Self::IN_AVX2,
@@ -163,7 +163,7 @@ impl<K: Kernel> Entries<K> {
     };
     /// Whether that is always so, and nothing is to be asked: also of unoptimised programs, where
     /// nobody else would find out.
-    const ALWAYS: bool = Self::AVX2.is_none() && Self::AVX512.is_none();
+    const FALLBACK_ONLY: bool = Self::AVX2_ENTRY.is_none() && Self::AVX512_ENTRY.is_none();
 }
 
 /// Runs a kernel as this machine does it best.
@@ -173,17 +173,17 @@ impl<K: Kernel> Entries<K> {
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
-    if const { Entries::<K>::ALWAYS } {
+    if const { EntryPoints::<K>::FALLBACK_ONLY } {
         // SAFETY: as at the end.
-        return unsafe { Entries::<K>::OTHERWISE(&mut kernel) };
+        return unsafe { EntryPoints::<K>::FALLBACK(&mut kernel) };
     }
-    if let Some(run) = Entries::<K>::AVX512
+    if let Some(run) = EntryPoints::<K>::AVX512_ENTRY
         && level() == Level::Avx512
     {
         // SAFETY: `level` says what the machine has.
         return unsafe { run(&mut kernel) };
     }
-    if let Some(run) = Entries::<K>::AVX2
+    if let Some(run) = EntryPoints::<K>::AVX2_ENTRY
         && level() >= Level::Avx2
     {
         // SAFETY: as above.
@@ -194,7 +194,7 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // no type of a user's can be any of these (`Lanes` is sealed). So what is aligned more is made
     // of registers of AVX2 or AVX-512, with which drivers compute only after detection; see the
     // head of `lanes`.
-    unsafe { Entries::<K>::OTHERWISE(&mut kernel) }
+    unsafe { EntryPoints::<K>::FALLBACK(&mut kernel) }
 }
 
 /// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one
@@ -209,5 +209,5 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Separate>()
+    kernel.run::<Unfused>()
 }

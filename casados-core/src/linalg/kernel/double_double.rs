@@ -24,7 +24,7 @@ pub fn dot_compensated<'a, A: Arithmetic, E: Field>(factors: impl Iterator<Item 
 
 /// `x + h d`
 #[inline(always)]
-pub fn displaced<A: Arithmetic, E: Field>(x: [E; 2], h: E, d: [E; 2]) -> [E; 2] {
+pub fn axpy_compensated<A: Arithmetic, E: Field>(x: [E; 2], h: E, d: [E; 2]) -> [E; 2] {
     let [change, rounded] = two_product::<A, E>(h, d[0]);
     let [high, lost] = two_sum(x[0], change);
     two_sum(high, lost + (x[1] + (rounded + h * d[1])))

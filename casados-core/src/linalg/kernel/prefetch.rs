@@ -2,12 +2,12 @@
 #![allow(unsafe_code)]
 
 /// Memory that is far away, whose lines are asked for one after the other.
-pub struct Ahead<'a, T>(pub &'a [T]);
+pub struct Prefetch<'a, T>(pub &'a [T]);
 
-impl<T> Ahead<'_, T> {
+impl<T> Prefetch<'_, T> {
     /// Asks for the next line. Of numbers that are registers themselves nothing is asked for.
     #[inline(always)]
-    pub fn next(&mut self) {
+    pub fn prefetch_line(&mut self) {
         if const { size_of::<T>() <= 8 }
             && let Some((line, rest)) = self.0.split_at_checked(const { 64 / size_of::<T>() })
         {

@@ -18,20 +18,20 @@
 use crate::linalg::block::{inverse, product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
-use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
+use crate::linalg::kernel::unroll::{PivotVisitor, is_large_plan, pivots_forward};
 use crate::model::{Pivot, Structure, Update};
 use crate::plan::Plan;
 use crate::scalar::Field;
 use crate::shape::copy;
 
 /// What a matrix is eliminated by.
-pub struct Planned<'a, M, E, const S: usize> {
+pub struct PlannedFactors<'a, M, E, const S: usize> {
     pub plan: M,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [Block<E, S>],
 }
 
-copy!(['a, M: Copy, E, const S: usize] Planned<'a, M, E, S>);
+copy!(['a, M: Copy, E, const S: usize] PlannedFactors<'a, M, E, S>);
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it
 /// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
@@ -49,18 +49,18 @@ pub(in crate::linalg) struct Factor<'a, M, E, const S: usize> {
 impl<M: Plan, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = S.is_multiple_of(4) && is_long::<M, S>();
+    const WIDE: bool = S.is_multiple_of(4) && is_large_plan::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        if has_all(self.plan, self.blocks) {
-            from_first::<A, M, _>(self.plan, &mut self);
+        if has_all_blocks(self.plan, self.blocks) {
+            pivots_forward::<A, M, _>(self.plan, &mut self);
         }
     }
 }
 
-impl<M: Plan, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+impl<M: Plan, E: Field, const S: usize> PivotVisitor for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
-    const UPDATES: bool = true;
+    const PER_UPDATE: bool = true;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [Update]) {
         let blocks = &mut *self.blocks;
@@ -87,11 +87,12 @@ impl<M: Plan, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             return;
         }
         // What is updated comes later.
-        let Some((own, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
+        let Some((own_blocks, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
         for lower in pivot.lower() {
-            let Some(&lower) = own.get(lower) else { continue };
+            let Some(&lower) = own_blocks.get(lower) else { continue };
             for (upper, target) in pivot.upper().zip(&mut updates) {
-                let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
+                let (upper, block) =
+                    (own_blocks.get(upper), later.get_mut((target.block - pivot.end) as usize));
                 if let (Some(upper), Some(block)) = (upper, block) {
                     update::<A, M, E, S>(block, target, &lower, upper);
                 }
@@ -120,21 +121,21 @@ fn update<A: Arithmetic, M: Plan, E: Field, const S: usize>(
 /// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less
 /// work than to ask; and where it is little.
 pub const fn begins_with_update<M: Plan, E>() -> bool {
-    let much = match M::KNOWN {
+    let has_much_fill = match M::KNOWN_STRUCTURE {
         Some(Structure { elimination, .. }) => 8 * elimination.fill() >= elimination.slots.len(),
         None => true,
     };
-    align_of::<E>() > 8 && much
+    align_of::<E>() > 8 && has_much_fill
 }
 
 /// Fill of the matrix, a row of its assembly.
 #[inline(always)]
 pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, zero: B) {
-    let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
+    let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
     if const { begins_with_update::<M, E>() } {
         return;
     }
-    if let Some(block) = blocks.get_mut(of.block as usize) {
+    if let Some(block) = blocks.get_mut(entry.block as usize) {
         *block = zero;
     }
 }
@@ -142,14 +143,14 @@ pub fn clear_fill<M: Plan, E, B: Copy>(plan: M, blocks: &mut [B], row: usize, ze
 /// Always; but the optimiser then knows their number, and with it how often loops over constant
 /// tables go round.
 #[inline(always)]
-pub fn has_all<M: Plan, B>(plan: M, blocks: &[B]) -> bool {
+pub fn has_all_blocks<M: Plan, B>(plan: M, blocks: &[B]) -> bool {
     blocks.len() == plan.structure().elimination.slots.len()
 }
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
 pub fn blocks_with_slots<'a, M: Plan, E, const S: usize>(
-    factors: Planned<'a, M, E, S>,
+    factors: PlannedFactors<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
     let slots = factors.plan.structure().elimination.slots.get(range.clone()).unwrap_or_default();

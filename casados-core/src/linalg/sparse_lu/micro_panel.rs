@@ -1,6 +1,6 @@
 //! Packets of right-hand sides, between memory and registers.
 
-use crate::linalg::block::{PanelRow, subtract};
+use crate::linalg::block::{PanelRow, subtract_product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::{Field, each};
 use crate::shape::{Array, Plain};
@@ -25,7 +25,7 @@ pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
 
 /// `panel_row − block · other`, with the other in the memory.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+pub fn subtract_from_memory<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     panel_row: &mut PanelRow<E, S, W>,
     block: &Block<E, S>,
     other: &[R; S],
@@ -33,7 +33,7 @@ pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize,
 ) {
     if const { W == 1 || size_of::<E>() <= 8 } {
         let other = load(core::slice::from_ref(other), 0, column);
-        subtract::<A, E, S, W>(panel_row, block, &other);
+        subtract_product::<A, E, S, W>(panel_row, block, &other);
         return;
     }
     each!(k < S => {

@@ -5,13 +5,13 @@
 //! other. Where one column fills registers, what is added to a row is added in them instead, and
 //! stored once.
 
-use super::factor::{Planned, blocks_with_slots, has_all};
-use super::micro_panel::{is_zero, load, store, subtract_of};
-use crate::linalg::block::{PanelRow, negate, subtract};
+use super::factor::{PlannedFactors, blocks_with_slots, has_all_blocks};
+use super::micro_panel::{is_zero, load, store, subtract_from_memory};
+use crate::linalg::block::{PanelRow, negate, subtract_product};
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
-use crate::linalg::kernel::prefetch::Ahead;
-use crate::linalg::kernel::unroll::{AtPivot, from_first, from_last, is_long};
+use crate::linalg::kernel::prefetch::Prefetch;
+use crate::linalg::kernel::unroll::{PivotVisitor, is_large_plan, pivots_backward, pivots_forward};
 use crate::model::{Pivot, Update};
 use crate::plan::Plan;
 use crate::scalar::Field;
@@ -24,7 +24,7 @@ use core::marker::PhantomData;
 /// Columns are taken in panel rows that fit registers, each through the whole elimination: a
 /// panel row of all rows stays in the nearest cache.
 pub fn solve<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
-    factors: Planned<'_, M, E, S>,
+    factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
     dispatch(Solve::<M, E, R, Down, Up, S> { factors, rows, systems: PhantomData });
@@ -32,7 +32,7 @@ pub fn solve<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
 
 /// Solves `Mᵀ X = R` in place.
 pub fn solve_transposed<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
-    factors: Planned<'_, M, E, S>,
+    factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
     dispatch(Solve::<M, E, R, TransposedDown, TransposedUp, S> { factors, rows, systems: PhantomData });
@@ -41,7 +41,7 @@ pub fn solve_transposed<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
 /// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
 /// registers themselves two at a time, or the panel row of all stages would not fit them.
 struct Solve<'a, M, E, R, First, Second, const S: usize> {
-    factors: Planned<'a, M, E, S>,
+    factors: PlannedFactors<'a, M, E, S>,
     rows: &'a mut [[R; S]],
     systems: PhantomData<(First, Second)>,
 }
@@ -51,29 +51,29 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, First: System, Second: System, cons
 {
     type Number = E;
     type Output = ();
-    const WIDE: bool = R::LEN >= 8 && is_long::<M, S>();
+    const WIDE: bool = R::LEN >= 8 && is_large_plan::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { factors, rows, .. } = self;
         let mut column = 0;
         if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
             while column + 8 <= R::LEN {
-                sweeps::<A, M, E, R, S, 8, First, Second>(factors, rows, column, &mut ());
+                solve_triangular_pair::<A, M, E, R, S, 8, First, Second>(factors, rows, column, &mut ());
                 column += 8;
             }
         }
         if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
-            sweeps::<A, M, E, R, S, 4, First, Second>(factors, rows, column, &mut ());
+            solve_triangular_pair::<A, M, E, R, S, 4, First, Second>(factors, rows, column, &mut ());
             column += 4;
         }
         if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
             while column + 2 <= R::LEN {
-                sweeps::<A, M, E, R, S, 2, First, Second>(factors, rows, column, &mut ());
+                solve_triangular_pair::<A, M, E, R, S, 2, First, Second>(factors, rows, column, &mut ());
                 column += 2;
             }
         }
         if const { R::LEN % 2 == 1 } {
-            sweeps::<A, M, E, R, S, 1, First, Second>(factors, rows, column, &mut ());
+            solve_triangular_pair::<A, M, E, R, S, 1, First, Second>(factors, rows, column, &mut ());
         }
     }
 }
@@ -85,24 +85,24 @@ pub trait Visitor<E, const S: usize, const W: usize> {
     fn on_solved<A: Arithmetic>(&mut self, _slot: usize, _packet: &PanelRow<E, S, W>) {}
     /// A pivot of the second system is done.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn pass(&mut self) {}
+    fn on_pivot_done(&mut self) {}
 }
 
 /// Nobody.
 impl<E, const S: usize, const W: usize> Visitor<E, S, W> for () {}
 
 /// Who asks for memory meanwhile, line by line.
-impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Ahead<'_, E> {
+impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Prefetch<'_, E> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn pass(&mut self) {
-        self.next();
+    fn on_pivot_done(&mut self) {
+        self.prefetch_line();
     }
 }
 
 /// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved
 /// through the second is shown to somebody, while it is in registers.
 #[inline(always)]
-pub fn sweeps<
+pub fn solve_triangular_pair<
     A: Arithmetic,
     M: Plan,
     E: Field + Plain,
@@ -112,31 +112,31 @@ pub fn sweeps<
     First: System,
     Second: System,
 >(
-    factors: Planned<'_, M, E, S>,
+    factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
     visitor: &mut impl Visitor<E, S, W>,
 ) {
-    if !has_all(factors.plan, factors.blocks) || rows.len() != factors.plan.nk() {
+    if !has_all_blocks(factors.plan, factors.blocks) || rows.len() != factors.plan.nk() {
         return;
     }
-    let viewer_of_first = &mut ();
-    let mut first = Along::<First, Substitution<'_, M, E, R, (), S, W>>(
-        Substitution { factors, rows, column, visitor: viewer_of_first },
+    let no_visitor = &mut ();
+    let mut first = SystemVisitor::<First, Substitution<'_, M, E, R, (), S, W>>(
+        Substitution { factors, rows, column, visitor: no_visitor },
         PhantomData,
     );
-    from_first::<A, M, _>(factors.plan, &mut first);
+    pivots_forward::<A, M, _>(factors.plan, &mut first);
     let rows = first.0.rows;
-    let mut second = Along::<Second, Substitution<'_, M, E, R, _, S, W>>(
+    let mut second = SystemVisitor::<Second, Substitution<'_, M, E, R, _, S, W>>(
         Substitution { factors, rows, column, visitor },
         PhantomData,
     );
-    from_last::<A, M, _>(factors.plan, &mut second);
+    pivots_backward::<A, M, _>(factors.plan, &mut second);
 }
 
 /// `W` columns of right-hand sides on their way.
 pub struct Substitution<'a, M, E, R, V, const S: usize, const W: usize> {
-    pub factors: Planned<'a, M, E, S>,
+    pub factors: PlannedFactors<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
     /// Of what is solved through `P + U`.
@@ -161,10 +161,10 @@ pub trait System {
 }
 
 /// A way through a system.
-struct Along<Y, T>(T, PhantomData<Y>);
+struct SystemVisitor<Y, T>(T, PhantomData<Y>);
 
 impl<Y: System, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    AtPivot for Along<Y, Substitution<'_, M, E, R, V, S, W>>
+    PivotVisitor for SystemVisitor<Y, Substitution<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
@@ -173,7 +173,7 @@ impl<Y: System, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, con
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Update]) {
         Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot);
-        self.0.visitor.pass();
+        self.0.visitor.on_pivot_done();
     }
 }
 
@@ -218,15 +218,15 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         // What is added to a row is added in registers where one column fills them.
-        if const { align_of::<E>() > 8 && goes_by_rows::<M>(size_of::<Block<E, S>>()) } {
-            self.down_by_rows::<A>(pivot);
+        if const { align_of::<E>() > 8 && is_solved_by_rows::<M>(size_of::<Block<E, S>>()) } {
+            self.forward_by_rows::<A>(pivot);
         } else {
-            self.down_by_columns::<A>(pivot);
+            self.forward_by_columns::<A>(pivot);
         }
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn forward_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
@@ -249,14 +249,14 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
                 continue;
             }
             let mut target = load(rows, other, *column);
-            subtract::<A, E, S, W>(&mut target, block, &panel_row);
+            subtract_product::<A, E, S, W>(&mut target, block, &panel_row);
             store(rows, other, *column, &target);
         }
     }
 
     /// What pivots before this one subtract from its row.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn forward_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() || pivot.left().is_empty() {
@@ -266,7 +266,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         for left in factors.plan.structure().elimination.left.get(pivot.left()).unwrap_or_default() {
             let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
             let (Some(block), Some(other)) = (block, other) else { continue };
-            subtract_of::<A, E, R, S, W>(&mut panel_row, block, other, *column);
+            subtract_from_memory::<A, E, R, S, W>(&mut panel_row, block, other, *column);
         }
         store(rows, slot, *column, &panel_row);
     }
@@ -280,7 +280,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
         let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for (block, other) in blocks_with_slots(*factors, pivot.upper()) {
             let Some(other) = rows.get(other) else { continue };
-            subtract_of::<A, E, R, S, W>(&mut panel_row, block, other, *column);
+            subtract_from_memory::<A, E, R, S, W>(&mut panel_row, block, other, *column);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
@@ -288,10 +288,10 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
             if const { S == 1 } {
                 let mut inverse = *inverse;
                 negate(&mut inverse);
-                subtract::<A, E, S, W>(&mut solution, &inverse, &panel_row);
+                subtract_product::<A, E, S, W>(&mut solution, &inverse, &panel_row);
             } else {
                 negate(&mut panel_row);
-                subtract::<A, E, S, W>(&mut solution, inverse, &panel_row);
+                subtract_product::<A, E, S, W>(&mut solution, inverse, &panel_row);
             }
             panel_row = solution;
         }
@@ -303,8 +303,8 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize
 /// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
 /// another column. Of large blocks that the second cache holds the processor fetches some columns
 /// ahead side by side, but no more than that.
-const fn goes_by_rows<M: Plan>(block: usize) -> bool {
-    let Some(structure) = M::KNOWN else { return block <= 256 };
+const fn is_solved_by_rows<M: Plan>(block: usize) -> bool {
+    let Some(structure) = M::KNOWN_STRUCTURE else { return block <= 256 };
     let pivots = structure.elimination.pivots;
     let (mut longest, mut index) = (0, 0);
     while index < pivots.len() {

@@ -5,7 +5,7 @@
 //! in registers, and stored once. Packets take two blocks at a time, so that additions need not
 //! wait for each other.
 
-use super::factor::{Planned, blocks_with_slots};
+use super::factor::{PlannedFactors, blocks_with_slots};
 use super::micro_panel::{load, store};
 use super::solve::Substitution;
 use crate::linalg::block::{negate, subtract_transposed};
@@ -46,7 +46,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
     pub(in crate::linalg) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         // Where nothing is optimised this would only take long to compile.
         if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
-            return self.transposed_up_in_strands::<A>(pivot);
+            return self.transposed_backward_two_sums::<A>(pivot);
         }
         let Self { factors, rows, column, .. } = self;
         if pivot.slot as usize >= rows.len() {
@@ -54,7 +54,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
         }
         let mut panel_row = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         for index in pivot.lower().rev() {
-            let Some((block, other)) = one(*factors, index) else { continue };
+            let Some((block, other)) = block_with_slot(*factors, index) else { continue };
             if other >= rows.len() {
                 continue;
             }
@@ -66,7 +66,7 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
 
     /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
     #[inline(always)]
-    fn transposed_up_in_strands<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn transposed_backward_two_sums<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() || pivot.lower().is_empty() {
@@ -103,8 +103,8 @@ impl<M: Plan, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize>
 
 /// One block, with the slot at its other end.
 #[inline(always)]
-fn one<'a, M: Plan, E, const S: usize>(
-    factors: Planned<'a, M, E, S>,
+fn block_with_slot<'a, M: Plan, E, const S: usize>(
+    factors: PlannedFactors<'a, M, E, S>,
     index: usize,
 ) -> Option<(&'a Block<E, S>, usize)> {
     let &slot = factors.plan.structure().elimination.slots.get(index)?;

@@ -14,7 +14,7 @@
 //! complex one, and what is left of a register repeats the last.
 
 use super::complex::Complex;
-use super::decomposition::{Memory, Parts, decompose};
+use super::decomposition::{DecompositionMemory, EigenbasisParts, decompose};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::scalar::Lanes;
 use crate::tableau::Tableau;
@@ -25,12 +25,12 @@ use crate::tableau::Tableau;
 pub struct Eigenbasis<T, const S: usize, const N: usize> {
     /// `μ`; of conjugate ones that with the positive imaginary part. A real one is the real number
     /// at the end, or the first of the complex ones if there is no such.
-    pub(in crate::linalg) values: Complex<T, N>,
+    pub(in crate::linalg) eigenvalues: Complex<T, N>,
     /// Columns of `V⁻¹`, one for each stage.
-    left: [Complex<T, N>; S],
+    left_vectors: [Complex<T, N>; S],
     /// Columns of `V`, one for each part, with a factor of two where they stand for a conjugate
     /// too.
-    right: [[T; S]; N],
+    right_vectors: [[T; S]; N],
 }
 
 impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
@@ -45,11 +45,14 @@ impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
             )
         };
         let (mut values, mut left, mut right) = ([0.0; N], [[0.0; N]; S], [[0.0; S]; N]);
-        let parts =
-            Parts { values: &mut values, left: left.as_flattened_mut(), right: right.as_flattened_mut() };
+        let parts = EigenbasisParts {
+            eigenvalues: &mut values,
+            left_vectors: left.as_flattened_mut(),
+            right_vectors: right.as_flattened_mut(),
+        };
         let zero = Complex::<f64, 2>::zero();
         let (mut matrix, mut powers) = ([[zero; S]; S], [[[0.0; S]; S]; 2]);
-        let mut memory = Memory {
+        let mut memory = DecompositionMemory {
             roots: &mut [zero; S],
             vectors: [&mut [zero; S], &mut [zero; S]],
             matrix: matrix.as_flattened_mut(),
@@ -61,35 +64,35 @@ impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
         }
         let cast = |parts: [f64; N]| Complex { parts: parts.map(T::from_f64) };
         Some(Self {
-            values: cast(values),
-            left: left.map(cast),
-            right: right.map(|column| column.map(T::from_f64)),
+            eigenvalues: cast(values),
+            left_vectors: left.map(cast),
+            right_vectors: right.map(|column| column.map(T::from_f64)),
         })
     }
 
     #[cfg(feature = "alloc")]
     /// The eigenvalues `μ` of `A`: of each complex pair there is one.
-    pub fn values(&self) -> &Complex<T, N> {
-        &self.values
+    pub fn eigenvalues(&self) -> &Complex<T, N> {
+        &self.eigenvalues
     }
 
     #[cfg(feature = "alloc")]
     /// Columns of `V⁻¹`, one for each stage.
-    pub fn left(&self) -> &[Complex<T, N>; S] {
-        &self.left
+    pub fn left_vectors(&self) -> &[Complex<T, N>; S] {
+        &self.left_vectors
     }
 
     #[cfg(feature = "alloc")]
     /// Columns of `V`, one for each part: `y = Σ_l right_l ŷ_l`.
-    pub fn right(&self) -> &[[T; S]; N] {
-        &self.right
+    pub fn right_vectors(&self) -> &[[T; S]; N] {
+        &self.right_vectors
     }
 
     /// `b̂ = V⁻¹ b`
     #[inline(always)]
-    pub fn split<A: Arithmetic>(&self, b: &[T; S]) -> Complex<T, N> {
+    pub fn transform<A: Arithmetic>(&self, b: &[T; S]) -> Complex<T, N> {
         let mut sum = Complex::<T, N>::zero();
-        for (left, &b) in self.left.iter().zip(b) {
+        for (left, &b) in self.left_vectors.iter().zip(b) {
             A::subtract_row(&mut sum.parts, -b, &left.parts);
         }
         sum
@@ -97,9 +100,9 @@ impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
 
     /// `y = V ŷ`
     #[inline(always)]
-    pub fn join<A: Arithmetic>(&self, y: &Complex<T, N>) -> [T; S] {
+    pub fn transform_back<A: Arithmetic>(&self, y: &Complex<T, N>) -> [T; S] {
         let mut sum = [T::from_f64(0.0); S];
-        for (column, &part) in self.right.iter().zip(&y.parts) {
+        for (column, &part) in self.right_vectors.iter().zip(&y.parts) {
             A::subtract_row(&mut sum, -part, column);
         }
         sum
@@ -118,11 +121,12 @@ mod tests {
         let basis = Eigenbasis::<f64, S, N>::new(tableau).expect("a basis");
         for column in 0..S {
             let unit = from_fn(|j| if j == column { 1.0 } else { 0.0 });
-            let image = *basis.values() * basis.split::<crate::linalg::kernel::arithmetic::Separate>(&unit);
-            let found = basis.join::<crate::linalg::kernel::arithmetic::Separate>(&image);
+            let image =
+                *basis.eigenvalues() * basis.transform::<crate::linalg::kernel::arithmetic::Unfused>(&unit);
+            let found = basis.transform_back::<crate::linalg::kernel::arithmetic::Unfused>(&image);
             for (stage, found) in found.into_iter().enumerate() {
                 let size = |parts: &[f64; N], l: usize| parts[l].hypot(parts[N / 2 + l]);
-                let right: [f64; N] = from_fn(|part| basis.right[part][stage]);
+                let right: [f64; N] = from_fn(|part| basis.right_vectors[part][stage]);
                 let mut terms: f64 = (0..N / 2).map(|l| size(&right, l) * size(&image.parts, l)).sum();
                 if N % 2 == 1 {
                     terms += (right[N - 1] * image.parts[N - 1]).abs();
@@ -170,7 +174,7 @@ mod tests {
     fn published_eigenvalue() {
         let basis = Eigenbasis::<f64, 3, 3>::new(&RadauIIA::<3>::TABLEAU).expect("a basis");
         let gamma = 3.0 + 3.0f64.powf(2.0 / 3.0) - 3.0f64.powf(1.0 / 3.0);
-        assert!((1.0 / basis.values().parts[2] - gamma).abs() <= 32.0 * f64::EPSILON * gamma);
+        assert!((1.0 / basis.eigenvalues().parts[2] - gamma).abs() <= 32.0 * f64::EPSILON * gamma);
     }
 
     /// A diagonally implicit tableau has one eigenvalue twice, and no basis.

@@ -2,11 +2,11 @@
 //! where they do not: what steps of variable size iterate with.
 
 use super::complex::Complex;
-use crate::linalg::dense_lu::Dense;
+use crate::linalg::dense_lu::DenseLu;
 use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
-use crate::linalg::newton_matrix::{each_entry, kinematic, slot};
-use crate::linalg::sparse_lu::factor::{self, Planned};
+use crate::linalg::newton_matrix::{for_each_dense_entry, kinematic, slot};
+use crate::linalg::sparse_lu::factor::{self, PlannedFactors};
 use crate::linalg::sparse_lu::solve;
 use crate::model::{ArrayK, Dae};
 use crate::plan::Known;
@@ -16,37 +16,37 @@ use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
 /// So many eigenvalues there may be, of complex conjugate ones one.
-const LANES: usize = 4;
+const MAX_EIGENVALUES: usize = 4;
 
 /// The parts of a number for each of them.
-pub const PARTS: usize = 2 * LANES;
+pub const COMPLEX_PARTS: usize = 2 * MAX_EIGENVALUES;
 
 /// A right-hand side or a solution of the systems of all eigenvalues, one row for each slot.
-pub type Rows<M, T> = ArrayK<M, [[Complex<T, PARTS>; 1]; 1]>;
+pub type EigenRows<M, T> = ArrayK<M, [[Complex<T, COMPLEX_PARTS>; 1]; 1]>;
 
 /// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all eigenvalues.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 pub struct EigenFactors<M: Dae, T: Plain> {
-    blocks: Aligned<M::Factors<[[Complex<T, PARTS>; 1]; 1]>>,
+    blocks: Aligned<M::Factors<[[Complex<T, COMPLEX_PARTS>; 1]; 1]>>,
     /// The Jacobian, and `hμ`: what kinematic states are eliminated by.
     jacobian: M::Jacobian<T>,
-    scale: Complex<T, PARTS>,
+    h_mu: Complex<T, COMPLEX_PARTS>,
     /// Memory that is touched only where the plan is not good enough: real and imaginary part as
     /// two stages.
-    dense: [Dense<M, T, 2>; LANES],
+    dense: [DenseLu<M, T, 2>; MAX_EIGENVALUES],
     is_dense: bool,
     pivoted: bool,
 }
 
 impl<M: Dae, T: Real> EigenFactors<M, T> {
     /// Whether the plan is in use, so that pivoting may give better factors.
-    fn is_planned(&self) -> bool {
+    fn uses_plan(&self) -> bool {
         !self.pivoted && M::STRUCTURE.elimination.has_plan()
     }
 
     /// Whether the factors that are there are those of the plan.
-    pub fn are_planned(&self) -> bool {
+    pub fn has_planned_factors(&self) -> bool {
         !self.is_dense
     }
 
@@ -62,12 +62,12 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     pub fn factor(
         &mut self,
         jacobian: &M::Jacobian<T>,
-        values: &Complex<T, PARTS>,
+        values: &Complex<T, COMPLEX_PARTS>,
         h: T,
     ) -> Result<bool, usize> {
         let scale = values.scaled(h);
-        (self.jacobian, self.scale) = (*jacobian, scale);
-        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
+        (self.jacobian, self.h_mu) = (*jacobian, scale);
+        self.is_dense = !(self.uses_plan() && self.factor_by_plan(jacobian, &scale));
         if self.is_dense {
             self.factor_dense(jacobian, &scale)?;
         }
@@ -75,17 +75,21 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     }
 
     /// By the plan; whether that went well.
-    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> bool {
+    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, COMPLEX_PARTS>) -> bool {
         let blocks = self.blocks.as_mut();
         dispatch(Assemble::<M, T> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
     }
 
     /// By pivoting whole matrices.
-    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> Result<(), usize> {
+    fn factor_dense(
+        &mut self,
+        jacobian: &M::Jacobian<T>,
+        scale: &Complex<T, COMPLEX_PARTS>,
+    ) -> Result<(), usize> {
         let square = *scale * *scale;
         for (l, dense) in self.dense.iter_mut().enumerate() {
             dense.clear();
-            each_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
+            for_each_dense_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
                 let (r, c, value) =
                     (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
                 let (re, im) = match place.order {
@@ -106,37 +110,37 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     }
 
     /// Solves all systems in place; equations are in their slots.
-    pub fn solve(&self, rows: &mut Rows<M, T>) {
+    pub fn solve(&self, rows: &mut EigenRows<M, T>) {
         self.eliminate(rows);
         if self.is_dense {
             self.solve_dense(rows);
         } else {
             let blocks = self.blocks.as_ref();
-            let factors = Planned::<_, _, 1> { plan: Known::<M>::PLAN, blocks };
+            let factors = PlannedFactors::<_, _, 1> { plan: Known::<M>::PLAN, blocks };
             solve::solve(factors, rows.as_mut());
         }
         self.reconstruct(rows);
     }
 
     /// `b_r ← b_r − (f_q̇ + hμ f_q) b_q` for each kinematic state `q`.
-    fn eliminate(&self, rows: &mut Rows<M, T>) {
+    fn eliminate(&self, rows: &mut EigenRows<M, T>) {
         for dependent in M::STRUCTURE.elimination.dependents {
             let (entry, [[own]]) = (dependent.entry as usize, rows[dependent.state as usize]);
-            let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.scale * own };
+            let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.h_mu * own };
             let [[to]] = &mut rows[slot::<M>(M::STRUCTURE.jacobian.at(entry).0)];
             *to = *to - own.scaled(self.jacobian[entry]);
         }
     }
 
     /// `y_q = b_q + c hμ y_v`
-    fn reconstruct(&self, rows: &mut Rows<M, T>) {
+    fn reconstruct(&self, rows: &mut EigenRows<M, T>) {
         let nx = M::Shape::NX;
         for state in 0..M::STRUCTURE.elimination.kinematic.len() {
             let Some(of) = kinematic::<M>(state) else { continue };
             if (of.velocity as usize) < 2 * nx {
                 let [[velocity]] = rows[of.velocity as usize - nx];
                 let [[to]] = &mut rows[state];
-                *to = *to - (self.scale * velocity).scaled(self.jacobian[of.entry as usize]);
+                *to = *to - (self.h_mu * velocity).scaled(self.jacobian[of.entry as usize]);
             }
         }
     }
@@ -146,13 +150,13 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     /// known, and each of its unknowns is of the size of its `unit`.
     #[inline(never)]
     pub fn backward_error(&self, units: &ArrayK<M, T>) -> f64 {
-        let mut right = Rows::<M, T>::zeroed();
+        let mut right = EigenRows::<M, T>::zeroed();
         for (index, ([[row]], unit)) in right.as_mut().iter_mut().zip(units.as_ref()).enumerate() {
             // Neither equal nor alternating, so that no structure hides an error.
             let weight = (1 + index * 7 % 11) as f64 * if index * 5 % 7 < 3 { -0.2 } else { 0.2 };
             *row = Complex::real(T::from_f64(weight) * *unit);
         }
-        let mut solution = Rows::<M, T>::zeroed();
+        let mut solution = EigenRows::<M, T>::zeroed();
         self.multiply(&right, |equation, term| {
             let [[row]] = &mut solution[equation];
             *row = *row + term;
@@ -163,8 +167,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         }
         solution = right;
         self.solve(&mut solution);
-        let mut sizes: ArrayK<M, [T; LANES]> = Zeroable::zeroed();
-        let size = |z: Complex<T, PARTS>, l: usize| {
+        let mut sizes: ArrayK<M, [T; MAX_EIGENVALUES]> = Zeroable::zeroed();
+        let size = |z: Complex<T, COMPLEX_PARTS>, l: usize| {
             let (re, im) = z.get(l);
             re.abs() + im.abs()
         };
@@ -193,21 +197,21 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 
     /// The terms of the product of the matrices with a solution, each with the slot of its
     /// equation.
-    fn multiply(&self, solution: &Rows<M, T>, mut term: impl FnMut(usize, Complex<T, PARTS>)) {
-        let square = self.scale * self.scale;
-        each_entry::<M, _>(self.jacobian.as_ref(), |place, &value, minus_c| {
+    fn multiply(&self, solution: &EigenRows<M, T>, mut term: impl FnMut(usize, Complex<T, COMPLEX_PARTS>)) {
+        let square = self.h_mu * self.h_mu;
+        for_each_dense_entry::<M, _>(self.jacobian.as_ref(), |place, &value, minus_c| {
             let value = minus_c.map_or(value, |&minus_c| -(minus_c * value));
             let [[unknown]] = solution[place.column];
             let unknown = match place.order {
                 0 => unknown,
-                1 => self.scale * unknown,
+                1 => self.h_mu * unknown,
                 _ => square * unknown,
             };
             term(place.slot, unknown.scaled(value));
         });
     }
 
-    fn solve_dense(&self, rows: &mut Rows<M, T>) {
+    fn solve_dense(&self, rows: &mut EigenRows<M, T>) {
         let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
         for (l, dense) in self.dense.iter().enumerate() {
             for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
@@ -225,8 +229,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 /// The matrices and their factors; whether these are finite.
 struct Assemble<'a, M, T> {
     jacobian: &'a [T],
-    scale: &'a Complex<T, PARTS>,
-    blocks: &'a mut [Block<Complex<T, PARTS>, 1>],
+    scale: &'a Complex<T, COMPLEX_PARTS>,
+    blocks: &'a mut [Block<Complex<T, COMPLEX_PARTS>, 1>],
     model: PhantomData<M>,
 }
 
@@ -238,15 +242,15 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
         let Self { jacobian, scale, blocks, .. } = self;
         let plan = &M::STRUCTURE.elimination;
         let square = *scale * *scale;
-        for of in plan.assembly {
-            let Some([[to]]) = blocks.get_mut(of.block as usize) else { continue };
-            let mut element = if of.first { Complex::zero() } else { *to };
+        for entry in plan.assembly {
+            let Some([[to]]) = blocks.get_mut(entry.block as usize) else { continue };
+            let mut element = if entry.first { Complex::zero() } else { *to };
             // An index that marks what is not there lies outside of the Jacobian.
-            if let Some(&(mut value)) = jacobian.get(of.entry as usize) {
-                if let Some(&minus_c) = jacobian.get(of.by as usize) {
+            if let Some(&(mut value)) = jacobian.get(entry.entry as usize) {
+                if let Some(&minus_c) = jacobian.get(entry.by as usize) {
                     value = -(minus_c * value);
                 }
-                element = match of.order {
+                element = match entry.order {
                     0 => element.plus(value),
                     1 => element + scale.scaled(value),
                     _ => element + square.scaled(value),

@@ -158,7 +158,7 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
     #[inline(always)]
     fn subtract_product(mut self, a: Self, b: Self) -> Self {
         // Kernels alone have numbers of this type.
-        T::subtract_complex(&mut self.parts, &a.parts, &b.parts, Known::<false>::here());
+        T::subtract_complex(&mut self.parts, &a.parts, &b.parts, Known::<false>::assume_detected());
         self
     }
 

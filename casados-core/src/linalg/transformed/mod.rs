@@ -8,6 +8,6 @@ pub mod basis;
 pub mod checked_factor;
 pub mod complex;
 mod decomposition;
-mod number;
+mod demoted;
 pub mod shared_factor;
 mod shared_solve;

@@ -4,15 +4,15 @@
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
-use super::number::{Number, demote};
-use super::shared_solve::Solve;
+use super::demoted::{DemotedComplex, demote};
+use super::shared_solve::SharedSolve;
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::{Kernel, dispatch};
-use crate::linalg::kernel::unroll::{AtRow, each_row};
+use crate::linalg::kernel::unroll::{RowVisitor, for_each_row};
 use crate::linalg::sparse_lu::factor;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
-use crate::plan::{Plan, PlanOf, Table};
+use crate::plan::{Plan, PlanOf, StructureTable};
 use crate::scalar::Lanes;
 use crate::shape::Aligned;
 use bytemuck::Zeroable;
@@ -22,8 +22,8 @@ use bytemuck::Zeroable;
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
-    blocks: Aligned<M::Factors<[[Number<E, S>; 1]; 1]>>,
-    rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
+    blocks: Aligned<M::Factors<[[DemotedComplex<E, S>; 1]; 1]>>,
+    rows: Aligned<ArrayK<M, [[DemotedComplex<E, S>; 1]; 1]>>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
@@ -32,17 +32,17 @@ impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     pub fn factor<F: Fallback>(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
-        first_only: bool,
+        first_stage_only: bool,
         basis: &Eigenbasis<E, S, S>,
         h: E,
     ) {
-        let (plan, values) = (F::plan::<M>(), &basis.values);
+        let (plan, values) = (F::plan::<M>(), &basis.eigenvalues);
         let jacobian = F::Plan::<M>::jacobian(jacobian);
         let blocks = F::Plan::<M>::factors_mut(&mut self.blocks);
-        if const { E::LANES > 1 } && first_only {
-            dispatch(AssembleShared::<_, E, S, true> { plan, jacobian, values, h, blocks });
+        if const { E::LANES > 1 } && first_stage_only {
+            dispatch(AssembleShared::<_, E, S, true> { plan, jacobian, eigenvalues: values, h, blocks });
         } else {
-            dispatch(AssembleShared::<_, E, S, false> { plan, jacobian, values, h, blocks });
+            dispatch(AssembleShared::<_, E, S, false> { plan, jacobian, eigenvalues: values, h, blocks });
         }
         factor::factor(plan, self.blocks.as_mut());
     }
@@ -60,7 +60,7 @@ impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
             (blocks.as_ref().as_flattened().as_flattened(), rows.as_mut().as_flattened_mut());
         let (f, rows) = (F::Plan::<M>::k(f), rows.as_flattened_mut());
         let solution = F::Plan::<M>::k_mut(solution);
-        dispatch(Solve { plan: F::plan::<M>(), basis, f, blocks, rows, solution });
+        dispatch(SharedSolve { plan: F::plan::<M>(), basis, f, blocks, rows, solution });
     }
 }
 
@@ -69,9 +69,9 @@ struct AssembleShared<'a, M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: b
     plan: M,
     jacobian: &'a M::Jacobian<[E; S]>,
     /// The eigenvalues `μ`.
-    values: &'a Complex<E, S>,
+    eigenvalues: &'a Complex<E, S>,
     h: E,
-    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
+    blocks: &'a mut M::Factors<[[DemotedComplex<E, S>; 1]; 1]>,
 }
 
 impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
@@ -81,52 +81,60 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, values, h, blocks } = self;
+        let Self { plan, jacobian, eigenvalues: values, h, blocks } = self;
         let (jacobian, blocks) = (jacobian.as_ref(), blocks.as_mut());
-        let (scale, share) = (values.scaled(h), E::from_f64(Rows::<M, E, S, FIRST_ONLY>::SHARE));
+        let (scale, share) =
+            (values.scaled(h), E::from_f64(SharedAssemblyRows::<M, E, S, FIRST_ONLY>::MEAN_WEIGHT));
         let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(demote);
-        each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { plan, jacobian, scales, blocks });
+        for_each_row::<A, _>(&mut SharedAssemblyRows::<M, E, S, FIRST_ONLY> {
+            plan,
+            jacobian,
+            scales,
+            blocks,
+        });
     }
 }
 
 /// See [`AssembleShared`].
-struct Rows<'a, M, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+struct SharedAssemblyRows<'a, M, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     plan: M,
     jacobian: &'a [[E; S]],
     /// `hμ` and `(hμ)²` of what is added up.
-    scales: [Number<E, S>; 2],
-    blocks: &'a mut [[[Number<E, S>; 1]; 1]],
+    scales: [DemotedComplex<E, S>; 2],
+    blocks: &'a mut [[[DemotedComplex<E, S>; 1]; 1]],
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
-    const ROWS: Option<usize> = Table::Assembly.known::<M>();
-    const SIMPLE: Option<usize> = Table::Fill.known::<M>();
+impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> RowVisitor
+    for SharedAssemblyRows<'_, M, E, S, FIRST_ONLY>
+{
+    const ROWS: Option<usize> = StructureTable::Assembly.known_row_count::<M>();
+    const SIMPLE_ROWS: Option<usize> = StructureTable::Fill.known_row_count::<M>();
     #[inline(always)]
-    fn rows(&self) -> usize {
-        Table::Assembly.of(self.plan.structure())
+    fn row_count(&self) -> usize {
+        StructureTable::Assembly.row_count(self.plan.structure())
     }
     #[inline(always)]
-    fn simple_rows(&self) -> usize {
-        self.plan.facts().fill
+    fn simple_row_count(&self) -> usize {
+        self.plan.facts().fill_terms
     }
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Self { plan, jacobian, blocks, .. } = self;
-        let Some(of) = plan.structure().elimination.assembly.get(row) else { return };
-        if const { factor::begins_with_update::<M, Number<E, S>>() } && of.is_fill() {
+        let Some(entry) = plan.structure().elimination.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, DemotedComplex<E, S>>() } && entry.is_fill() {
             return;
         }
-        let Some([[to]]) = blocks.get_mut(of.block as usize) else { return };
+        let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
         let [scale, square] = self.scales;
-        let mut element = if of.first { Complex::zero() } else { *to };
+        let mut element = if entry.first { Complex::zero() } else { *to };
         // An index that marks what is not there lies outside of the Jacobian.
-        if let Some(mut value) = jacobian.get(of.entry as usize).map(Self::total) {
-            if let Some(minus_c) = jacobian.get(of.by as usize) {
+        if let Some(mut value) = jacobian.get(entry.entry as usize).map(Self::sum_over_stages) {
+            if let Some(minus_c) = jacobian.get(entry.by as usize) {
                 value = -(minus_c[0] * value);
             }
-            element = match of.order {
-                0 => element.plus((E::from_f64(Self::SHARE) * value).demote()),
+            element = match entry.order {
+                0 => element.plus((E::from_f64(Self::MEAN_WEIGHT) * value).demote()),
                 1 => element + scale.scaled(value.demote()),
                 _ => element + square.scaled(value.demote()),
             };
@@ -135,18 +143,18 @@ impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'
     }
     /// Fill.
     #[inline(always)]
-    fn simple(&mut self, row: usize) {
-        factor::clear_fill::<M, Number<E, S>, _>(self.plan, self.blocks, row, [[Complex::zero()]]);
+    fn visit_simple(&mut self, row: usize) {
+        factor::clear_fill::<M, DemotedComplex<E, S>, _>(self.plan, self.blocks, row, [[Complex::zero()]]);
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S, FIRST_ONLY> {
+impl<M: Plan, E: Lanes, const S: usize, const FIRST_ONLY: bool> SharedAssemblyRows<'_, M, E, S, FIRST_ONLY> {
     /// The mean is so much of what is added up.
-    const SHARE: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
+    const MEAN_WEIGHT: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
 
     /// The sum over the stages.
     #[inline(always)]
-    fn total(stages: &[E; S]) -> E {
+    fn sum_over_stages(stages: &[E; S]) -> E {
         if FIRST_ONLY {
             return stages[0];
         }

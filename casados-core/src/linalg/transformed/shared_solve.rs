@@ -6,74 +6,76 @@
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
-use super::number::{Number, demote};
+use super::demoted::{DemotedComplex, demote};
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::linalg::kernel::dispatch::Kernel;
-use crate::linalg::kernel::unroll::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
-use crate::linalg::sparse_lu::factor::has_all;
+use crate::linalg::kernel::unroll::{
+    SupernodeVisitor, is_large_plan, supernodes_backward, supernodes_forward,
+};
+use crate::linalg::sparse_lu::factor::has_all_blocks;
 use crate::model::Pivot;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
 
 /// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns.
-pub struct Solve<'a, M: Plan, E: Lanes, const S: usize> {
+pub struct SharedSolve<'a, M: Plan, E: Lanes, const S: usize> {
     pub plan: M,
     pub basis: &'a Eigenbasis<E, S, S>,
     pub f: &'a M::K<[E; S]>,
     /// `P⁻¹`, `L`, `U`.
-    pub blocks: &'a [Number<E, S>],
+    pub blocks: &'a [DemotedComplex<E, S>],
     /// Memory for a row of each slot.
-    pub rows: &'a mut [Number<E, S>],
+    pub rows: &'a mut [DemotedComplex<E, S>],
     pub solution: &'a mut M::K<[[E; 1]; S]>,
 }
 
-impl<M: Plan, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
+impl<M: Plan, E: Lanes, const S: usize> Kernel for SharedSolve<'_, M, E, S> {
     type Number = E;
     type Output = ();
-    const WIDE: bool = S >= 8 && is_long::<M, 1>();
+    const WIDE: bool = S >= 8 && is_large_plan::<M, 1>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { plan, basis, f, blocks, rows, solution } = self;
         let (f, solution) = (f.as_ref(), solution.as_mut());
-        if !has_all(plan, blocks) || rows.len() != f.len() {
+        if !has_all_blocks(plan, blocks) || rows.len() != f.len() {
             return;
         }
-        let mut down = Down { plan, basis: *basis, f, blocks, rows };
-        supernodes_from_first::<A, M, _>(plan, &mut down);
-        let mut up = Up { plan, basis: *basis, blocks, rows: down.rows, solution };
-        supernodes_from_last::<A, M, _>(plan, &mut up);
+        let mut down = ForwardSubstitution { plan, basis: *basis, f, blocks, rows };
+        supernodes_forward::<A, M, _>(plan, &mut down);
+        let mut up = BackSubstitution { plan, basis: *basis, blocks, rows: down.rows, solution };
+        supernodes_backward::<A, M, _>(plan, &mut up);
     }
 }
 
 /// Instructions for each block: two to fetch it, two products.
-const PER_BLOCK: usize = 5;
+const INSTRUCTIONS_PER_BLOCK: usize = 5;
 
 /// See [`Solve`].
-struct Down<'a, M, E: Lanes, const S: usize> {
+struct ForwardSubstitution<'a, M, E: Lanes, const S: usize> {
     plan: M,
     basis: Eigenbasis<E, S, S>,
     f: &'a [[E; S]],
-    blocks: &'a [Number<E, S>],
-    rows: &'a mut [Number<E, S>],
+    blocks: &'a [DemotedComplex<E, S>],
+    rows: &'a mut [DemotedComplex<E, S>],
 }
 
 /// See [`Solve`].
-struct Up<'a, M, E: Lanes, const S: usize> {
+struct BackSubstitution<'a, M, E: Lanes, const S: usize> {
     plan: M,
     basis: Eigenbasis<E, S, S>,
-    blocks: &'a [Number<E, S>],
-    rows: &'a mut [Number<E, S>],
+    blocks: &'a [DemotedComplex<E, S>],
+    rows: &'a mut [DemotedComplex<E, S>],
     solution: &'a mut [[[E; 1]; S]],
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
-    const INSTRUCTIONS: usize = PER_BLOCK;
+impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for ForwardSubstitution<'_, M, E, S> {
+    const INSTRUCTIONS: usize = INSTRUCTIONS_PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let mut sums = [Complex::zero(); P];
         for (sum, pivot) in sums.iter_mut().zip(pivots) {
             if let Some(f) = self.f.get(pivot.equation as usize) {
-                *sum = demote(self.basis.split::<A>(f));
+                *sum = demote(self.basis.transform::<A>(f));
             }
         }
         for left in self.plan.structure().elimination.left.get(pivots[0].left()).unwrap_or_default() {
@@ -101,13 +103,13 @@ impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
     }
 }
 
-impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
-    const INSTRUCTIONS: usize = PER_BLOCK;
+impl<M: Plan, E: Lanes, const S: usize> SupernodeVisitor for BackSubstitution<'_, M, E, S> {
+    const INSTRUCTIONS: usize = INSTRUCTIONS_PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let beside = pivots[P - 1].upper();
-        let slots = self.plan.structure().elimination.slots.get(beside).unwrap_or_default();
-        let (mut sums, mut own): (_, [&[Number<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
+        let common_columns = pivots[P - 1].upper();
+        let slots = self.plan.structure().elimination.slots.get(common_columns).unwrap_or_default();
+        let (mut sums, mut own): (_, [&[DemotedComplex<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
         let mut triangle = own;
         for (index, pivot) in pivots.into_iter().enumerate() {
             let (row, blocks) = (self.rows.get(pivot.slot as usize), self.blocks.get(pivot.upper as usize..));
@@ -142,7 +144,7 @@ impl<M: Plan, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
             }
             if let Some(solution) = self.solution.get_mut(slot) {
                 let sum = Complex { parts: sum.parts.map(E::promote) };
-                solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&sum));
+                solution.as_flattened_mut().copy_from_slice(&self.basis.transform_back::<A>(&sum));
             }
         }
     }

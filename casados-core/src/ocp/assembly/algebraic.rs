@@ -11,17 +11,18 @@
 //! the dynamics.
 
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
-use crate::ocp::formulation::functions::cost::{At, Cost};
+use crate::ocp::formulation::free_parameters::FreeParametersView;
+use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes};
 #[cfg(feature = "alloc")]
-use crate::ocp::formulation::functions::point::Cross;
-use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::functions::node_evaluation::ParameterDerivatives;
+use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::data::{
-    Layout, Node, inputs, is_algebraic, kept, node_rows, sizes, split,
+    Layout, Node, algebraic_len, depends_on_algebraic, node_row_count, split_data, stage_variable_count,
+    variable_and_algebraic_counts,
 };
-use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
 use crate::qp::{StageDims, part, part_mut};
@@ -30,24 +31,24 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// Keeps what an interval says about the algebraic states at its start.
-pub(in crate::ocp) fn keep<S: Shape, T: Real>(
-    all: &mut [T],
-    free: Free<'_>,
+pub(in crate::ocp) fn store_interval<S: Shape, T: Real>(
+    storage: &mut [T],
+    free: FreeParametersView<'_>,
     k: usize,
     step: &IntervalResult<'_, T>,
 ) {
-    let [n, nz] = sizes::<S>(free.count());
+    let [n, nz] = variable_and_algebraic_counts::<S>(free.count());
     if nz == 0 {
         return;
     }
     let (z, rows) =
-        part_mut(all, k * (nz + nz * n), nz + nz * n).split_at_mut_checked(nz).unwrap_or_default();
+        part_mut(storage, k * (nz + nz * n), nz + nz * n).split_at_mut_checked(nz).unwrap_or_default();
     crate::qp::copy_common(z, step.z);
     let [dx, du, dp] = step.dz;
-    let of_free = free.columns(dp, nz).map(|(w, column)| (S::NX + w, column));
-    let of_states = dx.chunks_exact(nz).enumerate();
-    let of_controls = (S::NX + free.count()..).zip(du.chunks_exact(nz));
-    for (j, column) in of_states.chain(of_controls).chain(of_free) {
+    let parameter_columns = free.free_columns(dp, nz).map(|(w, column)| (S::NX + w, column));
+    let state_columns = dx.chunks_exact(nz).enumerate();
+    let control_columns = (S::NX + free.count()..).zip(du.chunks_exact(nz));
+    for (j, column) in state_columns.chain(control_columns).chain(parameter_columns) {
         for (i, &value) in column.iter().enumerate() {
             if let Some(element) = rows.get_mut(i * n + j) {
                 *element = value;
@@ -57,27 +58,31 @@ pub(in crate::ocp) fn keep<S: Shape, T: Real>(
 }
 
 /// What was kept of a stage: nothing of the last one.
-pub(in crate::ocp) fn at<S: Shape, T>(all: &[T], layout: Layout, k: usize) -> (&[T], &[T]) {
-    let kept = kept::<S>(layout.free);
-    part(all, k * kept, kept).split_at_checked(S::NZ).unwrap_or_default()
+pub(in crate::ocp) fn values_and_jacobian<S: Shape, T>(
+    storage: &[T],
+    layout: Layout,
+    k: usize,
+) -> (&[T], &[T]) {
+    let stage_len = algebraic_len::<S>(layout.free_count);
+    part(storage, k * stage_len, stage_len).split_at_checked(S::NZ).unwrap_or_default()
 }
 
 /// Derivatives of a stage over `(x, u, z)`.
-pub(in crate::ocp) struct Extended<'a, T> {
-    pub(in crate::ocp) terms: Terms<'a, T>,
+pub(in crate::ocp) struct ExtendedDerivatives<'a, T> {
+    pub(in crate::ocp) terms: QuadraticTerms<'a, T>,
     /// Of the constraints, `ld` apart as columns of the Hessian are.
     pub(in crate::ocp) columns: &'a mut [T],
 }
 
-impl<'a, T: Real> Extended<'a, T> {
+impl<'a, T: Real> ExtendedDerivatives<'a, T> {
     /// Zeros; nothing where there is no memory.
-    pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T], free: Free<'a>) -> Self {
+    pub(in crate::ocp) fn new<S: Shape>(memory: &'a mut [T], free: FreeParametersView<'a>) -> Self {
         memory.fill(T::ZERO);
-        let [n, nz] = sizes::<S>(free.count());
+        let [n, nz] = variable_and_algebraic_counts::<S>(free.count());
         let ld = n + nz;
         let (gradient, rest) = memory.split_at_mut_checked(ld).unwrap_or_default();
         let (hessian, columns) = rest.split_at_mut_checked(ld * ld).unwrap_or_default();
-        Self { terms: Terms { free, gradient, hessian, ld }, columns }
+        Self { terms: QuadraticTerms { free, gradient, hessian, ld }, columns }
     }
 
     /// An element of the symmetric Hessian.
@@ -87,69 +92,75 @@ impl<'a, T: Real> Extended<'a, T> {
 
     /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of
     /// the constraints it is all there is.
-    pub(in crate::ocp) fn fold<S: Shape>(
+    pub(in crate::ocp) fn eliminate_algebraic<S: Shape>(
         &self,
         dz: &[T],
-        to: &mut Terms<'_, T>,
+        to: &mut QuadraticTerms<'_, T>,
         columns: &mut [T],
         ld: usize,
     ) {
-        let [n, _] = sizes::<S>(self.terms.free.count());
+        let [n, _] = variable_and_algebraic_counts::<S>(self.terms.free.count());
         let rows = || dz.chunks_exact(n.max(1)).enumerate();
         // `a_j + Σ_i a_zi ∂z_i/∂v_j`
-        let total = |a: &dyn Fn(usize) -> T, j: usize| {
+        let total_derivative = |a: &dyn Fn(usize) -> T, j: usize| {
             rows().fold(a(j), |sum, (i, row)| sum + a(n + i) * get(row, j))
         };
         for j in 0..n {
-            to.slope(j, total(&|i| get(self.terms.gradient, i), j));
+            to.add_gradient(j, total_derivative(&|i| get(self.terms.gradient, i), j));
             for i in j..n {
                 // Column j of `H [I; Z]`, and then row i of `[I Zᵀ]` times it.
-                let column = |row: usize| total(&|l| self.hessian(row, l), j);
-                to.curve(i, j, total(&column, i));
+                let column = |row: usize| total_derivative(&|l| self.hessian(row, l), j);
+                to.add_hessian(i, j, total_derivative(&column, i));
             }
         }
-        let mine = self.columns.chunks_exact(self.terms.ld.max(1));
-        for (mine, column) in mine.zip(columns.chunks_exact_mut(ld.max(1))) {
+        let own_columns = self.columns.chunks_exact(self.terms.ld.max(1));
+        for (own_column, column) in own_columns.zip(columns.chunks_exact_mut(ld.max(1))) {
             for (j, element) in column.iter_mut().enumerate().take(n) {
-                *element = total(&|i| get(mine, i), j);
+                *element = total_derivative(&|i| get(own_column, i), j);
             }
         }
     }
 
-    /// Adds what parameters do through `z` as well: `dz` as in [`Extended::fold`], `dp` the columns
+    /// Adds what parameters do through `z` as well: `dz` as in [`ExtendedDerivatives::fold`], `dp` the columns
     /// of `∂z/∂p`, `direct` what they do over `(x, u, z)` where `z` stays, and `slopes` the rows of
     /// `∂g/∂p`.
     #[cfg(feature = "alloc")]
-    pub(in crate::ocp) fn fold_parameters<S: Shape>(
+    pub(in crate::ocp) fn eliminate_algebraic_for_parameters<S: Shape>(
         &self,
         [dz, dp]: [&[T]; 2],
         direct: &[T],
-        to: &mut Cross<'_, T>,
+        to: &mut ParameterDerivatives<'_, T>,
         slopes: &mut [T],
     ) {
-        let [n, nz] = sizes::<S>(self.terms.free.count());
+        let [n, nz] = variable_and_algebraic_counts::<S>(self.terms.free.count());
         let parameters = || direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate();
         for (p, (direct, dp)) in parameters() {
-            let through = |i: usize| {
+            let total_mixed = |i: usize| {
                 dp.iter().enumerate().fold(get(direct, i), |sum, (l, &dp)| sum + self.hessian(i, n + l) * dp)
             };
             for (l, &slope) in dp.iter().enumerate() {
-                to.slope(p, get(self.terms.gradient, n + l) * slope);
+                to.add_gradient(p, get(self.terms.gradient, n + l) * slope);
             }
             for (q, (other, dq)) in parameters() {
                 let products = dq.iter().zip(dp).enumerate();
-                let sum = products
-                    .fold(T::ZERO, |sum, (l, (&dq, &dp))| sum + dq * through(n + l) + get(other, n + l) * dp);
-                to.curve(q, p, sum);
+                let sum = products.fold(T::ZERO, |sum, (l, (&dq, &dp))| {
+                    sum + dq * total_mixed(n + l) + get(other, n + l) * dp
+                });
+                to.add_hessian(q, p, sum);
             }
             for j in 0..n {
                 let rows = dz.chunks_exact(n.max(1)).enumerate();
-                to.add(j, p, rows.fold(through(j), |sum, (i, row)| sum + through(n + i) * get(row, j)));
+                to.add_mixed(
+                    j,
+                    p,
+                    rows.fold(total_mixed(j), |sum, (i, row)| sum + total_mixed(n + i) * get(row, j)),
+                );
             }
-            let mine = self.columns.chunks_exact(self.terms.ld.max(1));
-            for (mine, slopes) in mine.zip(slopes.chunks_exact_mut(S::NP.max(1))) {
+            let own_columns = self.columns.chunks_exact(self.terms.ld.max(1));
+            for (own_column, slopes) in own_columns.zip(slopes.chunks_exact_mut(S::NP.max(1))) {
                 if let Some(slope) = slopes.get_mut(p) {
-                    *slope = dp.iter().enumerate().fold(*slope, |sum, (l, &dp)| sum + get(mine, n + l) * dp);
+                    *slope =
+                        dp.iter().enumerate().fold(*slope, |sum, (l, &dp)| sum + get(own_column, n + l) * dp);
                 }
             }
         }
@@ -163,42 +174,50 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(in crate::ocp) fn weigh(&mut self) -> Result<(), OcpError> {
-        let layout @ Layout { intervals, free, bounds_algebraic, .. } = self.layout();
-        if !(const { is_algebraic::<P, T>() } || bounds_algebraic) {
+    pub(in crate::ocp) fn update_algebraic_weights(&mut self) -> Result<(), OcpError> {
+        let layout @ Layout { intervals, free_count: free, has_algebraic_bounds: bounds_algebraic, .. } =
+            self.layout();
+        if !(const { depends_on_algebraic::<P, T>() } || bounds_algebraic) {
             return Ok(());
         }
-        let (n, nz) = (inputs::<P::Shape>(free), P::Shape::NZ);
+        let (n, nz) = (stage_variable_count::<P::Shape>(free), P::Shape::NZ);
         let free = self.free.view();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.variables_and_costates();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
+        let nodes = interval_nodes::<P::Shape, T>(v, multipliers, &[], (data.p, free), data.times);
         let nodes = Nodes { step_length: self.step_length, ..nodes };
-        let has_points = self.inner.count() > 0;
-        if !core::mem::take(&mut self.has_algebraic) && !has_points {
-            dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, free, k, step))?;
+        let has_points = self.inner_points.count() > 0;
+        if !core::mem::take(&mut self.algebraic_is_current) && !has_points {
+            dynamics.simulate(&nodes, &mut |k, step| {
+                store_interval::<P::Shape, T>(data.algebraic, free, k, step)
+            })?;
         }
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
-            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = at::<P::Shape, T>(data.algebraic, layout, k);
-            node.read::<P::Shape>(&mut point, &stage, z, free);
-            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended, free);
-            let first = self.inner.first_part();
-            let factor = if *running { free.duration(stage.u) * node.factor * first } else { node.factor };
-            let place = At { stage: k, factor, exact: false, from: &[] };
-            stage_cost.add(&point, node.reference, place, &mut terms)?;
-            path.linearise(&point, &mut [], columns, terms.ld, Spot::new(k, free, &[]))?;
+            let node_data = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
+            let (z, _) = values_and_jacobian::<P::Shape, T>(data.algebraic, layout, k);
+            node_data.write_variables::<P::Shape>(&mut point, &stage, z, free);
+            let ExtendedDerivatives { mut terms, columns } =
+                ExtendedDerivatives::new::<P::Shape>(data.extended, free);
+            let node_fraction = self.inner_points.node_fraction();
+            let factor = if *running {
+                free.duration(stage.u) * node_data.factor * node_fraction
+            } else {
+                node_data.factor
+            };
+            let cost_context = CostContext { stage: k, factor, exact: false, model_origin: &[] };
+            stage_cost.add_derivatives(&point, node_data.reference, cost_context, &mut terms)?;
+            path.linearise(&point, &mut [], columns, terms.ld, ConstraintContext::new(k, free, &[]))?;
             for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
                 *nu = get(terms.gradient, n + j);
                 let mu = stage.g_upper.iter().zip(stage.g_lower);
                 for ((&upper, &lower), column) in mu.zip(columns.chunks_exact(terms.ld.max(1))) {
                     *nu = *nu + (upper - lower) * get(column, n + j);
                 }
-                for (i, &variable) in self.inner.variables().iter().enumerate() {
+                for (i, &variable) in self.inner_points.bounded_variables().iter().enumerate() {
                     if bounds_algebraic && variable == (P::Shape::NX + j, 0) {
-                        let row = node_rows::<P, T>() + self.inner.count() * P::Path::ROWS + i;
+                        let row = node_row_count::<P, T>() + self.inner_points.count() * P::Path::ROWS + i;
                         *nu = *nu + get(stage.g_upper, row) - get(stage.g_lower, row);
                     }
                 }

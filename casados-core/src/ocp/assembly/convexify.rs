@@ -6,9 +6,9 @@ use crate::qp::part_mut;
 use crate::scalar::Real;
 
 /// Eigenvalues are at least this, relative to the largest element.
-const LEAST: f64 = 1e-6;
+const MIN_RELATIVE_EIGENVALUE: f64 = 1e-6;
 /// Sweeps of Jacobi's method; it converges quadratically.
-const SWEEPS: usize = 30;
+const MAX_JACOBI_SWEEPS: usize = 30;
 
 /// Makes a matrix positive definite, whose lower triangle lies column after column, `ld` apart.
 /// `scratch` has room for two such matrices and a vector.
@@ -28,16 +28,17 @@ pub(in crate::ocp) fn convexify<T: Real>(
             largest = value.abs().max(largest);
         }
     }
-    let least = T::from_f64(LEAST) * if largest > T::ZERO { largest } else { T::ONE };
+    let min_eigenvalue =
+        T::from_f64(MIN_RELATIVE_EIGENVALUE) * if largest > T::ZERO { largest } else { T::ONE };
     let (work, rest) = scratch.split_at_mut_checked(n * ld).unwrap_or_default();
-    if is_positive(h, ld, n, least, work) {
+    if is_positive_definite(h, ld, n, min_eigenvalue, work) {
         return;
     }
     if method == Convexification::LevenbergMarquardt {
-        let mut shift = least;
+        let mut shift = min_eigenvalue;
         // The shift cannot be more than the sum of a row, which `n` times the largest element
         // bounds.
-        while !is_positive_shifted(h, ld, n, least, shift, work) {
+        while !is_shifted_positive_definite(h, ld, n, min_eigenvalue, shift, work) {
             shift = shift * T::from_f64(4.0);
             if !shift.is_finite() {
                 return;
@@ -73,7 +74,7 @@ pub(in crate::ocp) fn convexify<T: Real>(
     for k in 0..n {
         let value = get(work, ld, k, k);
         let value = if method == Convexification::Mirror { value.abs() } else { value };
-        let value = if value > least { value } else { least };
+        let value = if value > min_eigenvalue { value } else { min_eigenvalue };
         let vector = vectors.get(k * ld..).unwrap_or_default();
         for (j, (column, &vj)) in h.chunks_exact_mut(ld).zip(vector.iter().take(n)).enumerate() {
             for (target, &vi) in column.iter_mut().zip(vector).take(n).skip(j) {
@@ -95,12 +96,19 @@ fn set<T: Real>(a: &mut [T], ld: usize, row: usize, column: usize, value: T) {
     }
 }
 
-fn is_positive<T: Real>(h: &[T], ld: usize, n: usize, least: T, work: &mut [T]) -> bool {
-    is_positive_shifted(h, ld, n, least, T::ZERO, work)
+fn is_positive_definite<T: Real>(h: &[T], ld: usize, n: usize, min_eigenvalue: T, work: &mut [T]) -> bool {
+    is_shifted_positive_definite(h, ld, n, min_eigenvalue, T::ZERO, work)
 }
 
 /// Whether the pivots of Cholesky's factorisation of `H + shift I` are no smaller than that.
-fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T, work: &mut [T]) -> bool {
+fn is_shifted_positive_definite<T: Real>(
+    h: &[T],
+    ld: usize,
+    n: usize,
+    min_eigenvalue: T,
+    shift: T,
+    work: &mut [T],
+) -> bool {
     for (j, (column, to)) in h.chunks_exact(ld).take(n).zip(work.chunks_exact_mut(ld)).enumerate() {
         for (i, (to, &value)) in to.iter_mut().zip(column).enumerate().take(n).skip(j) {
             *to = if i == j { value + shift } else { value };
@@ -110,8 +118,8 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
         let pivot = get(work, ld, k, k);
         // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for
         // rounding.
-        let is_positive = pivot > T::from_f64(0.5) * least;
-        if !is_positive {
+        let pivot_is_positive = pivot > T::from_f64(0.5) * min_eigenvalue;
+        if !pivot_is_positive {
             return false;
         }
         let Some((left, right)) = work.split_at_mut_checked((k + 1) * ld) else { return true };
@@ -133,18 +141,18 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
 /// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its
 /// eigenvectors.
 pub(in crate::ocp) fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
-    let small = T::from_f64(T::EPSILON);
-    for _ in 0..SWEEPS {
-        let mut off = T::ZERO;
-        let mut diagonal = T::ZERO;
+    let relative_tolerance = T::from_f64(T::EPSILON);
+    for _ in 0..MAX_JACOBI_SWEEPS {
+        let mut max_off_diagonal = T::ZERO;
+        let mut max_diagonal = T::ZERO;
         for j in 0..n {
-            diagonal = get(a, ld, j, j).abs().max(diagonal);
+            max_diagonal = get(a, ld, j, j).abs().max(max_diagonal);
             for i in 0..j {
-                off = get(a, ld, i, j).abs().max(off);
+                max_off_diagonal = get(a, ld, i, j).abs().max(max_off_diagonal);
             }
         }
-        let is_full = off > small * diagonal;
-        if !is_full {
+        let is_not_diagonal = max_off_diagonal > relative_tolerance * max_diagonal;
+        if !is_not_diagonal {
             return;
         }
         for q in 1..n {
@@ -194,13 +202,13 @@ mod tests {
     const LD: usize = 8;
 
     /// Symmetric, with eigenvalues that are known.
-    fn matrix(values: [f64; N]) -> SMatrix<f64, N, N> {
+    fn symmetric_matrix(values: [f64; N]) -> SMatrix<f64, N, N> {
         let a = SMatrix::<f64, N, N>::from_fn(|i, j| ((3 * i + 7 * j * j + 1) as f64).sin());
         let q = a.qr().q();
         q * SMatrix::from_diagonal(&values.into()) * q.transpose()
     }
 
-    fn run(method: Convexification, a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    fn convexified(method: Convexification, a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
         // What is not the lower triangle must not be read.
         let mut h = [f64::NAN; N * LD];
         for j in 0..N {
@@ -218,29 +226,29 @@ mod tests {
 
     #[test]
     fn positive_definite_matrices_stay_as_they_are() {
-        let a = matrix([4.0, 3.0, 2.0, 1.0, 0.5]);
+        let a = symmetric_matrix([4.0, 3.0, 2.0, 1.0, 0.5]);
         for method in [Convexification::Project, Convexification::Mirror, Convexification::LevenbergMarquardt]
         {
             // Both triangles of what was given: it is symmetric but for rounding.
             let lower = SMatrix::<f64, N, N>::from_fn(|i, j| a[(i.max(j), i.min(j))]);
-            assert_eq!(run(method, &a), lower);
+            assert_eq!(convexified(method, &a), lower);
         }
     }
 
     #[test]
     fn eigenvalues_are_projected_mirrored_or_shifted() {
         let values = [4.0, -2.0, 1.0, 0.0, -0.5];
-        let a = matrix(values);
-        let least = LEAST * a.amax();
-        let projected = matrix(values.map(|value| value.max(least)));
-        let mirrored = matrix(values.map(|value: f64| value.abs().max(least)));
-        assert!((run(Convexification::Project, &a) - projected).amax() < TOLERANCE);
-        assert!((run(Convexification::Mirror, &a) - mirrored).amax() < TOLERANCE);
-        let shifted = run(Convexification::LevenbergMarquardt, &a) - a;
+        let a = symmetric_matrix(values);
+        let least = MIN_RELATIVE_EIGENVALUE * a.amax();
+        let projected = symmetric_matrix(values.map(|value| value.max(least)));
+        let mirrored = symmetric_matrix(values.map(|value: f64| value.abs().max(least)));
+        assert!((convexified(Convexification::Project, &a) - projected).amax() < TOLERANCE);
+        assert!((convexified(Convexification::Mirror, &a) - mirrored).amax() < TOLERANCE);
+        let shifted = convexified(Convexification::LevenbergMarquardt, &a) - a;
         let shift = shifted[(0, 0)];
         // As large as it takes, and not four times that.
         assert!(shift > 2.0 && shift < 4.0 * 2.1);
         assert!((shifted - SMatrix::identity() * shift).amax() < TOLERANCE);
-        assert!((run(Convexification::None, &a) - a).amax() < TOLERANCE);
+        assert!((convexified(Convexification::None, &a) - a).amax() < TOLERANCE);
     }
 }

@@ -13,63 +13,68 @@ use crate::scalar::{Packed, Real, Registers, compiled};
 /// here with room for three vectors over `(x, u)`.
 pub(in crate::ocp) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
-    at: &Solution<T, D, M>,
+    iterate: &Solution<T, D, M>,
     scratch: &mut [T],
 ) -> (Residuals, f64) {
     let mut result = Default::default();
-    T::compiled::<Conditions>(Kkt { qp, at: at.borrowed(), scratch, result: &mut result });
+    T::run_precompiled::<KktResidualsCompiled>(KktResiduals {
+        qp,
+        iterate: iterate.borrowed(),
+        scratch,
+        result: &mut result,
+    });
     result
 }
 
 /// A point that others own.
-type Point<'a, T> = Solution<T, &'a [StageDims], &'a [T]>;
+type BorrowedSolution<'a, T> = Solution<T, &'a [StageDims], &'a [T]>;
 
 /// See [`residuals`].
-struct Kkt<'a, T: Real> {
+struct KktResiduals<'a, T: Real> {
     qp: QpView<'a, T>,
-    at: Point<'a, T>,
+    iterate: BorrowedSolution<'a, T>,
     scratch: &'a mut [T],
     result: &'a mut (Residuals, f64),
 }
 
 compiled! {
     /// See [`residuals`].
-    Conditions: Kkt<'r, T>
+    KktResidualsCompiled: KktResiduals<'r, T>
 }
 
-impl<T: Real> Registers<T> for Kkt<'_, T> {
+impl<T: Real> Registers<T> for KktResiduals<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        *self.result = conditions::<T, E>(self.qp, &self.at, self.scratch);
+        *self.result = compute_residuals::<T, E>(self.qp, &self.iterate, self.scratch);
     }
 }
 
 #[inline(always)]
-fn conditions<T: Real, E: Packed<T>>(
+fn compute_residuals<T: Real, E: Packed<T>>(
     qp: QpView<'_, T>,
-    at: &Point<'_, T>,
+    iterate: &BorrowedSolution<'_, T>,
     scratch: &mut [T],
 ) -> (Residuals, f64) {
     let mut residuals = Residuals::default();
     let mut penalties = 0.0;
-    let mut arriving: &[T] = &[];
+    let mut previous_costates: &[T] = &[];
     let (periodic, shared) = (qp.periodic(), qp.shared());
     let last = qp.dims().len().saturating_sub(1);
     let ld = padded_len::<T>(qp.dims().iter().map(|stage| stage.nx + stage.nu).max().unwrap_or(0));
     let (scratch, joint) = scratch.split_at_mut_checked(2 * ld).unwrap_or_default();
     let joint = part_mut(joint, 0, ld);
     joint.fill(T::ZERO);
-    let (all, _) = at.variables_and_costates();
-    let mut begin = 0;
-    let mut stages = at.stages().peekable();
+    let (all, _) = iterate.variables_and_costates();
+    let mut stage_start = 0;
+    let mut stages = iterate.stages().peekable();
     for (k, stage) in qp.stages().enumerate() {
         let Some(point) = stages.next() else { break };
         let next = stages.peek().map_or(&[][..], |next| next.x);
         let view = stage.arrays();
         // What is padding is zero.
         let (n, ld) = (view.n, view.ld);
-        let v = part(all, begin, ld);
-        begin += ld;
+        let v = part(all, stage_start, ld);
+        stage_start += ld;
         let (sum, rest) = scratch.split_at_mut_checked(ld).unwrap_or_default();
         let gap = part_mut(rest, 0, view.next);
         let matrix = Columns { data: view.matrix, ld };
@@ -78,7 +83,7 @@ fn conditions<T: Real, E: Packed<T>>(
         }
         add_transposed::<T, E>(gap, matrix, v, n, view.next);
         for &gap in &*gap {
-            grow(&mut residuals.dynamics, gap);
+            update_max(&mut residuals.dynamics, gap);
         }
         // The gradient with another sign.
         copy_common(sum, view.gradient);
@@ -89,7 +94,7 @@ fn conditions<T: Real, E: Packed<T>>(
         for ((&upper, &lower), column) in point.g_upper.iter().zip(point.g_lower).zip(columns) {
             subtract_column::<T, E>(sum, upper - lower, column);
         }
-        for (sum, &pi) in sum.iter_mut().zip(arriving) {
+        for (sum, &pi) in sum.iter_mut().zip(previous_costates) {
             *sum = *sum + pi;
         }
         let upper = point.x_upper.iter().chain(point.u_upper);
@@ -98,12 +103,12 @@ fn conditions<T: Real, E: Packed<T>>(
         for (i, ((&sum, &upper), &lower)) in sum.iter().zip(upper).zip(lower).enumerate() {
             let residual = sum + lower - upper;
             // Of variables that are one the sum counts.
-            let is_joint = match i.checked_sub(nx) {
+            let is_coupled = match i.checked_sub(nx) {
                 None => (k == 0 || k == last) && is_marked(periodic, i),
                 Some(j) => is_marked(shared, j),
             };
-            match joint.get_mut(i).filter(|_| is_joint) {
-                None => grow(&mut residuals.stationarity, residual),
+            match joint.get_mut(i).filter(|_| is_coupled) {
+                None => update_max(&mut residuals.stationarity, residual),
                 Some(joint) => *joint = *joint + residual,
             }
         }
@@ -113,32 +118,37 @@ fn conditions<T: Real, E: Packed<T>>(
         penalties += bound_residuals(&stage.x_bounds(), x, point.x_lower, point.x_upper, &mut residuals);
         penalties += bound_residuals(&stage.u_bounds(), u, point.u_lower, point.u_upper, &mut residuals);
         penalties += bound_residuals(&stage.g_bounds(), g, point.g_lower, point.g_upper, &mut residuals);
-        arriving = point.dynamics;
+        previous_costates = point.dynamics;
     }
     if qp.is_coupled() {
-        joint_residuals(qp, at, joint, &mut residuals);
+        coupled_residuals(qp, iterate, joint, &mut residuals);
     }
     (residuals, penalties)
 }
 
 /// Residuals of variables that are one, from the sums of their gradients.
-fn joint_residuals<T: Real>(qp: QpView<'_, T>, at: &Point<'_, T>, joint: &[T], residuals: &mut Residuals) {
-    let mut stages = at.stages();
+fn coupled_residuals<T: Real>(
+    qp: QpView<'_, T>,
+    iterate: &BorrowedSolution<'_, T>,
+    joint: &[T],
+    residuals: &mut Residuals,
+) {
+    let mut stages = iterate.stages();
     let (Some(first), last) = (stages.next(), stages.next_back()) else { return };
-    joint.iter().for_each(|&sum| grow(&mut residuals.stationarity, sum));
+    joint.iter().for_each(|&sum| update_max(&mut residuals.stationarity, sum));
     let get = |values: &[T], i: usize| values.get(i).copied().unwrap_or(T::ZERO);
     for i in marked_indices(qp.periodic()) {
-        grow(&mut residuals.dynamics, get(first.x, i) - last.map_or(T::ZERO, |last| get(last.x, i)));
+        update_max(&mut residuals.dynamics, get(first.x, i) - last.map_or(T::ZERO, |last| get(last.x, i)));
     }
     for j in marked_indices(qp.shared()) {
-        for &u in at.stages().filter_map(|stage| stage.u.get(j)) {
-            grow(&mut residuals.dynamics, u - get(first.u, j));
+        for &u in iterate.stages().filter_map(|stage| stage.u.get(j)) {
+            update_max(&mut residuals.dynamics, u - get(first.u, j));
         }
     }
 }
 
 /// The larger size; NaN stays.
 #[inline(always)]
-pub(in crate::ocp) fn grow<T: Real>(largest: &mut f64, value: T) {
+pub(in crate::ocp) fn update_max<T: Real>(largest: &mut f64, value: T) {
     *largest = nan_max(*largest, value.abs().to_f64());
 }

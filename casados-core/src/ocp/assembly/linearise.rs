@@ -1,21 +1,25 @@
 //! The QP at an iterate.
 
 use crate::linalg::dot;
-use crate::ocp::assembly::algebraic::{self, Extended};
+use crate::ocp::assembly::algebraic::{self, ExtendedDerivatives};
 use crate::ocp::assembly::convexify::convexify;
+use crate::ocp::assembly::initial_state_copies::link_initial_state_copies;
 #[cfg(feature = "alloc")]
-use crate::ocp::assembly::inside::{Costs, Rows};
-use crate::ocp::assembly::start::link_start;
-use crate::ocp::assembly::transfer::Left;
+use crate::ocp::assembly::inner_points::{ConstraintRows, PointCost};
+use crate::ocp::assembly::linearised_interval::IntervalContributions;
 use crate::ocp::formulation::arrival;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
-use crate::ocp::formulation::functions::cost::{At, Cost};
-use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, Sink, add_stages};
-use crate::ocp::formulation::functions::point::Terms;
-use crate::ocp::formulation::instance::data::{Layout, Node, inputs, node_rows, path_rows, split};
-use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::free_parameters::FreeParametersView;
+use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext};
+use crate::ocp::formulation::functions::dynamics::{
+    Dynamics, IntervalResult, Nodes, Sink, add_stage_residuals,
+};
+use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
+use crate::ocp::formulation::instance::data::{
+    Layout, Node, node_row_count, path_row_count, split_data, stage_variable_count,
+};
+use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::{Arrays, StageDims, add_symmetric, copy_common, padded_len, part, part_mut};
@@ -28,25 +32,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn linearise_with_observer<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        watch: Sink<'_, T>,
+        observer: Sink<'_, T>,
     ) -> Result<(), OcpError> {
         let intervals = self.intervals();
-        let is_free_cost = self.free.view().end().is_some() && self.problem.parts().running;
-        let plain = !C::EXACT && !is_free_cost && !self.inner.has_costs_at_points();
-        let mut left = Left { plain, adding: false };
-        let sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
-            left.transfer::<P, T>(step, free, stage, at);
-            watch(k, step);
+        let is_free_cost = self.free.view().end_time_index().is_some() && self.problem.parts().running;
+        let plain = !C::EXACT && !is_free_cost && !self.inner_points.has_costs_at_points();
+        let mut contributions = IntervalContributions { has_node_costs_only: plain, adds_to_costs: false };
+        let interval_sums = self.linearise_intervals(curvature, |k, step, (stage, free), at| {
+            contributions.write_interval::<P, T>(step, free, stage, at);
+            observer(k, step);
         })?;
-        let costs = self.linearise_functions::<C>(left.plain, |k, hessian, gradient| {
-            if !(left.adding && k < intervals) {
-                hessian.fill(T::ZERO);
-                gradient.fill(T::ZERO);
-            }
-        })?;
-        self.complete_gradients(curvature, left.plain);
-        self.add_arrival(false);
-        self.keep_sums(sums, costs);
+        let costs =
+            self.linearise_functions::<C>(contributions.has_node_costs_only, |k, hessian, gradient| {
+                if !(contributions.adds_to_costs && k < intervals) {
+                    hessian.fill(T::ZERO);
+                    gradient.fill(T::ZERO);
+                }
+            })?;
+        self.complete_gradients(curvature, contributions.has_node_costs_only);
+        self.add_arrival_cost(false);
+        self.store_objective(interval_sums, costs);
         Ok(())
     }
 
@@ -55,172 +60,209 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut to: impl FnMut(usize, &IntervalResult<'_, T>, (Arrays<'_, T>, Free<'_>), &[T]),
-    ) -> Result<Sums<T>, OcpError> {
+        mut visit: impl FnMut(usize, &IntervalResult<'_, T>, (Arrays<'_, T>, FreeParametersView<'_>), &[T]),
+    ) -> Result<IntervalSums<T>, OcpError> {
         self.check()?;
         #[cfg(feature = "alloc")]
-        if self.inner.count() > 0 {
-            return self.linearise_pieces(curvature, to);
+        if self.inner_points.count() > 0 {
+            return self.linearise_pieces(curvature, visit);
         }
         if C::EXACT {
-            self.weigh()?;
+            self.update_algebraic_weights()?;
         }
         let layout = self.layout();
-        let ld = ld_of::<P::Shape, T>(layout);
+        let ld = stage_stride::<P::Shape, T>(layout);
         let Self { problem, qp, iterate, data, step_length, free, .. } = self;
         let free = free.view();
-        let data = split::<P, T>(data.as_mut(), layout);
+        let data = split_data::<P, T>(data.as_mut(), layout);
         let (v, multipliers) = iterate.variables_and_costates();
         let weights = if C::EXACT { &*data.weights } else { &[] };
-        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, (data.p, free), data.times);
+        let nodes = interval_nodes::<P::Shape, T>(v, multipliers, weights, (data.p, free), data.times);
         let nodes = Nodes { step_length: *step_length, ..nodes };
         let mut stages = qp.stages_mut();
         let (mut objective, mut left) = (T::ZERO, [T::ZERO; 2]);
         let Problem { dynamics, .. } = problem.parts();
         curvature.run(dynamics, &nodes, &mut |k, step: &IntervalResult<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
-            algebraic::keep::<P::Shape, T>(data.algebraic, free, k, step);
+            algebraic::store_interval::<P::Shape, T>(data.algebraic, free, k, step);
             objective = objective + step.cost.value;
             if P::Dynamics::LIFTED {
-                left = add_stages(left, step.stages);
+                left = add_stage_residuals(left, step.stage_residuals);
             }
-            to(k, step, (stage.arrays(), free), part(v, k * ld, ld));
+            visit(k, step, (stage.arrays(), free), part(v, k * ld, ld));
         })?;
         Ok((objective, left))
     }
 
     /// Adds the arrival cost to the QP: its gradient at zero, or `at_iterate`.
-    pub(in crate::ocp) fn add_arrival(&mut self, at_iterate: bool) {
+    pub(in crate::ocp) fn add_arrival_cost(&mut self, at_iterate: bool) {
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         let x0 = self.iterate.stages().next().filter(|_| at_iterate).map_or(&[][..], |first| first.x);
-        arrival::add(data.arrival, x0, &mut self.qp);
+        arrival::add_to_qp(data.arrival, x0, &mut self.qp);
     }
 
     /// The objective at the iterate, of intervals and `costs` at nodes.
-    pub(in crate::ocp) fn keep_sums(&mut self, (objective, stages): Sums<T>, costs: T) {
+    pub(in crate::ocp) fn store_objective(&mut self, (objective, stages): IntervalSums<T>, costs: T) {
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        self.objective = objective + costs + arrival::cost(data.arrival, &self.iterate);
-        self.stages = stages;
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
+        self.objective = objective + costs + arrival::arrival_cost(data.arrival, &self.iterate);
+        self.stage_residuals = stages;
     }
 
     /// Costs and constraints at nodes, stage by stage, added to Hessians and gradients with which
     /// each `begin`s; the costs. Where stages have nothing else, they are `plain`.
     pub(in crate::ocp) fn linearise_functions<C: Curvature<P::Dynamics, T>>(
         &mut self,
-        plain: bool,
-        begin: impl Fn(usize, &mut [T], &mut [T]),
+        has_node_costs_only: bool,
+        initialise: impl Fn(usize, &mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
         let layout @ Layout { intervals, .. } = self.layout();
-        let first_part = self.inner.first_part();
+        let first_part = self.inner_points.node_fraction();
         #[cfg(feature = "alloc")]
-        let inner = &mut self.inner;
+        let inner = &mut self.inner_points;
         let Self { problem, qp, iterate, data, free, .. } = self;
         let free = free.view();
-        let data = split::<P, T>(data.as_mut(), layout);
+        let data = split_data::<P, T>(data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
         let (v, _) = iterate.variables_and_costates();
         let mut objective = T::ZERO;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
+        for (k, (mut stage, stage_point)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            begin(k, hessian, gradient);
+            initialise(k, hessian, gradient);
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
-            node.read::<P::Shape>(&mut point, &at, z, free);
-            let mut direct = Terms { free, gradient, hessian, ld };
+            let (z, dz) = algebraic::values_and_jacobian::<P::Shape, T>(data.algebraic, layout, k);
+            node.write_variables::<P::Shape>(&mut point, &stage_point, z, free);
+            let mut direct = QuadraticTerms { free, gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
-            let here = part(v, k * ld_of::<P::Shape, T>(layout), n);
-            let from = if plain && is_direct::<P, T>(k == intervals, z) { here } else { &[] };
+            let stage_variables = part(v, k * stage_stride::<P::Shape, T>(layout), n);
+            let from = if has_node_costs_only && writes_qp_gradient::<P, T>(k == intervals, z) {
+                stage_variables
+            } else {
+                &[]
+            };
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
-            let mut room =
-                Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] }, free);
+            let mut extended = ExtendedDerivatives::new::<P::Shape>(
+                if is_extended { &mut *data.extended } else { &mut [] },
+                free,
+            );
             let (terms, slopes, ld_slopes) = if is_extended {
-                let ld = room.terms.ld;
-                (&mut room.terms, &mut *room.columns, ld)
+                let ld = extended.terms.ld;
+                (&mut extended.terms, &mut *extended.columns, ld)
             } else {
                 (&mut direct, &mut *columns, ld)
             };
             // Values lie where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
-            let count = if k < intervals { path_rows::<P, T>(layout) } else { P::Terminal::ROWS };
+            let count = if k < intervals { path_row_count::<P, T>(layout) } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
             // Of a running cost the end time is a factor.
-            let w = free.end().filter(|_| *running && k < intervals);
-            let duration = if w.is_some() { free.duration(at.u) } else { T::ONE };
+            let end_time_index = free.end_time_index().filter(|_| *running && k < intervals);
+            let duration = if end_time_index.is_some() { free.duration(stage_point.u) } else { T::ONE };
             let factor = duration * node.factor * if *running && k < intervals { first_part } else { T::ONE };
-            let place = At { stage: k, factor, exact: C::EXACT, from };
-            let spot = Spot::new(k, free, part(at.u, 0, P::Terminal::STARTS));
+            let cost_context = CostContext { stage: k, factor, exact: C::EXACT, model_origin: from };
+            let constraint_context =
+                ConstraintContext::new(k, free, part(stage_point.u, 0, P::Terminal::INITIAL_STATE_COPIES));
             // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
             let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
-            for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+            for ((mu, &upper), &lower) in mu.iter_mut().zip(stage_point.g_upper).zip(stage_point.g_lower) {
                 *mu = upper - lower;
             }
             if k < intervals {
-                let cost = if let Some(w) = w {
-                    let before = part_mut(data.scratch, 0, terms.gradient.len());
-                    copy_common(before, terms.gradient);
-                    let cost = stage_cost.add(&point, node.reference, place, terms)?;
-                    terms.add_duration(w + P::Shape::NX, [cost, duration], before, C::EXACT);
+                let cost = if let Some(w) = end_time_index {
+                    let gradient_before = part_mut(data.scratch, 0, terms.gradient.len());
+                    copy_common(gradient_before, terms.gradient);
+                    let cost = stage_cost.add_derivatives(&point, node.reference, cost_context, terms)?;
+                    terms.add_duration_derivatives(
+                        w + P::Shape::NX,
+                        [cost, duration],
+                        gradient_before,
+                        C::EXACT,
+                    );
                     cost
                 } else {
-                    stage_cost.add(&point, node.reference, place, terms)?
+                    stage_cost.add_derivatives(&point, node.reference, cost_context, terms)?
                 };
                 objective = objective + cost;
-                path.linearise(&point, values, slopes, ld_slopes, spot)?;
+                path.linearise(&point, values, slopes, ld_slopes, constraint_context)?;
                 if !mu.is_empty() {
-                    path.curve(&point, mu, spot, terms);
+                    path.add_hessian(&point, mu, constraint_context, terms);
                 }
             } else {
-                objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
-                terminal.linearise(&point, values, slopes, ld_slopes, spot)?;
+                objective =
+                    objective + terminal_cost.add_derivatives(&point, node.reference, cost_context, terms)?;
+                terminal.linearise(&point, values, slopes, ld_slopes, constraint_context)?;
                 if !mu.is_empty() {
-                    terminal.curve(&point, mu, spot, terms);
+                    terminal.add_hessian(&point, mu, constraint_context, terms);
                 }
             }
             if is_extended {
-                let at_node = if k < intervals { node_rows::<P, T>() } else { count };
-                room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, at_node * ld), ld);
+                let node_row_total = if k < intervals { node_row_count::<P, T>() } else { count };
+                extended.eliminate_algebraic::<P::Shape>(
+                    dz,
+                    &mut direct,
+                    part_mut(columns, 0, node_row_total * ld),
+                    ld,
+                );
             }
             #[cfg(feature = "alloc")]
-            if k < intervals && (layout.inner > 0 || inner.has_costs_at_points()) {
+            if k < intervals && (layout.inner_rows > 0 || inner.has_costs_at_points()) {
                 let mu = part(rest, ld, if C::EXACT { count } else { 0 });
                 let (values, columns) = (&mut *values, &mut *columns);
-                let rows = &mut Rows { values, columns, ld, terms: Some(&mut direct), mu, stage: at, k };
-                let costs = Costs {
+                let rows = &mut ConstraintRows {
+                    values,
+                    columns,
+                    ld,
+                    terms: Some(&mut direct),
+                    mu,
+                    stage: stage_point,
+                    k,
+                };
+                let costs = PointCost {
                     cost: &mut *stage_cost,
                     reference: node.reference,
                     running: *running,
                     exact: C::EXACT,
                 };
-                let found =
-                    inner.write_rows::<P>((&mut *path, costs), (z, dz), (data.times, data.p), free, rows)?;
-                objective = objective + found;
+                let point_costs = inner.write_point_rows::<P>(
+                    (&mut *path, costs),
+                    (z, dz),
+                    (data.times, data.p),
+                    free,
+                    rows,
+                )?;
+                objective = objective + point_costs;
             }
             if k < intervals {
-                link_start::<P, T>(&at, k, (values, columns, ld));
+                link_initial_state_copies::<P, T>(&stage_point, k, (values, columns, ld));
             }
-            let given =
-                [&*data.lower, &*data.upper].map(|limits| part(limits, k * path_rows::<P, T>(layout), count));
-            shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
+            let given_limits = [&*data.lower, &*data.upper]
+                .map(|limits| part(limits, k * path_row_count::<P, T>(layout), count));
+            shift_limits(
+                columns,
+                [n, ld],
+                stage_variables,
+                [values, part_mut(rest, ld, count)],
+                given_limits,
+            );
         }
         Ok(objective)
     }
 
     /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
     /// complete.
-    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, plain: bool) {
+    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, has_node_costs_only: bool) {
         let layout @ Layout { intervals, .. } = self.layout();
         let Self { qp, iterate, data, .. } = self;
-        let data = split::<P, T>(data.as_mut(), layout);
+        let data = split_data::<P, T>(data.as_mut(), layout);
         let (v, _) = iterate.variables_and_costates();
-        let ld = ld_of::<P::Shape, T>(layout);
+        let ld = stage_stride::<P::Shape, T>(layout);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
-            if plain && is_direct::<P, T>(k == intervals, z) {
+            let (z, _) = algebraic::values_and_jacobian::<P::Shape, T>(data.algebraic, layout, k);
+            if has_node_costs_only && writes_qp_gradient::<P, T>(k == intervals, z) {
                 continue;
             }
             let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
@@ -241,7 +283,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The objective of the QP at the iterate `v̄` becomes `½ (v − v̄)ᵀ H (v − v̄)`.
-    pub(in crate::ocp) fn forget_gradients(&mut self) {
+    pub(in crate::ocp) fn centre_objective_at_iterate(&mut self) {
         let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
@@ -270,10 +312,10 @@ impl<P, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D,
 }
 
 /// The costs of all intervals, and what is left of the equations of lifted stages.
-type Sums<T> = (T, [T; 2]);
+type IntervalSums<T> = (T, [T; 2]);
 
 /// Whether costs at a node write the gradient of the QP themselves, where nothing else is there.
-fn is_direct<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
+fn writes_qp_gradient<P: Formulation<T>, T: Real>(is_last: bool, z: &[T]) -> bool {
     let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
     convex && z.is_empty()
 }
@@ -286,14 +328,14 @@ pub(super) fn shift_limits<T: Real>(
     [lower, upper]: [&mut [T]; 2],
     [given_lower, given_upper]: [&[T]; 2],
 ) {
-    let sides = lower.iter_mut().zip(upper).zip(given_lower.iter().zip(given_upper));
-    for (((lower, upper), (&low, &high)), column) in sides.zip(columns.chunks(ld.max(1))) {
+    let limits = lower.iter_mut().zip(upper).zip(given_lower.iter().zip(given_upper));
+    for (((lower, upper), (&low, &high)), column) in limits.zip(columns.chunks(ld.max(1))) {
         let shift = dot(part(column, 0, n), v) - *lower;
         (*lower, *upper) = (low + shift, high + shift);
     }
 }
 
 /// The distance of stages in vectors `v`.
-pub(super) const fn ld_of<S: Shape, T>(layout: Layout) -> usize {
-    padded_len::<T>(inputs::<S>(layout.free))
+pub(super) const fn stage_stride<S: Shape, T>(layout: Layout) -> usize {
+    padded_len::<T>(stage_variable_count::<S>(layout.free_count))
 }

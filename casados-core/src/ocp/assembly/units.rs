@@ -14,69 +14,69 @@ use crate::scalar::Real;
 use core::ops::Range as Stages;
 
 /// No unit is larger, or smaller than its inverse: squares of units are numbers.
-const FARTHEST: f64 = 1e12;
+const MAX_UNIT: f64 = 1e12;
 /// Tolerances are those of the problem where units are up to this or its inverse.
-pub(in crate::ocp) const WIDE: f64 = 100.0;
+pub(in crate::ocp) const NEAR_ONE_RATIO: f64 = 100.0;
 
 /// Beside the unit of forces at the guess a smaller one cannot be met where this many rounding
 /// errors of it are more than what has to be met.
-const ROUNDING_ERRORS: f64 = 10.0;
+const ROUNDING_ERROR_MARGIN: f64 = 10.0;
 /// So many times the distance of two numbers are the last digits of a sum of some.
-const LAST_DIGITS: f64 = 4.0;
+const SUM_ROUNDING_FACTOR: f64 = 4.0;
 /// IPOPT's `nlp_upper_bound_inf`: larger bounds say nothing of how large variables are.
 const BOUND_INFINITY: f64 = 1e19;
 
 /// What is known of all units.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp) struct Sizes {
+pub(in crate::ocp) struct ProblemScaling {
     /// The unit of forces.
-    pub force: f64,
+    pub objective_unit: f64,
     /// The least unit of a row, at most one.
-    pub least: f64,
+    pub min_row_unit: f64,
 }
 
 /// The units of a problem.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp) struct Units<'a, T> {
-    pub sizes: Sizes,
+pub(in crate::ocp) struct ScalingUnits<'a, T> {
+    pub scaling: ProblemScaling,
     /// Those of variables and constraints.
     pub rows: &'a [T],
 }
 
 /// What a tolerance is multiplied by: the unit, but one from there to a hundredth of it.
-pub(in crate::ocp) fn of_tolerance(unit: f64) -> f64 {
-    unit.min(1.0).max(unit / WIDE)
+pub(in crate::ocp) fn tolerance_factor(unit: f64) -> f64 {
+    unit.min(1.0).max(unit / NEAR_ONE_RATIO)
 }
 
 /// The least and the largest of the sizes that something may have.
 #[derive(Clone, Copy)]
-struct Range {
-    least: f64,
-    most: f64,
+struct MagnitudeRange {
+    smallest: f64,
+    largest: f64,
 }
 
-impl Range {
-    const EMPTY: Self = Self { least: f64::INFINITY, most: 0.0 };
+impl MagnitudeRange {
+    const EMPTY: Self = Self { smallest: f64::INFINITY, largest: 0.0 };
 
     /// Zeros and infinite bounds say nothing.
     fn add<T: Real>(&mut self, size: T) {
         let size = size.abs().to_f64();
         if size > 0.0 && size.is_finite() {
-            (self.least, self.most) = (self.least.min(size), self.most.max(size));
+            (self.smallest, self.largest) = (self.smallest.min(size), self.largest.max(size));
         }
     }
 
     /// The number between least and most that is nearest to one; one where nothing is known.
     fn unit<T: Real>(&self) -> T {
-        let Self { least, most } = *self;
+        let Self { smallest: least, largest: most } = *self;
         let unit = if most == 0.0 { 1.0 } else { least.max(most.min(1.0)) };
-        T::from_f64(unit.clamp(1.0 / FARTHEST, FARTHEST))
+        T::from_f64(unit.clamp(1.0 / MAX_UNIT, MAX_UNIT))
     }
 
     /// The same; one where that is between a hundredth and a hundred.
-    fn unit_far_from_one<T: Real>(&self) -> T {
+    fn unit_unless_near_one<T: Real>(&self) -> T {
         let unit = self.unit::<T>();
-        let wide = T::from_f64(WIDE);
+        let wide = T::from_f64(NEAR_ONE_RATIO);
         if unit <= wide && unit * wide >= T::ONE { T::ONE } else { unit }
     }
 }
@@ -86,7 +86,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// constraints.
     ///
     /// With a number for each row, and scratch over the variables of a stage.
-    pub(in crate::ocp) fn find_units(&self, rows: &mut [T], scratch: &mut [T]) -> Sizes {
+    pub(in crate::ocp) fn compute_units(&self, rows: &mut [T], scratch: &mut [T]) -> ProblemScaling {
         rows.fill(T::ONE);
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
         for span in self.problem.spans(qp.dims.len()) {
@@ -95,45 +95,45 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             let StageDims { nx, nu, .. } = qp.dims.get(span.start).copied().unwrap_or_default();
             for i in 0..nx + nu {
                 // Controls of the last stage are those that all stages share, or others.
-                let is_one = i < nx || is_marked(qp.shared(), i - nx);
-                let stages = if is_one { span.clone() } else { path.clone() };
-                units_of_variable(qp, v, (stages, i), rows);
+                let is_single_variable = i < nx || is_marked(qp.shared(), i - nx);
+                let stages = if is_single_variable { span.clone() } else { path.clone() };
+                set_variable_unit(qp, v, (stages, i), rows);
             }
-            let of_last = qp.dims.get(last).map_or(0, |dims| dims.nu);
-            for j in (0..of_last).filter(|&j| !is_marked(qp.shared(), j)) {
-                units_of_variable(qp, v, (terminal.clone(), nx + j), rows);
+            let last_controls = qp.dims.get(last).map_or(0, |dims| dims.nu);
+            for j in (0..last_controls).filter(|&j| !is_marked(qp.shared(), j)) {
+                set_variable_unit(qp, v, (terminal.clone(), nx + j), rows);
             }
             for stages in [path, terminal] {
                 for i in 0..qp.dims.get(stages.start).map_or(0, |dims| dims.ng) {
-                    units_of_row(qp, v, (stages.clone(), i), rows);
+                    set_row_unit(qp, v, (stages.clone(), i), rows);
                 }
             }
         }
-        let force = unit_of_forces(qp, v, rows, scratch);
+        let force = compute_objective_unit(qp, v, rows, scratch);
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
-        Sizes { force, least: least.to_f64() }
+        ProblemScaling { objective_unit: force, min_row_unit: least.to_f64() }
     }
 
     /// A smaller unit of forces, where the one at the guess says little of the iterate: there the
     /// objective and its slopes are less than a hundredth of it. A cost of `(x − r)²` with a large
     /// `r` is large at the guess, and one at a solution nearby. With units of rows, and the least
     /// residual in units of forces that is asked for.
-    pub(in crate::ocp) fn smaller_force(
+    pub(in crate::ocp) fn reduced_objective_unit(
         &self,
         rows: &[T],
-        force: f64,
-        least: f64,
+        objective_unit: f64,
+        min_row_unit: f64,
         scratch: &mut [T],
     ) -> Option<f64> {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        let [slope, _] = slopes_and_changes(qp, v, rows, scratch);
+        let [slope, _] = largest_gradient_and_change(qp, v, rows, scratch);
         let size = slope.to_f64().max(self.objective.abs().to_f64()).max(1.0);
-        let smaller = size.max(ROUNDING_ERRORS * T::EPSILON / least * force);
-        (smaller * WIDE < force).then_some(smaller)
+        let smaller_unit = size.max(ROUNDING_ERROR_MARGIN * T::EPSILON / min_row_unit * objective_unit);
+        (smaller_unit * NEAR_ONE_RATIO < objective_unit).then_some(smaller_unit)
     }
 
     /// The largest size of variables and of their bounds, at least one.
-    pub(in crate::ocp) fn largest_size(&self) -> f64 {
+    pub(in crate::ocp) fn largest_magnitude(&self) -> f64 {
         let mut largest =
             self.iterate.variables_and_costates().0.iter().fold(T::ONE, |m, v| m.max(v.abs())).to_f64();
         for stage in self.qp().stages() {
@@ -151,33 +151,34 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// What rounding leaves of gaps, and of distances to bounds: the last digits of the largest
     /// variable of the iterate, moved into its bounds.
-    pub(in crate::ocp) fn rounding_of_gaps(&self) -> f64 {
+    pub(in crate::ocp) fn gap_rounding_error(&self) -> f64 {
         let mut largest = T::ZERO;
-        for (stage, at) in self.qp().stages().zip(self.iterate.stages()) {
-            for (bounds, values) in [(stage.x_bounds(), at.x), (stage.u_bounds(), at.u)] {
+        for (stage, stage_point) in self.qp().stages().zip(self.iterate.stages()) {
+            for (bounds, values) in [(stage.x_bounds(), stage_point.x), (stage.u_bounds(), stage_point.u)] {
                 let limits = bounds.lower.iter().zip(bounds.upper);
                 for (&value, (&lower, &upper)) in values.iter().zip(limits) {
                     largest = largest.max(value.max(lower).min(upper).abs());
                 }
             }
         }
-        LAST_DIGITS * T::EPSILON * largest.to_f64()
+        SUM_ROUNDING_FACTOR * T::EPSILON * largest.to_f64()
     }
 }
 
 /// The unit of a variable at all stages, by its guess and bounds; one where they are not far from
 /// one.
-fn units_of_variable<T: Real>(
+fn set_variable_unit<T: Real>(
     qp: QpView<'_, T>,
     v: &[T],
     (stages, i): (Stages<usize>, usize),
     units: &mut [T],
 ) {
-    let mut range = Range::EMPTY;
+    let mut range = MagnitudeRange::EMPTY;
     let mut guess = T::ZERO;
-    let places = || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
-    let of_places = qp.stages().skip(stages.start);
-    for (place, stage) in places().zip(of_places) {
+    let variable_places =
+        || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
+    let stages_of_places = qp.stages().skip(stages.start);
+    for (place, stage) in variable_places().zip(stages_of_places) {
         guess = guess.max(at(v, (place.v + i) as u32).abs());
         let (bounds, i) = if i < place.nx { (stage.x_bounds(), i) } else { (stage.u_bounds(), i - place.nx) };
         let Bounds { lower, upper, .. } = bounds;
@@ -188,19 +189,19 @@ fn units_of_variable<T: Real>(
         }
     }
     // Small guesses are as good as zero.
-    if range.most > 0.0 || guess > T::ONE {
+    if range.largest > 0.0 || guess > T::ONE {
         range.add(guess);
     }
-    let unit = range.unit_far_from_one();
-    for place in places() {
+    let unit = range.unit_unless_near_one();
+    for place in variable_places() {
         set(units, place.row + i, unit);
     }
 }
 
 /// The unit of a constraint at some stages, by its gradients and how far it is from its bounds.
-fn units_of_row<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>, usize), units: &mut [T]) {
-    let mut range = Range::EMPTY;
-    let (mut slope, mut distance) = (T::ZERO, T::ZERO);
+fn set_row_unit<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>, usize), units: &mut [T]) {
+    let mut range = MagnitudeRange::EMPTY;
+    let (mut largest_gradient, mut bound_distance) = (T::ZERO, T::ZERO);
     for (place, stage) in
         Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
     {
@@ -210,20 +211,20 @@ fn units_of_row<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>
         let mut value = T::ZERO;
         for ((&g, &v), &unit) in column.iter().zip(v).zip(part(units, place.row, place.n)) {
             value = value + g * v;
-            slope = slope.max((g * unit).abs());
+            largest_gradient = largest_gradient.max((g * unit).abs());
         }
         let Bounds { lower, upper, .. } = stage.g_bounds();
-        let mut nearest = T::from_f64(f64::INFINITY);
+        let mut nearest_distance = T::from_f64(f64::INFINITY);
         for &bound in lower.get(i).into_iter().chain(upper.get(i)) {
-            nearest = nearest.min((value - bound).abs());
+            nearest_distance = nearest_distance.min((value - bound).abs());
         }
-        if nearest.is_finite() {
-            distance = distance.max(nearest);
+        if nearest_distance.is_finite() {
+            bound_distance = bound_distance.max(nearest_distance);
         }
     }
-    range.add(slope);
-    range.add(distance);
-    let unit = range.unit_far_from_one();
+    range.add(largest_gradient);
+    range.add(bound_distance);
+    let unit = range.unit_unless_near_one();
     for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
         set(units, place.row + place.ld + i, unit);
     }
@@ -232,31 +233,31 @@ fn units_of_row<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>
 /// The unit of forces: of the largest derivative of the objective by a variable, or what that
 /// changes by where the variable changes by a unit or by its size. At many guesses gradients
 /// vanish.
-fn unit_of_forces<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
-    let [slope, change] = slopes_and_changes(qp, v, rows, scratch);
-    let mut range = Range::EMPTY;
+fn compute_objective_unit<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> f64 {
+    let [slope, change] = largest_gradient_and_change(qp, v, rows, scratch);
+    let mut range = MagnitudeRange::EMPTY;
     range.add(slope.max(change));
     range.unit::<T>().to_f64()
 }
 
 /// Both of them, with units of rows.
-fn slopes_and_changes<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
-    let ([mut largest, mut most], fixed) = ([T::ZERO; 2], is_initial_state_fixed(qp));
+fn largest_gradient_and_change<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
+    let ([mut largest_gradient, mut largest_change], fixed) = ([T::ZERO; 2], is_initial_state_fixed(qp));
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
         copy_common(gradient, part(view.gradient, 0, place.ld));
         add_symmetric(gradient, view.hessian, place.ld, v, place.n);
         let curvatures = view.hessian.iter().step_by(place.ld + 1);
-        let given = if fixed && place.stage == 0 { place.nx } else { 0 };
+        let fixed_states = if fixed && place.stage == 0 { place.nx } else { 0 };
         let units = part(rows, place.row, place.n);
         for (((&slope, &curvature), &v), &unit) in
-            gradient.iter().zip(curvatures).zip(v).zip(units).skip(given)
+            gradient.iter().zip(curvatures).zip(v).zip(units).skip(fixed_states)
         {
             let change = curvature * v.abs().max(unit);
-            largest = largest.max(slope.abs() * unit);
-            most = most.max(change.abs() * unit);
+            largest_gradient = largest_gradient.max(slope.abs() * unit);
+            largest_change = largest_change.max(change.abs() * unit);
         }
     }
-    [largest, most]
+    [largest_gradient, largest_change]
 }

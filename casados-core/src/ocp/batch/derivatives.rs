@@ -1,7 +1,7 @@
 //! Derivatives of all instances.
 
 use super::gradients::Gradients;
-use super::{BatchOcp, Worker, refill};
+use super::{BatchOcp, Worker, reset_list};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
@@ -62,10 +62,10 @@ where
         curvature: C,
         seed: impl Fn(usize, &HeapOcp<P, T>, &mut HeapSolution<T>) + Sync,
     ) -> Result<Gradients<'_, T>, OcpError> {
-        self.gradients(curvature, |instance, ocp, factors, of_seed, [x0, p, references]| {
-            of_seed.clear();
-            seed(instance, ocp, of_seed);
-            let found = factors.adjoint(of_seed)?;
+        self.gradients(curvature, |instance, ocp, factors, seed_of_worker, [x0, p, references]| {
+            seed_of_worker.clear();
+            seed(instance, ocp, seed_of_worker);
+            let found = factors.adjoint(seed_of_worker)?;
             copy_common(x0, found.x0);
             copy_common(p, found.p);
             ocp.adjoint_by_references(factors, references)
@@ -94,7 +94,7 @@ where
     fn gradients<C: Curvature<P::Dynamics, T> + Sync>(
         &mut self,
         curvature: C,
-        ask: impl Fn(
+        evaluate: impl Fn(
             usize,
             &mut HeapOcp<P, T>,
             &mut SolutionFactors<T>,
@@ -103,23 +103,23 @@ where
         ) -> Result<(), OcpError>
         + Sync,
     ) -> Result<Gradients<'_, T>, OcpError> {
-        let (threads, smoothing) = (self.hire()?, self.smoothing);
-        let Self { instances, workers, gradients, outcomes, .. } = self;
+        let (threads, smoothing) = (self.prepare_workers()?, self.smoothing);
+        let Self { instances, workers, gradient_memory: gradients, outcomes, .. } = self;
         let workers = workers.get_mut(..threads).unwrap_or_default();
         let Some(first) = instances.first() else { return Ok(gradients.view()) };
         for worker in workers.iter_mut().filter(|worker| worker.adjoint.is_none()) {
             worker.adjoint = Some((SolutionFactors::new(first)?, HeapSolution::new(first.qp().dims())?));
         }
-        let places = gradients.places(instances.len())?;
+        let places = gradients.instance_gradients(instances.len())?;
         let items = instances.iter_mut().zip(places).enumerate();
         each(workers, items, |Worker { adjoint, .. }, (i, (ocp, (status, places)))| {
             let Some((factors, seed)) = adjoint else { return };
             factors.smoothing = smoothing;
             let mut places = places;
             places.iter_mut().for_each(|place| place.fill(T::ZERO));
-            *status = is_solution(outcomes, i)
+            *status = check_solved(outcomes, i)
                 .and_then(|()| ocp.factorise(curvature, factors))
-                .and_then(|()| ask(i, ocp, factors, seed, places));
+                .and_then(|()| evaluate(i, ocp, factors, seed, places));
         });
         Ok(gradients.view())
     }
@@ -154,18 +154,18 @@ where
         &mut self,
         curvature: C,
     ) -> Result<&[Result<(), OcpError>], OcpError> {
-        let (threads, smoothing) = (self.hire()?, self.smoothing);
-        let Self { instances, workers, forward, statuses, outcomes, .. } = self;
+        let (threads, smoothing) = (self.prepare_workers()?, self.smoothing);
+        let Self { instances, workers, sensitivities: forward, statuses, outcomes, .. } = self;
         try_reserve(forward, instances.len().saturating_sub(forward.len()))?;
         while let Some(ocp) = instances.get(forward.len()) {
             forward.push(Sensitivities::new(ocp)?);
         }
-        refill(statuses, instances.len(), || Ok(()))?;
+        reset_list(statuses, instances.len(), || Ok(()))?;
         let workers = workers.get_mut(..threads).unwrap_or_default();
         let items = instances.iter_mut().zip(forward).zip(&mut *statuses).enumerate();
         each(workers, items, |_, (i, ((ocp, result), status))| {
             result.factors().smoothing = smoothing;
-            *status = is_solution(outcomes, i).and_then(|()| ocp.differentiate(curvature, result));
+            *status = check_solved(outcomes, i).and_then(|()| ocp.differentiate(curvature, result));
         });
         Ok(statuses)
     }
@@ -174,12 +174,12 @@ where
     #[must_use]
     pub fn sensitivities(&self, instance: usize) -> Option<&Sensitivities<T>> {
         self.statuses.get(instance)?.as_ref().ok()?;
-        self.forward.get(instance)
+        self.sensitivities.get(instance)
     }
 }
 
 /// Whether the iterate of an instance is a solution, as far as anybody has said.
-fn is_solution(outcomes: &[Result<Outcome, OcpError>], instance: usize) -> Result<(), OcpError> {
+fn check_solved(outcomes: &[Result<Outcome, OcpError>], instance: usize) -> Result<(), OcpError> {
     match outcomes.get(instance) {
         Some(Err(error)) => Err(*error),
         Some(Ok(outcome)) if !outcome.is_solved() => Err(OcpError::NoSolution),

@@ -63,7 +63,7 @@ pub struct Gradient<'a, T> {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Gradients<'a, T> {
-    memory: &'a Memory<T>,
+    memory: &'a GradientMemory<T>,
 }
 
 impl<'a, T: Real> Gradients<'a, T> {
@@ -74,7 +74,7 @@ impl<'a, T: Real> Gradients<'a, T> {
     /// the error that it ended with, or where there is no such instance; those of
     /// [`Ocp::factorise`](crate::ocp::Ocp::factorise).
     pub fn get(&self, instance: usize) -> Result<Gradient<'a, T>, OcpError> {
-        let Memory { dims: [nx, np, nr], x0, p, references, statuses } = self.memory;
+        let GradientMemory { dims: [nx, np, nr], x0, p, references, statuses } = self.memory;
         statuses.get(instance).copied().unwrap_or(Err(OcpError::NoSolution))?;
         Ok(Gradient {
             x0: part(x0, instance * nx, *nx),
@@ -92,7 +92,7 @@ impl<'a, T: Real> Gradients<'a, T> {
 
 /// Where they are.
 #[derive(Clone, Debug)]
-pub struct Memory<T> {
+pub struct GradientMemory<T> {
     /// `NX`, `NP`, and how many references there are.
     dims: [usize; 3],
     x0: Vec<T>,
@@ -102,12 +102,12 @@ pub struct Memory<T> {
 }
 
 /// The status and the three gradients of an instance.
-type Place<'a, T> = (&'a mut Result<(), OcpError>, [&'a mut [T]; 3]);
+type InstanceGradients<'a, T> = (&'a mut Result<(), OcpError>, [&'a mut [T]; 3]);
 
-impl<T: Real> Memory<T> {
+impl<T: Real> GradientMemory<T> {
     /// Of no instance.
     pub fn new<P: Formulation<T>>(intervals: usize) -> Self {
-        let dims = [P::Shape::NX, P::Shape::NP, references::count::<P, T>(intervals)];
+        let dims = [P::Shape::NX, P::Shape::NP, references::reference_count::<P, T>(intervals)];
         Self { dims, x0: Vec::new(), p: Vec::new(), references: Vec::new(), statuses: Vec::new() }
     }
 
@@ -115,9 +115,12 @@ impl<T: Real> Memory<T> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn places(&mut self, count: usize) -> Result<impl Iterator<Item = Place<'_, T>> + Send, OcpError> {
+    pub fn instance_gradients(
+        &mut self,
+        count: usize,
+    ) -> Result<impl Iterator<Item = InstanceGradients<'_, T>> + Send, OcpError> {
         let [nx, np, nr] = self.dims;
-        super::refill(&mut self.statuses, count, || Ok(()))?;
+        super::reset_list(&mut self.statuses, count, || Ok(()))?;
         try_resize(&mut self.x0, count * nx)?;
         try_resize(&mut self.p, count * np)?;
         try_resize(&mut self.references, count * nr)?;

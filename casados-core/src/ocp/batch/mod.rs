@@ -23,7 +23,7 @@ use crate::ocp::solution::sensitivities::{Sensitivities, SolutionFactors};
 use crate::qp::{HeapSolution, each, threads, try_reserve};
 use crate::scalar::Real;
 use alloc::vec::Vec;
-use gradients::Memory;
+use gradients::GradientMemory;
 
 /// Many problems of one formulation, each with its own initial state, parameters, references,
 /// bounds, guess, outcome and derivatives: for learning the weights of a controller, runs with
@@ -81,9 +81,9 @@ pub struct BatchOcp<P, S = HeapSqp, T = f64> {
     outcomes: Vec<Result<Outcome, OcpError>>,
     /// One for each thread.
     workers: Vec<Worker<S, T>>,
-    gradients: Memory<T>,
+    gradient_memory: GradientMemory<T>,
     /// Of every instance; none until they are asked for.
-    forward: Vec<Sensitivities<T>>,
+    sensitivities: Vec<Sensitivities<T>>,
     statuses: Vec<Result<(), OcpError>>,
 }
 
@@ -117,8 +117,8 @@ where
             instances,
             outcomes: Vec::new(),
             workers,
-            gradients: Memory::new::<P>(ocp.intervals()),
-            forward: Vec::new(),
+            gradient_memory: GradientMemory::new::<P>(ocp.intervals()),
+            sensitivities: Vec::new(),
             statuses: Vec::new(),
         })
     }
@@ -162,8 +162,8 @@ where
     /// # Errors
     /// [`OcpError::OutOfMemory`]: nothing was solved. Errors of an instance are its outcome.
     pub fn solve(&mut self) -> Result<&[Result<Outcome, OcpError>], OcpError> {
-        let threads = self.hire()?;
-        refill(&mut self.outcomes, self.instances.len(), || Ok(Outcome::new()))?;
+        let threads = self.prepare_workers()?;
+        reset_list(&mut self.outcomes, self.instances.len(), || Ok(Outcome::new()))?;
         let workers = self.workers.get_mut(..threads).unwrap_or_default();
         each(workers, self.instances.iter_mut().zip(&mut self.outcomes), |worker, (ocp, outcome)| {
             *outcome = worker.solver.solve(ocp);
@@ -180,10 +180,10 @@ where
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    fn hire(&mut self) -> Result<usize, OcpError> {
+    fn prepare_workers(&mut self) -> Result<usize, OcpError> {
         let threads = threads(self.threads.min(self.instances.len()));
-        let more = threads.saturating_sub(self.workers.len());
-        try_reserve(&mut self.workers, more)?;
+        let missing_workers = threads.saturating_sub(self.workers.len());
+        try_reserve(&mut self.workers, missing_workers)?;
         while let Some(worker) = self.workers.first().filter(|_| self.workers.len() < threads) {
             let worker = worker.clone();
             self.workers.push(worker);
@@ -193,7 +193,7 @@ where
 }
 
 /// As many as that, all new.
-fn refill<V>(list: &mut Vec<V>, count: usize, value: impl FnMut() -> V) -> Result<(), OcpError> {
+fn reset_list<V>(list: &mut Vec<V>, count: usize, value: impl FnMut() -> V) -> Result<(), OcpError> {
     list.clear();
     try_reserve(list, count)?;
     list.resize_with(count, value);

@@ -1,6 +1,6 @@
 //! Real-time iterations of many plants.
 
-use super::refill;
+use super::reset_list;
 use crate::ocp::feedback::real_time::HeapRealTime;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::instance::HeapOcp;
@@ -44,7 +44,7 @@ pub struct BatchRealTime<P: Formulation<T>, C = GaussNewton, T: Real = f64> {
     statuses: Vec<Result<(), OcpError>>,
     /// The controls of all plants, one after the other.
     u: Vec<T>,
-    threads: Vec<()>,
+    thread_slots: Vec<()>,
 }
 
 /// QPs that wait for the states; see [`BatchRealTime`].
@@ -86,8 +86,8 @@ impl<P: Formulation<T> + Clone, T: Real> BatchRealTime<P, GaussNewton, T> {
         try_resize(&mut u, count.saturating_mul(P::Shape::NU))?;
         workers.resize(threads(count), ());
         let mut statuses = Vec::new();
-        refill(&mut statuses, count, || Ok(()))?;
-        Ok(Self { controllers, statuses, u, threads: workers })
+        reset_list(&mut statuses, count, || Ok(()))?;
+        Ok(Self { controllers, statuses, u, thread_slots: workers })
     }
 }
 
@@ -99,9 +99,9 @@ where
     /// The same with another Hessian, as [`Exact`](crate::ocp::Exact).
     #[must_use]
     pub fn with_curvature<N: Copy>(self, curvature: N) -> BatchRealTime<P, N, T> {
-        let Self { controllers, statuses, u, threads } = self;
+        let Self { controllers, statuses, u, thread_slots: threads } = self;
         let controllers = controllers.into_iter().map(|each| each.with_curvature(curvature)).collect();
-        BatchRealTime { controllers, statuses, u, threads }
+        BatchRealTime { controllers, statuses, u, thread_slots: threads }
     }
 
     /// The controllers, to be changed: references, parameters and plans by
@@ -128,8 +128,8 @@ where
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn prepare(&mut self) -> Result<BatchPrepared<'_, P, C, T>, OcpError> {
-        let Self { controllers, statuses, threads, .. } = self;
-        refill(statuses, controllers.len(), || Ok(()))?;
+        let Self { controllers, statuses, thread_slots: threads, .. } = self;
+        reset_list(statuses, controllers.len(), || Ok(()))?;
         each(threads, controllers.iter_mut().zip(&mut *statuses), |(), (controller, status)| {
             *status = controller.linearise();
         });
@@ -156,7 +156,7 @@ where
     /// [`OcpError::Length`] if there are other than `NX` numbers for each plant.
     pub fn feedback(self, x: &[T]) -> Result<&'a [T], OcpError> {
         let (nx, nu) = (P::Shape::NX, P::Shape::NU);
-        let BatchRealTime { controllers, statuses, u, threads } = self.batch;
+        let BatchRealTime { controllers, statuses, u, thread_slots: threads } = self.batch;
         let (expected, found) = (controllers.len() * nx, x.len());
         if expected != found {
             return Err(OcpError::Length { part: Part::States, stage: 0, expected, found });

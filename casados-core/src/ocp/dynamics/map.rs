@@ -2,12 +2,14 @@
 
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector,
 };
-use crate::ocp::formulation::functions::pattern::Origin;
-use crate::ocp::formulation::functions::point::{finite_outputs, parameter, read};
+use crate::ocp::formulation::functions::node_evaluation::{
+    check_finite_outputs, parameter_index, write_variables,
+};
+use crate::ocp::formulation::functions::sparsity::Origin;
 use crate::ocp::formulation::names::Names;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
@@ -67,13 +69,22 @@ impl<F: Function, T: Real> Map<F, T> {
         map
     }
 
-    fn run(&mut self, nodes: &Nodes<'_, T>, second: bool, sink: Sink<'_, T>) -> Result<(), OcpError> {
+    fn evaluate(
+        &mut self,
+        nodes: &Nodes<'_, T>,
+        with_hessian: bool,
+        sink: Sink<'_, T>,
+    ) -> Result<(), OcpError> {
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for (k, interval) in nodes.iter().enumerate() {
             let p: <F::Shape as Shape>::VectorP<T> = interval.parameters();
-            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, p.as_slice()], interval.t);
+            write_variables::<F::Shape, T>(
+                &mut self.v,
+                [interval.x, &[], interval.u, p.as_slice()],
+                interval.t,
+            );
             F::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
-            finite_outputs::<F, T>(&self.y, k)?;
+            check_finite_outputs::<F, T>(&self.y, k)?;
             self.x = vector(self.y.as_ref());
             for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
                 let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
@@ -88,24 +99,27 @@ impl<F: Function, T: Real> Map<F, T> {
                 }
             }
             let (mut hessian, mut hessian_p) = ([&[][..]; 3], [&[][..]; 3]);
-            if second {
+            if with_hessian {
                 crate::qp::copy_common(self.mu.as_mut(), interval.multipliers);
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
                     let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
-                    if let (Some(p), Some(q)) = (parameter::<F::Shape>(row), parameter::<F::Shape>(column)) {
+                    if let (Some(p), Some(q)) =
+                        (parameter_index::<F::Shape>(row), parameter_index::<F::Shape>(column))
+                    {
                         (self.h_pp[(p, q)], self.h_pp[(q, p)]) = (value, value);
                     }
-                    let here =
-                        |variable| Free::default().position::<F::Shape>(variable).filter(|&i| i < nx + nu);
-                    let Some(column) = here(column) else { continue };
-                    if let Some(p) = parameter::<F::Shape>(row) {
+                    let qp_index = |variable| {
+                        FreeParametersView::default().position::<F::Shape>(variable).filter(|&i| i < nx + nu)
+                    };
+                    let Some(column) = qp_index(column) else { continue };
+                    if let Some(p) = parameter_index::<F::Shape>(row) {
                         match column.checked_sub(nx) {
                             None => self.h_xp[(column, p)] = value,
                             Some(column) => self.h_up[(column, p)] = value,
                         }
                     }
-                    let Some(row) = here(row) else { continue };
+                    let Some(row) = qp_index(row) else { continue };
                     match (row.checked_sub(nx), column.checked_sub(nx)) {
                         (None, _) => {
                             self.h_xx[(row, column)] = value;
@@ -157,20 +171,24 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         for (k, interval) in nodes.iter().enumerate() {
             let p: <F::Shape as Shape>::VectorP<T> = interval.parameters();
-            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, p.as_slice()], interval.t);
+            write_variables::<F::Shape, T>(
+                &mut self.v,
+                [interval.x, &[], interval.u, p.as_slice()],
+                interval.t,
+            );
             F::value::<T>(&self.v, &mut self.y);
-            finite_outputs::<F, T>(&self.y, k)?;
+            check_finite_outputs::<F, T>(&self.y, k)?;
             sink(k, &IntervalResult { x: self.y.as_ref(), ..IntervalResult::default() });
         }
         Ok(())
     }
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.run(nodes, false, sink)
+        self.evaluate(nodes, false, sink)
     }
 }
 
 impl<F: Function, T: Real> SecondOrder<T> for Map<F, T> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.run(nodes, true, sink)
+        self.evaluate(nodes, true, sink)
     }
 }

@@ -5,7 +5,7 @@ use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::cost::Show;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink};
-use crate::ocp::formulation::functions::point::{finite_outputs, read};
+use crate::ocp::formulation::functions::node_evaluation::{check_finite_outputs, write_variables};
 use crate::ocp::formulation::names::Names;
 use crate::qp::element::set;
 use crate::scalar::Real;
@@ -52,7 +52,7 @@ use core::fmt;
 /// ```
 pub struct ReturnMap<G: Function, D, T: Plain = f64> {
     dynamics: D,
-    end: End<G, T>,
+    end_map: EndMap<G, T>,
 }
 
 impl<G: Function, D: fmt::Debug, T: Plain> fmt::Debug for ReturnMap<G, D, T> {
@@ -72,7 +72,7 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
             assert!(G::Outputs::NY == G::Shape::NX, "a return map has one output for each state");
             assert!(blocks[2] == blocks[5], "a return map depends on the states alone");
         }
-        Self { dynamics, end: End::new() }
+        Self { dynamics, end_map: EndMap::new() }
     }
 
     /// The dynamics, without the map.
@@ -81,35 +81,37 @@ impl<G: Function, D, T: Real> ReturnMap<G, D, T> {
     }
 
     /// What a call of the dynamics returns, with the map at its end and so many of its derivatives.
-    fn visit(
+    fn evaluate_with_map(
         &mut self,
         nodes: &Nodes<'_, T>,
-        call: impl FnOnce(&mut D, &Nodes<'_, T>, Sink<'_, T>) -> Result<(), OcpError>,
+        evaluate_dynamics: impl FnOnce(&mut D, &Nodes<'_, T>, Sink<'_, T>) -> Result<(), OcpError>,
         derivatives: usize,
         sink: Sink<'_, T>,
     ) -> Result<(), OcpError> {
-        let Self { dynamics, end } = self;
+        let Self { dynamics, end_map: end } = self;
         let last = nodes.len().wrapping_sub(1);
         let pi = crate::qp::part(nodes.multipliers, last.wrapping_mul(nodes.ld[1]), G::Shape::NX);
         let t = nodes.times.last().copied().unwrap_or(T::ZERO);
         let is_end = nodes.piece.is_none_or(|[_, end]| end == T::ONE);
         let mut outcome = Ok(());
         // Second derivatives of the dynamics take other multipliers of the end: see there.
-        let others = core::mem::take(&mut end.multipliers);
-        let inner =
-            Nodes { multipliers: if derivatives == 2 { &others } else { nodes.multipliers }, ..*nodes };
-        let called = call(dynamics, &inner, &mut |k, step| {
+        let pulled_back_multipliers = core::mem::take(&mut end.pulled_back_multipliers);
+        let inner = Nodes {
+            multipliers: if derivatives == 2 { &pulled_back_multipliers } else { nodes.multipliers },
+            ..*nodes
+        };
+        let dynamics_result = evaluate_dynamics(dynamics, &inner, &mut |k, step| {
             if k != last || !is_end {
                 return sink(k, step);
             }
             end.evaluate(step, t, derivatives, pi);
-            match finite_outputs::<G, T>(&end.x, k) {
-                Ok(()) => sink(k, &end.mapped(step, derivatives)),
+            match check_finite_outputs::<G, T>(&end.x, k) {
+                Ok(()) => sink(k, &end.mapped_result(step, derivatives)),
                 error => outcome = error,
             }
         });
-        end.multipliers = others;
-        called.and(outcome)
+        end.pulled_back_multipliers = pulled_back_multipliers;
+        dynamics_result.and(outcome)
     }
 }
 
@@ -133,10 +135,10 @@ impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for Ret
         self.dynamics.has_pieces()
     }
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.visit(nodes, D::simulate, 0, sink)
+        self.evaluate_with_map(nodes, D::simulate, 0, sink)
     }
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.visit(nodes, D::linearise, 1, sink)
+        self.evaluate_with_map(nodes, D::linearise, 1, sink)
     }
     fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
         self.dynamics.inside(nodes, parts, sink)
@@ -149,31 +151,31 @@ impl<G: Function<Shape = D::Shape>, D: SecondOrder<T>, T: Real> SecondOrder<T> f
             return self.dynamics.second_order(nodes, sink);
         }
         // Where the last interval ends says what its multipliers are.
-        self.visit(nodes, D::simulate, 1, &mut |_, _| {})?;
-        self.end.pull_back(nodes);
-        self.visit(nodes, D::second_order, 2, sink)
+        self.evaluate_with_map(nodes, D::simulate, 1, &mut |_, _| {})?;
+        self.end_map.pull_back_multipliers(nodes);
+        self.evaluate_with_map(nodes, D::second_order, 2, sink)
     }
 }
 
 /// The map at an end, and what it makes of a step.
-struct End<G: Function, T: Plain> {
+struct EndMap<G: Function, T: Plain> {
     v: ArrayV<G, T>,
-    pi: ArrayY<G, T>,
+    end_multipliers: ArrayY<G, T>,
     jacobian: G::Jacobian<T>,
     hessian: G::Hessian<T>,
     /// `x_N`
     x: ArrayY<G, T>,
     /// `g′` and `∇²(πᵀg)`, column after column.
-    first: Vec<T>,
-    second: Vec<T>,
+    dense_jacobian: Vec<T>,
+    dense_hessian: Vec<T>,
     /// Those of all intervals, of the last one before the map: `g′ᵀπ`.
-    multipliers: Vec<T>,
+    pulled_back_multipliers: Vec<T>,
     /// Derivatives of `x_N` by `x`, `u`, `p`, and second ones, as a [`IntervalResult`] has them.
-    slopes: [Vec<T>; 3],
-    curvature: [Vec<T>; 6],
+    end_jacobians: [Vec<T>; 3],
+    end_hessians: [Vec<T>; 6],
 }
 
-impl<G: Function, T: Real> End<G, T> {
+impl<G: Function, T: Real> EndMap<G, T> {
     fn new() -> Self {
         let (nx, nu, np) = (G::Shape::NX, G::Shape::NU, G::Shape::NP);
         let zeros = |length: usize| vec![T::ZERO; length];
@@ -181,50 +183,50 @@ impl<G: Function, T: Real> End<G, T> {
         G::jacobian_constants::<T>(&mut jacobian);
         Self {
             v: Zeroable::zeroed(),
-            pi: Zeroable::zeroed(),
+            end_multipliers: Zeroable::zeroed(),
             jacobian,
             hessian: Zeroable::zeroed(),
             x: Zeroable::zeroed(),
-            first: zeros(nx * nx),
-            second: zeros(nx * nx),
-            multipliers: Vec::new(),
-            slopes: [nx, nu, np].map(|columns| zeros(nx * columns)),
-            curvature: [nx * nx, nx * nu, nu * nu, nx * np, nu * np, np * np].map(zeros),
+            dense_jacobian: zeros(nx * nx),
+            dense_hessian: zeros(nx * nx),
+            pulled_back_multipliers: Vec::new(),
+            end_jacobians: [nx, nu, np].map(|columns| zeros(nx * columns)),
+            end_hessians: [nx * nx, nx * nu, nu * nu, nx * np, nu * np, np * np].map(zeros),
         }
     }
 
     /// The map at the end of a step, with so many derivatives.
     fn evaluate(&mut self, step: &IntervalResult<'_, T>, t: T, derivatives: usize, pi: &[T]) {
-        read::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
+        write_variables::<G::Shape, T>(&mut self.v, [step.x, &[], &[], &[]], t);
         if derivatives == 0 {
             return G::value::<T>(&self.v, &mut self.x);
         }
         let nx = G::Shape::NX;
         G::value_jacobian::<T>(&self.v, &mut self.x, &mut self.jacobian);
         for ((row, variable), &value) in G::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
-            set(&mut self.first, (variable - nx) * nx + row, value);
+            set(&mut self.dense_jacobian, (variable - nx) * nx + row, value);
         }
-        self.slopes(step);
+        self.chain_jacobians(step);
         if derivatives == 1 {
             return;
         }
-        crate::qp::copy_common(self.pi.as_mut(), pi);
-        G::hessian::<T>(&self.v, &self.pi, &mut self.hessian);
+        crate::qp::copy_common(self.end_multipliers.as_mut(), pi);
+        G::hessian::<T>(&self.v, &self.end_multipliers, &mut self.hessian);
         for ((row, column), &value) in G::STRUCTURE.hessian.iter().zip(self.hessian.as_ref()) {
             let (row, column) = (row - nx, column - nx);
-            set(&mut self.second, column * nx + row, value);
-            set(&mut self.second, row * nx + column, value);
+            set(&mut self.dense_hessian, column * nx + row, value);
+            set(&mut self.dense_hessian, row * nx + column, value);
         }
-        self.curvature(step);
+        self.chain_hessians(step);
     }
 
     /// `g′ φ′`
-    fn slopes(&mut self, step: &IntervalResult<'_, T>) {
+    fn chain_jacobians(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
-        for (slopes, of_step) in self.slopes.iter_mut().zip([step.dx, step.du, step.dp]) {
+        for (slopes, of_step) in self.end_jacobians.iter_mut().zip([step.dx, step.du, step.dp]) {
             for (to, column) in slopes.chunks_exact_mut(nx).zip(of_step.chunks_exact(nx)) {
                 to.fill(T::ZERO);
-                for (of_state, &by) in self.first.chunks_exact(nx).zip(column) {
+                for (of_state, &by) in self.dense_jacobian.chunks_exact(nx).zip(column) {
                     to.iter_mut().zip(of_state).for_each(|(to, &slope)| *to = *to + slope * by);
                 }
             }
@@ -232,17 +234,17 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// Second derivatives of `φ` along `g′ᵀπ`, and `φ′ᵀ ∇²(πᵀg) φ′`.
-    fn curvature(&mut self, step: &IntervalResult<'_, T>) {
+    fn chain_hessians(&mut self, step: &IntervalResult<'_, T>) {
         let nx = G::Shape::NX.max(1);
         let [dx, du, dp] = [step.dx, step.du, step.dp];
         let pairs = [(dx, dx), (dx, du), (du, du), (dx, dp), (du, dp), (dp, dp)];
         let of_step = step.hessian.iter().chain(&step.hessian_p);
-        for ((block, (rows, columns)), of_step) in self.curvature.iter_mut().zip(pairs).zip(of_step) {
+        for ((block, (rows, columns)), of_step) in self.end_hessians.iter_mut().zip(pairs).zip(of_step) {
             let height = rows.len() / nx;
             for (j, column) in columns.chunks_exact(nx).enumerate() {
                 for (i, row) in rows.chunks_exact(nx).enumerate() {
                     let mut sum = of_step.get(j * height + i).copied().unwrap_or(T::ZERO);
-                    for (&factor, of_state) in row.iter().zip(self.second.chunks_exact(nx)) {
+                    for (&factor, of_state) in row.iter().zip(self.dense_hessian.chunks_exact(nx)) {
                         sum = sum + factor * dot(of_state, column);
                     }
                     set(block, j * height + i, sum);
@@ -252,22 +254,27 @@ impl<G: Function, T: Real> End<G, T> {
     }
 
     /// The multipliers of all intervals, with `g′ᵀπ` in the place of the last.
-    fn pull_back(&mut self, nodes: &Nodes<'_, T>) {
+    fn pull_back_multipliers(&mut self, nodes: &Nodes<'_, T>) {
         let nx = G::Shape::NX.max(1);
-        self.multipliers.clear();
-        self.multipliers.extend_from_slice(nodes.multipliers);
+        self.pulled_back_multipliers.clear();
+        self.pulled_back_multipliers.extend_from_slice(nodes.multipliers);
         let begin = nodes.len().saturating_sub(1) * nodes.ld[1];
         let pi = crate::qp::part(nodes.multipliers, begin, nx);
-        for (j, column) in self.first.chunks_exact(nx).enumerate() {
-            set(&mut self.multipliers, begin + j, dot(column, pi));
+        for (j, column) in self.dense_jacobian.chunks_exact(nx).enumerate() {
+            set(&mut self.pulled_back_multipliers, begin + j, dot(column, pi));
         }
     }
 
     /// The step with the map at its end, and with as many derivatives.
-    fn mapped<'a>(&'a self, step: &IntervalResult<'a, T>, derivatives: usize) -> IntervalResult<'a, T> {
-        let all = |there: bool, numbers: &'a Vec<T>| if there { numbers.as_slice() } else { &[] };
-        let [dx, du, dp] = self.slopes.each_ref().map(|slopes| all(derivatives > 0, slopes));
-        let [xx, xu, uu, xp, up, pp] = self.curvature.each_ref().map(|block| all(derivatives > 1, block));
+    fn mapped_result<'a>(
+        &'a self,
+        step: &IntervalResult<'a, T>,
+        derivatives: usize,
+    ) -> IntervalResult<'a, T> {
+        let slice_if = |there: bool, numbers: &'a Vec<T>| if there { numbers.as_slice() } else { &[] };
+        let [dx, du, dp] = self.end_jacobians.each_ref().map(|slopes| slice_if(derivatives > 0, slopes));
+        let [xx, xu, uu, xp, up, pp] =
+            self.end_hessians.each_ref().map(|block| slice_if(derivatives > 1, block));
         IntervalResult {
             x: self.x.as_ref(),
             dx,

@@ -2,14 +2,14 @@
 
 use crate::batch::{Answer, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
-use crate::ocp::dynamics::begin::at;
-use crate::ocp::dynamics::inside::Inside;
-use crate::ocp::dynamics::single::{names, origin};
+use crate::ocp::dynamics::dense_output::DenseOutput;
+use crate::ocp::dynamics::interval_setup::in_interval;
+use crate::ocp::dynamics::single_interval::{names, origin};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector,
 };
-use crate::ocp::formulation::functions::pattern::Origin;
+use crate::ocp::formulation::functions::sparsity::Origin;
 use crate::ocp::formulation::names::Names;
 use crate::qp::try_reserve;
 use crate::result::{Forward, Hessian, Nominal};
@@ -52,7 +52,7 @@ pub struct Shooting<I: Single> {
     forward: Vec<Forward<I::Model, I::Number>>,
     hessian: Vec<Hessian<I::Model, I::Number>>,
     /// Whether the batch has the stages of all intervals that are here.
-    solved: bool,
+    stages_are_current: bool,
 }
 
 impl<I: Single> core::fmt::Debug for Shooting<I> {
@@ -84,40 +84,42 @@ impl<I: Single> Shooting<I> {
             nominal: Vec::new(),
             forward: Vec::new(),
             hessian: Vec::new(),
-            solved: false,
+            stages_are_current: false,
         }
     }
 
     /// The batch.
     pub fn batch(&mut self) -> &mut Integrator<I> {
         // Whoever has it may use it for something else.
-        self.solved = false;
+        self.stages_are_current = false;
         &mut self.batch
     }
 
     /// Copies the intervals to where the batch takes them from, and their multipliers if they are
     /// asked for. Where they are those of the last call, the batch has their stages.
-    fn take(&mut self, nodes: &Nodes<'_, I::Number>, multipliers: bool) -> Result<(), OcpError> {
+    fn load_intervals(&mut self, nodes: &Nodes<'_, I::Number>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
-        let mut same = core::mem::take(&mut self.solved) && self.x.len() == n;
-        if !same {
-            reserve(&mut self.x, n)?;
-            reserve(&mut self.u, n)?;
-            reserve(&mut self.p, n)?;
-            reserve(&mut self.h, n)?;
-            reserve(&mut self.t, n)?;
+        let mut is_unchanged = core::mem::take(&mut self.stages_are_current) && self.x.len() == n;
+        if !is_unchanged {
+            clear_and_reserve(&mut self.x, n)?;
+            clear_and_reserve(&mut self.u, n)?;
+            clear_and_reserve(&mut self.p, n)?;
+            clear_and_reserve(&mut self.h, n)?;
+            clear_and_reserve(&mut self.t, n)?;
         }
-        reserve(&mut self.lambda, n)?;
-        reserve(&mut self.nu, n)?;
+        clear_and_reserve(&mut self.lambda, n)?;
+        clear_and_reserve(&mut self.nu, n)?;
         for (k, interval) in nodes.iter().enumerate() {
-            same &= put(&mut self.x, k, vector(interval.x), |x| x.as_slice() == interval.x);
-            same &= put(&mut self.u, k, vector(interval.u), |u| u.as_slice() == interval.u);
+            is_unchanged &=
+                replace_or_push(&mut self.x, k, vector(interval.x), |x| x.as_slice() == interval.x);
+            is_unchanged &=
+                replace_or_push(&mut self.u, k, vector(interval.u), |u| u.as_slice() == interval.u);
             if <<I::Model as Dae>::Shape as Shape>::NP > 0 {
                 let p: VectorP<I::Model, I::Number> = interval.parameters();
-                same &= put(&mut self.p, k, p, |old| *old == p);
+                is_unchanged &= replace_or_push(&mut self.p, k, p, |old| *old == p);
             }
-            same &= put(&mut self.h, k, interval.h, |&h| h == interval.h);
-            same &= put(&mut self.t, k, interval.t, |&t| t == interval.t);
+            is_unchanged &= replace_or_push(&mut self.h, k, interval.h, |&h| h == interval.h);
+            is_unchanged &= replace_or_push(&mut self.t, k, interval.t, |&t| t == interval.t);
             if multipliers {
                 self.lambda.push(vector(interval.multipliers));
             }
@@ -126,40 +128,40 @@ impl<I: Single> Shooting<I> {
             }
         }
         // Lifted stages go on where they are.
-        self.batch.keep_stages(same && self.batch.options().newton.fixed_iterations.is_none());
+        self.batch.store_stages(is_unchanged && self.batch.options().newton.fixed_iterations.is_none());
         Ok(())
     }
 
     /// The results of all intervals, of which a few at a time are in memory; with the multipliers
     /// of ends and algebraic states, if these are asked for.
-    fn each<R: Answer<I::Model, I::Number> + Zeroable>(
+    fn evaluate_intervals<R: Answer<I::Model, I::Number> + Zeroable>(
         &mut self,
         nodes: &Nodes<'_, I::Number>,
         [of_ends, of_algebraic]: [bool; 2],
-        place: fn(&mut Self) -> &mut Vec<R>,
+        result_memory: fn(&mut Self) -> &mut Vec<R>,
         sink: &mut dyn FnMut(usize, &R),
     ) -> Result<(), OcpError> {
-        self.take(nodes, of_ends)?;
-        let mut results = core::mem::take(place(self));
+        self.load_intervals(nodes, of_ends)?;
+        let mut results = core::mem::take(result_memory(self));
         let Self { batch, x, u, p, h, t, lambda, nu, .. } = self;
         let intervals = Intervals { x0: x, u, p, h, t0: t };
         let lambda = of_ends.then_some(&lambda[..]);
         let nu = (of_algebraic && !nu.is_empty()).then_some(&nu[..]);
-        let outcome = batch.each(&intervals, (lambda, nu), &mut results, sink);
-        *place(self) = results;
+        let outcome = batch.for_each_result(&intervals, (lambda, nu), &mut results, sink);
+        *result_memory(self) = results;
         outcome.map_err(OcpError::from)?;
-        self.solved = true;
+        self.stages_are_current = true;
         Ok(())
     }
 }
 
 /// Writes an element, or adds it at the end; whether it was there already.
-fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -> bool {
+fn replace_or_push<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -> bool {
     match list.get_mut(k) {
         Some(element) => {
-            let same = is_same(element);
+            let is_unchanged = is_same(element);
             *element = value;
-            same
+            is_unchanged
         }
         None => {
             list.push(value);
@@ -169,12 +171,12 @@ fn put<V>(list: &mut Vec<V>, k: usize, value: V, is_same: impl Fn(&V) -> bool) -
 }
 
 /// An empty list with room for so many.
-fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
+fn clear_and_reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
     list.clear();
     Ok(try_reserve(list, length)?)
 }
 
-impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
+impl<I: Single<Number = T> + DenseOutput<T>, T: Real> Dynamics<T> for Shooting<I> {
     type Shape = <I::Model as Dae>::Shape;
     const NAMES: Names = names::<I::Model>();
     const ALGEBRAIC: bool = true;
@@ -192,34 +194,46 @@ impl<I: Single<Number = T> + Inside<T>, T: Real> Dynamics<T> for Shooting<I> {
     }
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.each(nodes, [false; 2], |own| &mut own.nominal, &mut |k, result: &Nominal<I::Model, T>| {
+        self.evaluate_intervals(nodes, [false; 2], |own| &mut own.nominal, &mut |k,
+                                                                                 result: &Nominal<
+            I::Model,
+            T,
+        >| {
             sink(k, &result.into())
         })
     }
 
     fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
-        let mut single = at(0, self.batch.single())?;
+        let mut single = in_interval(0, self.batch.single_integrator())?;
         for (k, interval) in nodes.iter().enumerate() {
-            at(k, self.batch.start(k, &mut single))?;
-            at(k, single.begin(&interval))?;
+            in_interval(k, self.batch.warm_start_single(k, &mut single))?;
+            in_interval(k, single.begin(&interval))?;
             let visit = &mut |j, x: &[T], z: &[T]| {
                 sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
             };
-            at(k, single.at_parts(&interval, parts, visit))?;
+            in_interval(k, single.states_at_fractions(&interval, parts, visit))?;
         }
         Ok(true)
     }
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.each(nodes, [false; 2], |own| &mut own.forward, &mut |k, result: &Forward<I::Model, T>| {
+        self.evaluate_intervals(nodes, [false; 2], |own| &mut own.forward, &mut |k,
+                                                                                 result: &Forward<
+            I::Model,
+            T,
+        >| {
             sink(k, &result.into())
         })
     }
 }
 
-impl<I: Single<Number = T> + Inside<T>, T: Real> SecondOrder<T> for Shooting<I> {
+impl<I: Single<Number = T> + DenseOutput<T>, T: Real> SecondOrder<T> for Shooting<I> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.each(nodes, [true; 2], |own| &mut own.hessian, &mut |k, result: &Hessian<I::Model, T>| {
+        self.evaluate_intervals(nodes, [true; 2], |own| &mut own.hessian, &mut |k,
+                                                                                result: &Hessian<
+            I::Model,
+            T,
+        >| {
             sink(k, &result.into())
         })
     }

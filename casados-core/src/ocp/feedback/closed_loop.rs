@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::ocp_solver::OcpSolver;
-use crate::ocp::nlp::watch::Watch;
+use crate::ocp::nlp::stopwatch::Stopwatch;
 use crate::qp::{QpSolver, copy_common, each, threads, try_reserve, zeros};
 use crate::scalar::Real;
 use crate::shape::{Matrix as _, Shape};
@@ -195,17 +195,17 @@ pub fn closed_loop<P: Formulation<T>, T: Real>(
     let (mut x, mut u) = (zeros(P::Shape::NX)?, zeros(P::Shape::NU)?);
     let mut recorder = Recorder::new(controller.problem(), x0, samples)?;
     copy_common(&mut x, x0);
-    let length = recorder.length;
+    let length = recorder.sample_length;
     for index in 0..samples {
         let sample = Sample { index, time: T::from_whole(index) * length, length };
-        let mut watch = Watch::start();
+        let mut watch = Stopwatch::start();
         let result = controller.control(&x, &mut u);
         let duration = watch.lap();
         recorder.record(controller.problem(), [&x, &u], (result, duration))?;
         plant(sample, &u, &mut x)?;
         disturbance(sample, &mut x);
     }
-    recorder.end(controller.problem(), &x)
+    recorder.finish(controller.problem(), &x)
 }
 
 /// Runs many closed loops, or whatever else `run` does: `make` makes what a run works with, once

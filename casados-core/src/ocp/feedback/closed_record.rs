@@ -2,15 +2,15 @@
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
+use crate::ocp::formulation::free_parameters::FreeParametersView;
+use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::functions::node_evaluation::write_variables;
 use crate::ocp::formulation::instance::HeapOcp;
-use crate::ocp::formulation::instance::data::{Node, is_algebraic, split};
+use crate::ocp::formulation::instance::data::{Node, depends_on_algebraic, split_data};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::ocp::solution::trajectory::{Kind, Series, Trajectory, names};
+use crate::ocp::solution::trajectory::{Kind, Series, Trajectory, constraint_names};
 use crate::qp::{Bounds, part, part_mut, try_reserve, zeros};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -72,7 +72,7 @@ impl<T: Real> ClosedLoop<T> {
 /// A loop while it runs.
 pub struct Recorder<T> {
     /// How long a sample is.
-    pub length: T,
+    pub sample_length: T,
     /// One row after the other: states of all samples and of the end, controls, path constraints.
     x: Vec<T>,
     u: Vec<T>,
@@ -94,7 +94,7 @@ impl<T: Real> Recorder<T> {
         samples: usize,
     ) -> Result<Self, OcpError> {
         Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
-        if is_algebraic::<P, T>() || ocp.free.count() > 0 {
+        if depends_on_algebraic::<P, T>() || ocp.free.count() > 0 {
             let what = "closed loops with algebraic states in costs or constraints, or with free parameters";
             let remedy = "Write them in states, controls and parameters that are set";
             return Err(OcpError::Unsupported { what, remedy });
@@ -102,7 +102,7 @@ impl<T: Real> Recorder<T> {
         let times = ocp.times();
         let length = times.get(1).copied().unwrap_or(T::ONE) - times.first().copied().unwrap_or(T::ZERO);
         let mut recorder = Self {
-            length,
+            sample_length: length,
             x: Vec::new(),
             u: Vec::new(),
             g: zeros(P::Path::ROWS)?,
@@ -136,32 +136,32 @@ impl<T: Real> Recorder<T> {
         self.u.extend_from_slice(u);
         self.durations.push(duration);
         let layout = ocp.layout();
-        let data = split::<P, T>(&mut ocp.data, layout);
+        let data = split_data::<P, T>(&mut ocp.data, layout);
         let Problem { stage_cost, path, running, .. } = ocp.problem.parts();
         let given = [&*data.times, &*data.p, &*data.references];
         let node = Node::new::<P>(0, layout.intervals, *running, given);
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        read::<P::Shape, T>(&mut point, [x, &[], u, node.p], node.time);
+        write_variables::<P::Shape, T>(&mut point, [x, &[], u, node.p], node.time);
         self.costs.push(stage_cost.value(&point, node.reference, 0)? * node.factor);
         let begin = self.g.len();
         self.g.resize(begin + P::Path::ROWS, T::ZERO);
         let rows = part_mut(&mut self.g, begin, P::Path::ROWS);
-        path.value(&point, rows, Spot::new(0, Free::default(), &[]))
+        path.value(&point, rows, ConstraintContext::new(0, FreeParametersView::default(), &[]))
     }
 
     /// The whole loop.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    pub fn end<P: Formulation<T>>(
+    pub fn finish<P: Formulation<T>>(
         mut self,
         ocp: &mut HeapOcp<P, T>,
         x: &[T],
     ) -> Result<ClosedLoop<T>, OcpError> {
         self.x.extend_from_slice(x);
         let samples = self.costs.len();
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
-        let times = (0..=samples).map(|k| T::from_whole(k) * self.length).collect();
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
+        let times = (0..=samples).map(|k| T::from_whole(k) * self.sample_length).collect();
         let qp = ocp.qp.view();
         let mut series = Vec::new();
         let column = |rows: &[T], width: usize, i: usize| {
@@ -170,28 +170,29 @@ impl<T: Real> Recorder<T> {
         // The first state is given: its bounds are those of the next one.
         let bounds = [qp.stage(1).map(|stage| stage.x_bounds()), qp.stage(0).map(|stage| stage.u_bounds())];
         let all = [
-            (Kind::State, known.x, known.units.x, &self.x),
-            (Kind::Control, known.u, known.units.u, &self.u),
+            (Kind::State, model_names.x, model_names.units.x, &self.x),
+            (Kind::Control, model_names.u, model_names.units.u, &self.u),
         ];
         for ((kind, names, units, rows), bounds) in all.into_iter().zip(bounds) {
             for (i, &name) in names.iter().enumerate() {
                 let unit = units.get(i).copied().unwrap_or_default();
-                let new = Series::new(kind, name, 0, column(rows, names.len(), i)).with_unit(unit);
+                let unbounded = Series::new(kind, name, 0, column(rows, names.len(), i)).with_unit(unit);
                 series.push(match bounds {
-                    Some(Bounds { lower, upper, .. }) => with_bounds(new, [lower, upper], i),
-                    None => new,
+                    Some(Bounds { lower, upper, .. }) => with_bounds(unbounded, [lower, upper], i),
+                    None => unbounded,
                 });
             }
         }
         let layout = ocp.layout();
-        let data = split::<P, T>(&mut ocp.data, layout);
+        let data = split_data::<P, T>(&mut ocp.data, layout);
         let (lower, upper) = (part(data.lower, 0, P::Path::ROWS), part(data.upper, 0, P::Path::ROWS));
-        for (row, name) in names::<P::Path, _, T>().enumerate() {
+        for (row, name) in constraint_names::<P::Path, _, T>().enumerate() {
             let values = column(&self.g, P::Path::ROWS, row);
-            let new = Series::new(Kind::Path, name.to_string(), 0, values).with_unit(P::Path::unit(row));
-            series.push(with_bounds(new, [lower, upper], row));
+            let unbounded =
+                Series::new(Kind::Path, name.to_string(), 0, values).with_unit(P::Path::unit(row));
+            series.push(with_bounds(unbounded, [lower, upper], row));
         }
-        let trajectory = Trajectory::of_series((known.model, known.units.t), times, series);
+        let trajectory = Trajectory::from_series((model_names.model, model_names.units.t), times, series);
         let Self { costs, durations, failures, .. } = self;
         Ok(ClosedLoop { trajectory, costs, durations, failures })
     }

@@ -4,7 +4,7 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::split;
+use crate::ocp::formulation::instance::data::split_data;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{Residuals, Solution, StageDims, add_symmetric, part, part_mut};
 use crate::scalar::Real;
@@ -125,113 +125,116 @@ pub struct Convergence {
 
 /// What the contraction test remembers. Its functions are pointers: a controller without a monitor
 /// has none of their code.
-pub(in crate::ocp) struct Monitor<P, T, D, M> {
+pub(in crate::ocp) struct ContractionMonitor<P, T, D, M> {
     /// Weights of the merit function, in the places of multipliers.
     weights: Solution<T, D, M>,
     /// Ends of intervals and constraints.
     ends: M,
     /// Whether the last iteration is still to be judged.
-    is_pending: bool,
+    has_pending_iteration: bool,
     /// The sums of actual and predicted reductions, and of how many.
-    sums: [f64; 2],
-    count: usize,
+    reduction_sums: [f64; 2],
+    iteration_count: usize,
     residuals: Residuals,
-    measure: fn(&mut Ocp<P, T, D, M>) -> Residuals,
-    size: StepSize<P, T, D, M>,
-    reductions: Reductions<P, T, D, M>,
+    residuals_fn: fn(&mut Ocp<P, T, D, M>) -> Residuals,
+    step_size_fn: StepSizeFn<P, T, D, M>,
+    reductions_fn: ReductionsFn<P, T, D, M>,
 }
 
 /// The largest change from the plan to the solution of its QP.
-type StepSize<P, T, D, M> = fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64;
+type StepSizeFn<P, T, D, M> = fn(&Ocp<P, T, D, M>, &Solution<T, D, M>) -> f64;
 
 /// The actual and the predicted reduction of the step from the plan to the solution of its QP, and
 /// the size of the merit function.
-type Reductions<P, T, D, M> =
+type ReductionsFn<P, T, D, M> =
     fn(&mut Ocp<P, T, D, M>, &Solution<T, D, M>, &mut Solution<T, D, M>, &mut [T]) -> [f64; 3];
 
 /// How many numbers a monitor takes for a problem: weights, and ends of intervals.
-pub(in crate::ocp) const fn memory<T: Real>(dims: &[StageDims]) -> [usize; 2] {
+pub(in crate::ocp) const fn memory_lens<T: Real>(dims: &[StageDims]) -> [usize; 2] {
     [Solution::<T, (), ()>::memory(dims), crate::ocp::formulation::program::ends(dims)]
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Monitor<P, T, D, M> {
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
+    ContractionMonitor<P, T, D, M>
+{
     /// In memory of [`memory`] numbers.
     pub fn new(weights: Solution<T, D, M>, ends: M) -> Self {
         Self {
             weights,
             ends,
-            is_pending: false,
-            sums: [0.0; 2],
-            count: 0,
+            has_pending_iteration: false,
+            reduction_sums: [0.0; 2],
+            iteration_count: 0,
             residuals: Residuals::default(),
-            measure: measure::<P, T, D, M>,
-            size: size::<P, T, D, M>,
-            reductions: reductions::<P, T, D, M>,
+            residuals_fn: plan_residuals::<P, T, D, M>,
+            step_size_fn: largest_step::<P, T, D, M>,
+            reductions_fn: reductions_of_step::<P, T, D, M>,
         }
     }
 
     /// Measures the plan where it has been linearised.
-    pub fn measure(&mut self, ocp: &mut Ocp<P, T, D, M>) {
-        self.residuals = (self.measure)(ocp);
+    pub fn update_residuals(&mut self, ocp: &mut Ocp<P, T, D, M>) {
+        self.residuals = (self.residuals_fn)(ocp);
     }
 
     /// What is known where the QP of the plan, which is the iterate, has been solved.
-    pub fn observe(
+    pub fn convergence_at_solution(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
         solution: &Solution<T, D, M>,
         test: &ContractionTest,
     ) -> Convergence {
-        self.is_pending = true;
-        let [actual, predicted] = self.sums;
+        self.has_pending_iteration = true;
+        let [actual, predicted] = self.reduction_sums;
         let reduction_ratio = if predicted > 0.0 { actual / predicted } else { 1.0 };
-        let contraction = if self.count < test.samples {
+        let contraction = if self.iteration_count < test.samples {
             Contraction::Unknown
         } else if reduction_ratio < test.min_ratio {
             Contraction::Diverging
         } else {
             Contraction::Contracting
         };
-        let (residuals, step_size) = (self.residuals, (self.size)(ocp, solution));
+        let (residuals, step_size) = (self.residuals, (self.step_size_fn)(ocp, solution));
         Convergence { residuals, step_size, reduction_ratio, contraction }
     }
 
     /// Judges the last iteration, from the plan `before` to the iterate, while the QP is that of
     /// `before`.
-    pub fn judge(
+    pub fn update_reductions(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         before: &mut Solution<T, D, M>,
         test: &ContractionTest,
     ) {
-        if !core::mem::take(&mut self.is_pending) {
+        if !core::mem::take(&mut self.has_pending_iteration) {
             return;
         }
         core::mem::swap(&mut ocp.iterate, before);
         let [actual, predicted, merit] =
-            (self.reductions)(ocp, before, &mut self.weights, self.ends.as_mut());
+            (self.reductions_fn)(ocp, before, &mut self.weights, self.ends.as_mut());
         core::mem::swap(&mut ocp.iterate, before);
         if predicted > test.tolerance * merit.abs().max(1.0) {
             // A step that loses much is forgotten as fast as one that loses what it was to gain;
             // one to a point without a value is as bad.
             let actual = if actual > -predicted { actual } else { -predicted };
-            let memory = 1.0 - 1.0 / test.samples.max(1) as f64;
-            self.sums = [memory * self.sums[0] + actual, memory * self.sums[1] + predicted];
-            self.count = self.count.saturating_add(1);
-        } else if self.sums[1] <= predicted.abs() {
+            let decay = 1.0 - 1.0 / test.samples.max(1) as f64;
+            self.reduction_sums =
+                [decay * self.reduction_sums[0] + actual, decay * self.reduction_sums[1] + predicted];
+            self.iteration_count = self.iteration_count.saturating_add(1);
+        } else if self.reduction_sums[1] <= predicted.abs() {
             // Nothing is left to be gained.
-            self.sums = [0.0; 2];
+            self.reduction_sums = [0.0; 2];
         }
     }
 
     /// Forgets all iterations.
     pub fn reset(&mut self) {
-        (self.is_pending, self.sums, self.count) = (false, [0.0; 2], 0);
+        (self.has_pending_iteration, self.reduction_sums, self.iteration_count) = (false, [0.0; 2], 0);
     }
 }
 
 /// The conditions of optimality at the plan, whose first state is the initial state.
-fn measure<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn plan_residuals<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
 ) -> Residuals {
     let Ocp { qp, iterate, .. } = &mut *ocp;
@@ -243,8 +246,8 @@ fn measure<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
     ocp.residuals().0
 }
 
-/// See [`StepSize`].
-fn size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+/// See [`StepSizeFn`].
+fn largest_step<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,
 ) -> f64 {
@@ -252,8 +255,8 @@ fn size<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut
     pairs.fold(T::ZERO, |size, (&v, &w)| size.max((w - v).abs())).to_f64()
 }
 
-/// See [`Reductions`].
-fn reductions<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+/// See [`ReductionsFn`].
+fn reductions_of_step<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,
     weights: &mut Solution<T, D, M>,
@@ -264,39 +267,39 @@ fn reductions<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> +
     }
     weights.copy_from(solution);
     weights.multipliers_mut().iter_mut().for_each(|weight| *weight = weight.abs());
-    let here = ocp.measure_here(weights);
-    let slope = ocp.slope(solution, here.objective - ocp.objective.to_f64());
-    let predicted = here.violation - slope - 0.5 * energy(ocp, solution);
-    ocp.has_algebraic = false;
-    let merit = here.objective + here.violation;
-    let actual = match ocp.measure(solution, weights, ends) {
-        Ok(there) => merit - there.objective - there.violation,
+    let current = ocp.objective_and_violation(weights);
+    let slope = ocp.objective_slope(solution, current.objective - ocp.objective.to_f64());
+    let predicted = current.violation - slope - 0.5 * step_curvature(ocp, solution);
+    ocp.algebraic_is_current = false;
+    let merit = current.objective + current.violation;
+    let actual = match ocp.objective_and_violation_at(solution, weights, ends) {
+        Ok(trial) => merit - trial.objective - trial.violation,
         Err(_) => f64::NEG_INFINITY,
     };
     [actual, predicted, merit]
 }
 
 /// `dᵀ H d` of the step from the iterate to a solution of its QP.
-fn energy<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn step_curvature<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     solution: &Solution<T, D, M>,
 ) -> f64 {
     let layout = ocp.layout();
-    let data = split::<P, T>(ocp.data.as_mut(), layout);
+    let data = split_data::<P, T>(ocp.data.as_mut(), layout);
     let ((from, _), (to, _)) = (ocp.iterate.variables_and_costates(), solution.variables_and_costates());
-    let (mut energy, mut begin) = (T::ZERO, 0);
+    let (mut curvature, mut begin) = (T::ZERO, 0);
     for stage in ocp.qp.view().stages() {
         let view = stage.arrays();
         let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
         begin += view.ld;
         let (step, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
-        let force = part_mut(rest, 0, view.ld);
+        let hessian_times_step = part_mut(rest, 0, view.ld);
         for ((d, &w), &v) in step.iter_mut().zip(w).zip(v) {
             *d = w - v;
         }
-        force.fill(T::ZERO);
-        add_symmetric(force, view.hessian, view.ld, step, view.n);
-        energy = energy + dot(force, step);
+        hessian_times_step.fill(T::ZERO);
+        add_symmetric(hessian_times_step, view.hessian, view.ld, step, view.n);
+        curvature = curvature + dot(hessian_times_step, step);
     }
-    energy.to_f64()
+    curvature.to_f64()
 }

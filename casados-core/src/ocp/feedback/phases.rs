@@ -1,7 +1,7 @@
 //! The two phases of a real-time iteration, and what the second one gives.
 
 use super::contraction::{Contraction, Convergence};
-use super::real_time::{RealTime, Step};
+use super::real_time::{IterationResult, RealTime};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Curvature;
@@ -166,10 +166,10 @@ where
     pub fn feedback_until(
         self,
         x0: &[T],
-        over: &mut dyn FnMut() -> bool,
+        deadline_passed: &mut dyn FnMut() -> bool,
     ) -> Result<Feedback<'a, T>, OcpError> {
-        let step = self.controller.iterate(x0, over)?;
-        self.give(step, 1)
+        let step = self.controller.iterate(x0, deadline_passed)?;
+        self.feedback_from(step, 1)
     }
 
     /// As [`Prepared::feedback_until`], with a control in any case: that of the feedback, or where
@@ -177,14 +177,14 @@ where
     pub fn feedback_or(
         self,
         x0: &[T],
-        over: &mut dyn FnMut() -> bool,
+        deadline_passed: &mut dyn FnMut() -> bool,
         fallback: Fallback<'a, T>,
     ) -> (&'a [T], Result<Feedback<'a, T>, OcpError>) {
-        let result = self.controller.iterate(x0, over);
+        let result = self.controller.iterate(x0, deadline_passed);
         let controller = &*self.controller;
         let plan = controller.ocp.stage(0).map_or(&[][..], |first| first.u);
         match (result, fallback) {
-            (Ok(step), _) => (plan, Ok(step.feedback(plan, 1))),
+            (Ok(step), _) => (plan, Ok(step.into_feedback(plan, 1))),
             (Err(error), Fallback::Plan) => (plan, Err(error)),
             (Err(error), Fallback::Control(u)) => (u, Err(error)),
         }
@@ -220,11 +220,11 @@ where
         self,
         x0: &[T],
         max_iterations: usize,
-        over: &mut dyn FnMut() -> bool,
+        deadline_passed: &mut dyn FnMut() -> bool,
     ) -> Result<Feedback<'a, T>, OcpError> {
-        let mut step = self.controller.iterate(x0, over)?;
+        let mut step = self.controller.iterate(x0, deadline_passed)?;
         let mut iterations = 1;
-        while iterations < max_iterations && !over() {
+        while iterations < max_iterations && !deadline_passed() {
             let controller = &mut *self.controller;
             if controller.linearise().is_err() {
                 break;
@@ -234,20 +234,20 @@ where
             if residuals.largest() <= controller.contraction_test.tolerance {
                 break;
             }
-            let Ok(next) = controller.iterate(x0, over) else { break };
+            let Ok(next) = controller.iterate(x0, deadline_passed) else { break };
             (step, iterations) = (next, iterations + 1);
         }
-        self.give(step, iterations)
+        self.feedback_from(step, iterations)
     }
 
-    fn give(self, step: Step, iterations: usize) -> Result<Feedback<'a, T>, OcpError> {
+    fn feedback_from(self, step: IterationResult, iterations: usize) -> Result<Feedback<'a, T>, OcpError> {
         let controller = self.controller;
-        Ok(step.feedback(controller.ocp.stage(0)?.u, iterations))
+        Ok(step.into_feedback(controller.ocp.stage(0)?.u, iterations))
     }
 }
 
-impl Step {
-    fn feedback<T>(self, u: &[T], iterations: usize) -> Feedback<'_, T> {
+impl IterationResult {
+    fn into_feedback<T>(self, u: &[T], iterations: usize) -> Feedback<'_, T> {
         let Self { statistics, regularisation, convergence } = self;
         Feedback { u, statistics, iterations, regularisation, convergence }
     }

@@ -8,7 +8,7 @@
 //! feedback(x)  solve the QP with x_0 = x: its first control is applied, its solution is the next plan
 //! ```
 
-use crate::ocp::feedback::contraction::{self, ContractionTest, Convergence, Monitor};
+use crate::ocp::feedback::contraction::{self, ContractionMonitor, ContractionTest, Convergence};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::error::Part;
 #[cfg(feature = "alloc")]
@@ -21,7 +21,7 @@ use crate::ocp::formulation::program::curvature::Convexification;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::program::curvature::Exact;
 use crate::ocp::formulation::program::curvature::{Curvature, GaussNewton};
-use crate::ocp::nlp::inertia::InertiaCorrection;
+use crate::ocp::nlp::inertia_correction::InertiaCorrection;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
 use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, Residuals, Solution, StageDims};
@@ -96,11 +96,11 @@ pub struct RealTime<P, S, C, T, D, M> {
     /// When iterations count as divergent.
     pub contraction_test: ContractionTest,
     inertia: InertiaCorrection,
-    monitor: Option<Monitor<P, T, D, M>>,
+    monitor: Option<ContractionMonitor<P, T, D, M>>,
     pub(super) ocp: Ocp<P, T, D, M>,
     solution: Solution<T, D, M>,
     /// Whether the plan has the multipliers of a QP before.
-    warm: bool,
+    has_multipliers: bool,
 }
 
 /// A controller with its memory on the heap.
@@ -137,7 +137,7 @@ impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewt
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn new(ocp: HeapOcp<P, T>) -> Result<Self, OcpError> {
-        Self::on_heap(ocp, GaussNewton::default())
+        Self::with_heap_memory(ocp, GaussNewton::default())
     }
 }
 
@@ -173,16 +173,16 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> HeapRealTime<P, HeapI
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn exact(ocp: HeapOcp<P, T>) -> Result<Self, OcpError> {
-        Self::on_heap(ocp, Exact::default())
+        Self::with_heap_memory(ocp, Exact::default())
     }
 }
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, C, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, C, T> {
-    fn on_heap(ocp: HeapOcp<P, T>, curvature: C) -> Result<Self, OcpError> {
+    fn with_heap_memory(ocp: HeapOcp<P, T>, curvature: C) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
         let solution = HeapSolution::new(dims)?;
-        Ok(Self::with(ocp, HeapInteriorPoint::new(), curvature, solution))
+        Ok(Self::from_parts(ocp, HeapInteriorPoint::new(), curvature, solution))
     }
 }
 
@@ -197,8 +197,8 @@ impl<P: Formulation<T>, S, C, T: Real> HeapRealTime<P, S, C, T> {
     /// [`OcpError::OutOfMemory`]
     pub fn monitored(self) -> Result<Self, OcpError> {
         let dims = self.ocp.qp().dims();
-        let [_, ends] = contraction::memory::<T>(dims);
-        let monitor = Monitor::new(HeapSolution::new(dims)?, crate::qp::zeros(ends)?);
+        let [_, ends_len] = contraction::memory_lens::<T>(dims);
+        let monitor = ContractionMonitor::new(HeapSolution::new(dims)?, crate::qp::zeros(ends_len)?);
         Ok(Self { monitor: Some(monitor), ..self })
     }
 }
@@ -224,7 +224,7 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real>
         memory: &'a mut [T],
     ) -> Result<Self, OcpError> {
         let solution = Solution::in_memory(dims, memory)?;
-        Ok(Self::with(ocp, qp_solver, GaussNewton::default(), solution))
+        Ok(Self::from_parts(ocp, qp_solver, GaussNewton::default(), solution))
     }
 }
 
@@ -232,8 +232,8 @@ impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims],
     /// How many numbers [`RealTime::monitored_in`] takes.
     #[must_use]
     pub const fn memory_of_monitor(dims: &[StageDims]) -> usize {
-        let [weights, ends] = contraction::memory::<T>(dims);
-        weights.saturating_add(ends)
+        let [weights_len, ends_len] = contraction::memory_lens::<T>(dims);
+        weights_len.saturating_add(ends_len)
     }
 
     /// As [`HeapRealTime::monitored`], in given memory of [`RealTime::memory_of_monitor`] numbers
@@ -242,14 +242,14 @@ impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims],
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::Qp`] if memory or dimensions do not fit.
     pub fn monitored_in(self, dims: &'a [StageDims], memory: &'a mut [T]) -> Result<Self, OcpError> {
-        self.ocp.fits(dims)?;
+        self.ocp.check_dimensions(dims)?;
         let (expected, found) = (Self::memory_of_monitor(dims), memory.len());
         if found < expected {
             return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
         }
-        let [weights, _] = contraction::memory::<T>(dims);
+        let [weights, _] = contraction::memory_lens::<T>(dims);
         let (weights, ends) = memory.split_at_mut_checked(weights).unwrap_or_default();
-        let monitor = Monitor::new(Solution::in_memory(dims, weights)?, ends);
+        let monitor = ContractionMonitor::new(Solution::in_memory(dims, weights)?, ends);
         Ok(Self { monitor: Some(monitor), ..self })
     }
 }
@@ -257,7 +257,7 @@ impl<'a, P: Formulation<T>, S, C, T: Real> RealTime<P, S, C, T, &'a [StageDims],
 impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>
     RealTime<P, S, C, T, D, M>
 {
-    fn with(ocp: Ocp<P, T, D, M>, qp_solver: S, curvature: C, solution: Solution<T, D, M>) -> Self {
+    fn from_parts(ocp: Ocp<P, T, D, M>, qp_solver: S, curvature: C, solution: Solution<T, D, M>) -> Self {
         Self {
             curvature,
             qp_solver,
@@ -266,7 +266,7 @@ impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
             monitor: None,
             ocp,
             solution,
-            warm: false,
+            has_multipliers: false,
         }
     }
 
@@ -281,7 +281,7 @@ impl<P: Formulation<T>, S, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + As
             monitor: self.monitor,
             ocp: self.ocp,
             solution: self.solution,
-            warm: self.warm,
+            has_multipliers: self.has_multipliers,
         }
     }
 }
@@ -292,13 +292,13 @@ where
     C: Curvature<P::Dynamics, T>,
 {
     pub(in crate::ocp) fn linearise(&mut self) -> Result<(), OcpError> {
-        self.judge();
+        self.update_contraction();
         let Self { curvature, monitor, ocp, .. } = self;
-        ocp.join_controls();
-        ocp.join_states();
+        ocp.equalise_shared_controls();
+        ocp.equalise_periodic_states();
         ocp.linearise(*curvature)?;
         if let Some(monitor) = monitor {
-            monitor.measure(ocp);
+            monitor.update_residuals(ocp);
         }
         Ok(())
     }
@@ -307,14 +307,23 @@ where
     pub(in crate::ocp) fn iterate(
         &mut self,
         x0: &[T],
-        over: &mut dyn FnMut() -> bool,
-    ) -> Result<Step, OcpError> {
-        let Self { curvature, qp_solver, contraction_test, inertia, monitor, ocp, solution, warm } = self;
+        deadline_passed: &mut dyn FnMut() -> bool,
+    ) -> Result<IterationResult, OcpError> {
+        let Self {
+            curvature,
+            qp_solver,
+            contraction_test,
+            inertia,
+            monitor,
+            ocp,
+            solution,
+            has_multipliers: warm,
+        } = self;
         ocp.fix_initial_state(x0)?;
         let start = if *warm { QpStart::Warm } else { QpStart::Cold };
         let mut solve = |ocp: &Ocp<P, T, D, M>| {
             solution.copy_from(&ocp.iterate);
-            qp_solver.solve_until(ocp.qp(), start, solution.view_mut(), over)
+            qp_solver.solve_until(ocp.qp(), start, solution.view_mut(), deadline_passed)
         };
         let mut regularisation = 0.0;
         // Other Hessians are convex, but for those of general costs that are to stay as they are.
@@ -328,24 +337,26 @@ where
         } else {
             solve(ocp)
         };
-        let statistics = result.map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;
-        let convergence = monitor.as_mut().map(|monitor| monitor.observe(ocp, solution, contraction_test));
+        let statistics =
+            result.map_err(|error| ocp.non_finite_derivative(&error).unwrap_or_else(|| error.into()))?;
+        let convergence =
+            monitor.as_mut().map(|monitor| monitor.convergence_at_solution(ocp, solution, contraction_test));
         *warm = true;
         core::mem::swap(&mut ocp.iterate, solution);
-        Ok(Step { statistics, regularisation, convergence })
+        Ok(IterationResult { statistics, regularisation, convergence })
     }
 
     /// The plan one interval earlier, for the next sample.
     pub fn shift(&mut self) {
-        self.judge();
+        self.update_contraction();
         self.ocp.shift();
     }
 
     /// Judges the last iteration, before anything of its problem is changed.
-    fn judge(&mut self) {
+    fn update_contraction(&mut self) {
         let Self { contraction_test, monitor, ocp, solution, .. } = self;
         if let Some(monitor) = monitor {
-            monitor.judge(ocp, solution, contraction_test);
+            monitor.update_reductions(ocp, solution, contraction_test);
         }
     }
 
@@ -358,13 +369,13 @@ where
     /// The problem, with the plan as its iterate, to be changed: references, bounds, the plan
     /// itself.
     pub fn ocp_mut(&mut self) -> &mut Ocp<P, T, D, M> {
-        self.judge();
+        self.update_contraction();
         &mut self.ocp
     }
 
     /// The next QP starts cold, and nothing is known of the convergence.
     pub fn reset(&mut self) {
-        self.warm = false;
+        self.has_multipliers = false;
         if let Some(monitor) = &mut self.monitor {
             monitor.reset();
         }
@@ -372,7 +383,7 @@ where
 }
 
 /// What an iteration took.
-pub(in crate::ocp) struct Step {
+pub(in crate::ocp) struct IterationResult {
     pub statistics: QpStatistics,
     pub regularisation: f64,
     pub convergence: Option<Convergence>,

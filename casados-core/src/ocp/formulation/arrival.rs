@@ -8,9 +8,9 @@
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::functions::weights::{Fault, check_matrix};
+use crate::ocp::formulation::functions::weights::{WeightError, check_semidefinite};
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::{arrival_weights, split};
+use crate::ocp::formulation::instance::data::{arrival_weights, split_data};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{Qp, Solution, StageDims};
 use crate::scalar::Real;
@@ -57,13 +57,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Labels::states::<P, T>(Part::Arrival, 0).check_length(weight, nx * nx)?;
         let mut matrix = <P::Shape as Shape>::MatrixXX::<T>::zeroed();
         crate::qp::copy_common(matrix.as_mut_slice(), weight);
-        check_matrix::<T, _>(&matrix, true).map_err(|Fault { place, value, allowed }| {
-            let x = <P::Dynamics as Dynamics<T>>::NAMES.x;
-            let states = place.map(|state| x.get(state).copied().unwrap_or_default());
-            OcpError::InvalidArrivalWeight { states, value, allowed }
-        })?;
+        check_semidefinite::<T, _>(&matrix, true).map_err(
+            |WeightError { indices: place, value, allowed }| {
+                let x = <P::Dynamics as Dynamics<T>>::NAMES.x;
+                let states = place.map(|state| x.get(state).copied().unwrap_or_default());
+                OcpError::InvalidArrivalWeight { states, value, allowed }
+            },
+        )?;
         let layout = self.layout();
-        let arrival = split::<P, T>(self.data.as_mut(), layout).arrival;
+        let arrival = split_data::<P, T>(self.data.as_mut(), layout).arrival;
         crate::qp::copy_common(arrival, mean);
         crate::qp::copy_common(arrival.get_mut(nx..).unwrap_or_default(), weight);
         Ok(self)
@@ -79,7 +81,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// The cost at a point.
-pub(in crate::ocp) fn cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn arrival_cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
     at: &Solution<T, D, M>,
 ) -> T {
@@ -87,17 +89,17 @@ pub(in crate::ocp) fn cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut
     let (mean, weight) = arrival.split_at_checked(first.x.len()).unwrap_or_default();
     let distance = || first.x.iter().zip(mean).map(|(&x, &mean)| x - mean);
     let columns = weight.chunks_exact(mean.len().max(1)).zip(distance());
-    let twice = columns.fold(T::ZERO, |sum, (column, d)| {
+    let quadratic_form = columns.fold(T::ZERO, |sum, (column, d)| {
         column.iter().zip(distance()).fold(sum, |sum, (&w, other)| sum + d * w * other)
     });
-    T::from_f64(0.5) * twice
+    T::from_f64(0.5) * quadratic_form
 }
 
 /// Adds it to a QP, whose variables are not changes: `W` and `−W x̄`; or with the gradient at a
 /// state, `W (x − x̄)`.
-pub(in crate::ocp) fn add<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn add_to_qp<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
-    at: &[T],
+    state: &[T],
     qp: &mut Qp<T, D, M>,
 ) {
     let nx = qp.dims().first().map_or(0, |first| first.nx);
@@ -112,7 +114,7 @@ pub(in crate::ocp) fn add<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<
         for (h, &w) in column.iter_mut().zip(weight).skip(j) {
             *h = *h + w;
         }
-        let at = at.iter().copied().chain(core::iter::repeat(T::ZERO));
+        let at = state.iter().copied().chain(core::iter::repeat(T::ZERO));
         *gradient = weight
             .iter()
             .zip(mean.iter().zip(at))

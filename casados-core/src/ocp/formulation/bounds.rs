@@ -1,13 +1,13 @@
 //! Bounds by name, parameters and references.
 
-use crate::ocp::formulation::check::{Labels, range};
+use crate::ocp::formulation::check::{Labels, stage_range};
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::data::{node_rows, path_rows, split};
-use crate::ocp::formulation::instance::inside::inner_path_row;
-use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::instance::data::{node_row_count, path_row_count, split_data};
+use crate::ocp::formulation::instance::inner_points::inner_path_row;
+use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::{BoundsMut, QpError, QpField, Side, StageDims, check};
@@ -19,12 +19,12 @@ use core::ops::{Range, RangeBounds};
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Bounds of a general constraint of a stage, as they were given.
     #[cfg(feature = "casadi")]
-    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+    pub(crate) fn given_bounds(&self, stage: usize, row: usize) -> [T; 2] {
         let (intervals, layout) = (self.intervals(), self.layout());
-        let rows = intervals * path_rows::<P, T>(layout) + P::Terminal::ROWS;
+        let rows = intervals * path_row_count::<P, T>(layout) + P::Terminal::ROWS;
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
         let begin =
-            (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_rows::<P, T>(layout) + row;
+            (intervals + 1) * (1 + P::Shape::NP) + references + stage * path_row_count::<P, T>(layout) + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
 
@@ -39,24 +39,27 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
-    pub(in crate::ocp) fn find(
+    pub(in crate::ocp) fn stages_of_name(
         &self,
         name: &str,
         stages: &impl RangeBounds<usize>,
     ) -> Result<[Range<usize>; 3], OcpError> {
-        let known = self.names();
-        let find =
+        let model_names = self.names();
+        let matching_stages =
             |part, names: &[&str], count| match names.iter().any(|variable| name_matches(name, variable)) {
-                true => range(part, stages, count),
+                true => stage_range(part, stages, count),
                 false => Ok(0..0),
             };
-        let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
-        let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
+        let of_states = matching_stages(Part::StateBounds, model_names.x, self.intervals() + 1)?;
+        let of_controls = matching_stages(Part::ControlBounds, model_names.u, self.intervals())?;
         // They are the same at all stages.
-        let is_free =
-            known.p.iter().enumerate().any(|(p, name_of_p)| self.is_meant_and_free(name, p, name_of_p));
+        let is_free = model_names
+            .p
+            .iter()
+            .enumerate()
+            .any(|(p, name_of_p)| self.matches_free_parameter(name, p, name_of_p));
         let is_algebraic =
-            P::Dynamics::ALGEBRAIC && known.z.iter().any(|variable| name_matches(name, variable));
+            P::Dynamics::ALGEBRAIC && model_names.z.iter().any(|variable| name_matches(name, variable));
         if of_states.is_empty() && of_controls.is_empty() && !is_free && !is_algebraic {
             let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
             return Err(OcpError::UnknownName { name: Text::new(name), known });
@@ -64,50 +67,51 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok([of_states, of_controls, 0..usize::from(is_free)])
     }
 
-    fn is_meant_and_free(&self, name: &str, parameter: usize, name_of_it: &str) -> bool {
-        name_matches(name, name_of_it) && self.free.view().of(parameter).is_some()
+    fn matches_free_parameter(&self, name: &str, parameter: usize, parameter_name: &str) -> bool {
+        name_matches(name, parameter_name) && self.free.view().index_of(parameter).is_some()
     }
 
     /// Does something to the bounds of every variable that a name means.
-    pub(in crate::ocp) fn each(
+    pub(in crate::ocp) fn for_each_bound(
         &mut self,
         name: &str,
         [of_states, of_controls, of_free]: [Range<usize>; 3],
         mut visit: impl FnMut(&mut BoundsMut<'_, T>, usize),
     ) {
-        let known = self.names();
+        let model_names = self.names();
         // Of a state that is given there is nothing to be bounded.
-        let given = match self.initial {
-            Initial::Fixed => known.x.len(),
-            Initial::Partly => known.own_states(),
+        let fixed_states = match self.initial_state {
+            InitialState::Fixed => model_names.x.len(),
+            InitialState::PartlyFixed => model_names.model_state_count(),
             _ => 0,
         };
-        let integrals = known.x.len() - known.integrals;
+        let first_integral = model_names.x.len() - model_names.integrals;
         let free = self.free.view();
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
-            let is_given = |index: usize| k == 0 && (index < given || index >= integrals);
-            let meant = |(_, variable): &(usize, &&str)| name_matches(name, variable);
+            let is_fixed = |index: usize| k == 0 && (index < fixed_states || index >= first_integral);
+            let matches_name = |(_, variable): &(usize, &&str)| name_matches(name, variable);
             if of_states.contains(&k) {
-                let states = known.x.iter().enumerate().filter(meant).map(|(index, _)| index);
-                states.filter(|&i| !is_given(i)).for_each(|i| visit(&mut stage.x_bounds_mut(), i));
+                let states = model_names.x.iter().enumerate().filter(matches_name).map(|(index, _)| index);
+                states.filter(|&i| !is_fixed(i)).for_each(|i| visit(&mut stage.x_bounds_mut(), i));
             }
             if of_controls.contains(&k) {
-                let controls = known.u.iter().enumerate().filter(meant);
+                let controls = model_names.u.iter().enumerate().filter(matches_name);
                 controls.for_each(|(j, _)| visit(&mut stage.u_bounds_mut(), free.count() + j));
             }
             if of_free.contains(&k) {
-                let meant = known.p.iter().enumerate().filter(|(_, variable)| name_matches(name, variable));
-                let meant = meant.filter_map(|(parameter, _)| free.of(parameter));
+                let meant =
+                    model_names.p.iter().enumerate().filter(|(_, variable)| name_matches(name, variable));
+                let meant = meant.filter_map(|(parameter, _)| free.index_of(parameter));
                 meant.for_each(|w| visit(&mut stage.u_bounds_mut(), w));
             }
         }
     }
 
     /// What the first variable that a name means is called, from some stage on.
-    pub(in crate::ocp) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
-        let known = self.names();
+    pub(in crate::ocp) fn labels_of_name(&self, name: &str, stage: usize) -> (Labels, usize) {
+        let model_names = self.names();
         let position = |names: &[&str]| names.iter().position(|variable| name_matches(name, variable));
-        match [known.x, known.u, known.z, known.p].map(position) {
+        match [model_names.x, model_names.u, model_names.z, model_names.p].map(position) {
             [Some(index), ..] => (Labels::states::<P, T>(Part::StateBounds, stage), index),
             [_, Some(index), ..] => (Labels::controls::<P, T>(Part::ControlBounds, stage), index),
             [_, _, Some(index), _] => (Labels::algebraic::<P, T>(Part::AlgebraicBounds, stage), index),
@@ -126,7 +130,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         lower: &[T],
         upper: &[T],
     ) -> Result<&mut Self, OcpError> {
-        let range = range(Part::PathBounds, &stages, self.intervals())?;
+        let range = stage_range(Part::PathBounds, &stages, self.intervals())?;
         self.write_bounds(Part::PathBounds, range, P::Path::ROWS, lower, upper)
     }
 
@@ -153,12 +157,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
             labels.check_bounds(index, lower, upper)?;
         }
-        let (layout, points) = (self.layout(), self.inner.count());
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let (layout, points) = (self.layout(), self.inner_points.count());
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
-                let begin = k * path_rows::<P, T>(layout);
+                let begin = k * path_row_count::<P, T>(layout);
                 crate::qp::copy_common(crate::qp::part_mut(bounds, begin, rows), given);
                 for point in if part == Part::PathBounds { 1..points + 1 } else { 0..0 } {
                     let row = inner_path_row::<P, T>(0, point);
@@ -175,10 +179,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn fix_initial_state(&mut self, x0: &[T]) -> Result<&mut Self, OcpError> {
-        let known = self.names();
-        let own = known.own_states();
-        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, own)?;
-        if own == P::Shape::NX {
+        let model_names = self.names();
+        let model_states = model_names.model_state_count();
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, model_states)?;
+        if model_states == P::Shape::NX {
             self.qp.fix_initial_state(x0)?;
         } else if let Some(mut stage) = self.qp.stage_mut(0) {
             let (infinity, mut bounds) = (T::from_f64(f64::INFINITY), stage.x_bounds_mut());
@@ -187,20 +191,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 bounds.soften(i, infinity, T::ZERO);
             }
         }
-        self.initial = if known.linear.is_empty() { Initial::Fixed } else { Initial::Partly };
+        self.initial_state =
+            if model_names.linear.is_empty() { InitialState::Fixed } else { InitialState::PartlyFixed };
         Ok(self)
     }
 
     /// The state at the start is free; it may be bounded like any other. If it was fixed, it has no
     /// bounds until it is given new ones.
     pub fn free_initial_state(&mut self) -> &mut Self {
-        let was_fixed = matches!(self.initial, Initial::Fixed | Initial::Partly);
-        let own = self.names().own_states();
-        self.initial = Initial::Free;
+        let was_fixed = matches!(self.initial_state, InitialState::Fixed | InitialState::PartlyFixed);
+        let model_states = self.names().model_state_count();
+        self.initial_state = InitialState::Free;
         let infinity = T::from_f64(f64::INFINITY);
         if was_fixed && let Some(mut stage) = self.qp.stage_mut(0) {
             let mut bounds = stage.x_bounds_mut();
-            (0..own).for_each(|i| bounds.set(i, -infinity, infinity));
+            (0..model_states).for_each(|i| bounds.set(i, -infinity, infinity));
         }
         self
     }
@@ -222,10 +227,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         p: &[T],
     ) -> Result<&mut Self, OcpError> {
         let intervals = self.intervals();
-        let range = range(Part::Parameters, &stages, intervals + 1)?;
+        let range = stage_range(Part::Parameters, &stages, intervals + 1)?;
         Labels::parameters::<P, T>(Part::Parameters, range.start).check_vector(p, P::Shape::NP)?;
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         for k in range {
             crate::qp::copy_common(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
         }
@@ -243,10 +248,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         reference: &[T],
     ) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
-        let range = range(Part::Reference, &stages, intervals)?;
+        let range = stage_range(Part::Reference, &stages, intervals)?;
         Labels::references::<P, T>(Part::Reference, range.start).check_vector(reference, length)?;
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         for k in range {
             crate::qp::copy_common(crate::qp::part_mut(data.references, k * length, length), reference);
         }
@@ -283,7 +288,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         for (k, &mut time) in data.times.iter_mut().enumerate().take(intervals) {
             let reference = crate::qp::part_mut(data.references, k * length, length);
             reference.fill(T::ZERO);
@@ -301,14 +306,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (intervals, length) = (self.intervals(), P::TerminalCost::REFERENCES);
         Labels::references::<P, T>(Part::TerminalReference, intervals).check_vector(reference, length)?;
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         let begin = intervals * P::StageCost::REFERENCES;
         crate::qp::copy_common(crate::qp::part_mut(data.references, begin, length), reference);
         Ok(self)
     }
 
     /// A constraint of the QP by its name in the problem.
-    pub(in crate::ocp) fn name_of_row(
+    pub(in crate::ocp) fn constraint_name(
         &self,
         field: QpField,
         stage: usize,
@@ -316,22 +321,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         side: Side,
     ) -> ConstraintName {
         let names = self.names();
-        let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
+        let name_at = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
         let mut point = 0;
         let (part, (name, output)) = match field {
-            QpField::StateBounds => (Part::StateBounds, (of(names.x), 0)),
+            QpField::StateBounds => (Part::StateBounds, (name_at(names.x), 0)),
             QpField::ControlBounds => match index.checked_sub(self.free.count()) {
                 Some(u) => (Part::ControlBounds, (names.u.get(u).copied().unwrap_or(""), 0)),
-                None => (Part::ParameterBounds, (self.name_of_free(index), 0)),
+                None => (Part::ParameterBounds, (self.free_parameter_name(index), 0)),
             },
             _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
             _ => match index.checked_sub(P::Path::ROWS) {
-                Some(_) if index >= node_rows::<P, T>() => {
-                    let (row, name) = self.inner.name_of::<P>(index - node_rows::<P, T>());
+                Some(_) if index >= node_row_count::<P, T>() => {
+                    let (row, name) = self.inner_points.row_name::<P>(index - node_row_count::<P, T>());
                     point = row.point();
-                    (row.part::<P, T>(), name)
+                    (row.bounds_part::<P, T>(), name)
                 }
-                Some(copy) => (Part::StateBounds, (self.name_of_free(copy), 0)),
+                Some(copy) => (Part::StateBounds, (self.free_parameter_name(copy), 0)),
                 None => (Part::PathBounds, P::Path::name(index)),
             },
         };
@@ -339,24 +344,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The derivative that makes a QP one without values.
-    pub(in crate::ocp) fn derivative_without_value(&self, error: &QpError) -> Option<OcpError> {
+    pub(in crate::ocp) fn find_non_finite_derivative(&self, error: &QpError) -> Option<OcpError> {
         // Whatever a solver says of a QP without values. Derivatives come first in it, before the
         // bounds and constants that are made with them.
         if matches!(error, QpError::Infeasible { .. }) {
             return None;
         }
         let Err(QpError::InvalidValue { field, stage, index, value }) = check(self.qp()) else { return None };
-        let known = self.names();
-        let (nx, nu) = (known.x.len(), self.free.count() + known.u.len());
+        let model_names = self.names();
+        let (nx, nu) = (model_names.x.len(), self.free.count() + model_names.u.len());
         let input = |index: usize| match index.checked_sub(self.free.count()) {
-            Some(u) => known.u.get(u).copied().unwrap_or(""),
-            None => self.name_of_free(index),
+            Some(u) => model_names.u.get(u).copied().unwrap_or(""),
+            None => self.free_parameter_name(index),
         };
-        let state = |index: usize| known.x.get(index).copied().unwrap_or("");
+        let state = |index: usize| model_names.x.get(index).copied().unwrap_or("");
         let rows = match field {
             QpField::A | QpField::B | QpField::Q => nx,
             QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
-            QpField::C | QpField::D => path_rows::<P, T>(self.layout()),
+            QpField::C | QpField::D => path_row_count::<P, T>(self.layout()),
             QpField::R | QpField::S => nu,
             QpField::GradientX | QpField::GradientU => 1,
             _ => return None,

@@ -14,7 +14,7 @@ pub(in crate::ocp) struct Labels {
 }
 
 impl Labels {
-    fn invalid(self, index: usize, value: f64) -> OcpError {
+    fn invalid_value(self, index: usize, value: f64) -> OcpError {
         let Self { part, stage, name } = self;
         let (name, index) = name(index);
         OcpError::InvalidValue { part, stage, name, index, value }
@@ -31,10 +31,10 @@ impl Labels {
         }
         let (lower, upper) = (lower.to_f64(), upper.to_f64());
         if lower.is_nan() || lower == f64::INFINITY {
-            return Err(self.invalid(index, lower));
+            return Err(self.invalid_value(index, lower));
         }
         if upper.is_nan() || upper == f64::NEG_INFINITY {
-            return Err(self.invalid(index, upper));
+            return Err(self.invalid_value(index, upper));
         }
         let Self { part, stage, name } = self;
         let (name, index) = name(index);
@@ -49,10 +49,10 @@ impl Labels {
         let labels = Self { part: Part::Penalty, ..self };
         let is_linear = linear >= T::ZERO;
         if !is_linear {
-            return Err(labels.invalid(index, linear.to_f64()));
+            return Err(labels.invalid_value(index, linear.to_f64()));
         }
         if !(quadratic >= T::ZERO && quadratic.is_finite()) {
-            return Err(labels.invalid(index, quadratic.to_f64()));
+            return Err(labels.invalid_value(index, quadratic.to_f64()));
         }
         Ok(())
     }
@@ -62,7 +62,7 @@ impl Labels {
     pub fn check_finite<T: Real>(self, values: &[T]) -> Result<(), OcpError> {
         match crate::finite::find_non_finite(values) {
             None => Ok(()),
-            Some((index, value)) => Err(self.invalid(index, value)),
+            Some((index, value)) => Err(self.invalid_value(index, value)),
         }
     }
 
@@ -83,7 +83,7 @@ impl Labels {
 }
 
 /// The first stage of a range.
-pub(in crate::ocp) fn first(stages: &impl RangeBounds<usize>) -> usize {
+pub(in crate::ocp) fn first_stage(stages: &impl RangeBounds<usize>) -> usize {
     match stages.start_bound() {
         Bound::Included(&start) => start,
         Bound::Excluded(&start) => start.saturating_add(1),
@@ -95,12 +95,12 @@ pub(in crate::ocp) fn first(stages: &impl RangeBounds<usize>) -> usize {
 ///
 /// # Errors
 /// [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
-pub(in crate::ocp) fn range(
+pub(in crate::ocp) fn stage_range(
     part: Part,
     stages: &impl RangeBounds<usize>,
     count: usize,
 ) -> Result<Range<usize>, OcpError> {
-    let start = first(stages);
+    let start = first_stage(stages);
     let end = match stages.end_bound() {
         Bound::Included(&end) => end.saturating_add(1),
         Bound::Excluded(&end) => end,

@@ -100,7 +100,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Coupled`]
     #[cfg(feature = "alloc")]
-    pub(in crate::ocp) fn is_uncoupled(&self) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn check_uncoupled(&self) -> Result<(), OcpError> {
         if self.qp().is_coupled() { Err(OcpError::Coupled) } else { Ok(()) }
     }
 }

@@ -85,13 +85,13 @@ impl<'a, T: Real> Horizon<'a, T> {
     /// ```
     #[must_use]
     pub fn free(intervals: usize, range: impl RangeBounds<T>, guess: T) -> Self {
-        Self::Free { intervals, parts: &[], range: limits(&range), guess }
+        Self::Free { intervals, parts: &[], range: range_limits(&range), guess }
     }
     /// As [`Horizon::free`], with nodes at these parts of the whole, from 0 to 1.
     #[must_use]
     pub fn free_nodes(parts: &'a [T], range: impl RangeBounds<T>, guess: T) -> Self {
         let intervals = parts.len().saturating_sub(1);
-        Self::Free { intervals, parts, range: limits(&range), guess }
+        Self::Free { intervals, parts, range: range_limits(&range), guess }
     }
     /// How many intervals.
     #[must_use]
@@ -136,7 +136,7 @@ impl<'a, T: Real> Horizon<'a, T> {
     ///
     /// # Errors
     /// [`OcpError::Times`]
-    pub(in crate::ocp) fn write(&self, times: &mut [T]) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn write_times(&self, times: &mut [T]) -> Result<(), OcpError> {
         if let Self::Free { parts: [start, .., end], .. } = self
             && !(*start == T::ZERO && *end == T::ONE)
         {
@@ -157,11 +157,11 @@ impl<'a, T: Real> Horizon<'a, T> {
 }
 
 /// The sides of a range.
-pub(in crate::ocp) fn limits<T: Real>(range: &impl RangeBounds<T>) -> [T; 2] {
+pub(in crate::ocp) fn range_limits<T: Real>(range: &impl RangeBounds<T>) -> [T; 2] {
     let infinity = T::from_f64(f64::INFINITY);
-    let side = |bound: Bound<&T>, none: T| match bound {
+    let limit = |bound: Bound<&T>, none: T| match bound {
         Bound::Included(&value) | Bound::Excluded(&value) => value,
         Bound::Unbounded => none,
     };
-    [side(range.start_bound(), -infinity), side(range.end_bound(), infinity)]
+    [limit(range.start_bound(), -infinity), limit(range.end_bound(), infinity)]
 }

@@ -8,7 +8,7 @@ use crate::ocp::formulation::functions::dynamics::Dynamics;
 #[cfg(feature = "alloc")]
 use crate::ocp::formulation::instance::Ocp;
 #[cfg(feature = "alloc")]
-use crate::ocp::formulation::instance::inside::InnerRow;
+use crate::ocp::formulation::instance::inner_points::InnerRow;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 #[cfg(feature = "alloc")]
@@ -21,11 +21,11 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use core::fmt;
 
-const fn names<P: Formulation<T>, T: Real>() -> Names {
+const fn model_names<P: Formulation<T>, T: Real>() -> Names {
     <P::Dynamics as Dynamics<T>>::NAMES
 }
 
-fn listed(names: &[&'static str], index: usize) -> (&'static str, usize) {
+fn name_and_index(names: &[&'static str], index: usize) -> (&'static str, usize) {
     (names.get(index).copied().unwrap_or(""), index)
 }
 
@@ -37,7 +37,7 @@ pub(in crate::ocp) struct OutputName {
 
 impl OutputName {
     /// Whether a name means it: that of the function means all of its outputs.
-    pub fn is_meant(&self, name: &str) -> bool {
+    pub fn matches(&self, name: &str) -> bool {
         let Some(rest) = name.strip_prefix(self.function) else { return false };
         let index = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         rest.is_empty() || index.is_some_and(|index| index.parse() == Ok(self.output.unwrap_or(0)))
@@ -45,7 +45,7 @@ impl OutputName {
 }
 
 /// The name of a row.
-pub(in crate::ocp) fn output<C: Constraints<S, T>, S: Shape, T: Real>(row: usize) -> OutputName {
+pub(in crate::ocp) fn output_name<C: Constraints<S, T>, S: Shape, T: Real>(row: usize) -> OutputName {
     let (function, output) = C::name(row);
     let has_others = (0..C::ROWS).map(C::name).any(|(other, output)| other == function && output > 0);
     OutputName { function, output: has_others.then_some(output) }
@@ -63,19 +63,19 @@ impl fmt::Display for OutputName {
 impl Labels {
     /// Of states: of the iterate, of the start, or of bounds.
     pub fn states<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().x, index) }
+        Self { part, stage, name: |index| name_and_index(model_names::<P, T>().x, index) }
     }
     /// Of controls.
     pub fn controls<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().u, index) }
+        Self { part, stage, name: |index| name_and_index(model_names::<P, T>().u, index) }
     }
     /// Of algebraic states.
     pub fn algebraic<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().z, index) }
+        Self { part, stage, name: |index| name_and_index(model_names::<P, T>().z, index) }
     }
     /// Of parameters.
     pub fn parameters<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().p, index) }
+        Self { part, stage, name: |index| name_and_index(model_names::<P, T>().p, index) }
     }
     /// Of constraints.
     pub fn constraints<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
@@ -93,22 +93,23 @@ impl Labels {
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// What a row behind those of path constraints at nodes is called, with its place, and its
     /// unit.
-    pub(in crate::ocp) fn inside_name(&self, index: usize) -> (String, &'static str) {
+    pub(in crate::ocp) fn inner_row_name_and_unit(&self, index: usize) -> (String, &'static str) {
         let units = <P::Dynamics as Dynamics<T>>::NAMES.units;
-        let of = |units: &'static [&'static str], index: usize| units.get(index).copied().unwrap_or_default();
-        let (row, (name, _)) = self.inner.name_of::<P>(index);
+        let unit_at =
+            |units: &'static [&'static str], index: usize| units.get(index).copied().unwrap_or_default();
+        let (row, (name, _)) = self.inner_points.row_name::<P>(index);
         let (name, unit) = match row {
             InnerRow::Path { row, .. } => {
-                (output::<P::Path, P::Shape, T>(row).to_string(), P::Path::unit(row))
+                (output_name::<P::Path, P::Shape, T>(row).to_string(), P::Path::unit(row))
             }
             InnerRow::Variable { variable, .. } => match variable.checked_sub(P::Shape::NX) {
-                None => (name.to_string(), of(units.x, variable)),
-                Some(z) => (name.to_string(), of(units.z, z)),
+                None => (name.to_string(), unit_at(units.x, variable)),
+                Some(z) => (name.to_string(), unit_at(units.z, z)),
             },
         };
         match row.point() {
             0 => (name, unit),
-            point => (format!("{name}@{}", self.inner.part(point).to_f64()), unit),
+            point => (format!("{name}@{}", self.inner_points.fraction(point).to_f64()), unit),
         }
     }
 }

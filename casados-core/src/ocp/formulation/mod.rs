@@ -14,17 +14,17 @@ pub(in crate::ocp) mod arrival;
 pub(in crate::ocp) mod bounds;
 pub(in crate::ocp) mod check;
 pub(in crate::ocp) mod coupling;
-#[cfg(feature = "alloc")]
-mod declare;
 pub(in crate::ocp) mod error;
-pub(in crate::ocp) mod free;
+pub(in crate::ocp) mod free_parameters;
+#[cfg(feature = "alloc")]
+mod free_parameters_and_points;
 pub(in crate::ocp) mod functions;
 pub(in crate::ocp) mod horizon;
 pub(in crate::ocp) mod instance;
 pub(in crate::ocp) mod labels;
-pub(in crate::ocp) mod limit;
 pub(in crate::ocp) mod names;
 pub(in crate::ocp) mod print;
 pub(in crate::ocp) mod problem;
 pub(in crate::ocp) mod program;
 pub(in crate::ocp) mod soften;
+pub(in crate::ocp) mod variable_bounds;

@@ -44,13 +44,13 @@ pub struct Names {
 
 impl Names {
     /// How many states the model has without linear controls and integrals.
-    pub(in crate::ocp) const fn own_states(&self) -> usize {
+    pub(in crate::ocp) const fn model_state_count(&self) -> usize {
         self.x.len() - self.linear.len() - self.integrals
     }
 
     /// What a control is called, of a rate the control that has it.
     #[cfg(feature = "alloc")]
-    pub(in crate::ocp) fn control(&self, control: usize) -> &'static str {
+    pub(in crate::ocp) fn control_name(&self, control: usize) -> &'static str {
         let state = self.linear_state(control).and_then(|state| self.x.get(state));
         state.or(self.u.get(control)).copied().unwrap_or("")
     }
@@ -58,7 +58,7 @@ impl Names {
     /// The state that a linear control is.
     #[cfg(feature = "alloc")]
     pub(in crate::ocp) fn linear_state(&self, control: usize) -> Option<usize> {
-        let place = self.linear.iter().position(|&linear| linear as usize == control)?;
-        Some(self.own_states() + place)
+        let position = self.linear.iter().position(|&linear| linear as usize == control)?;
+        Some(self.model_state_count() + position)
     }
 }

@@ -4,10 +4,10 @@ use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 #[cfg(feature = "alloc")]
-use crate::ocp::formulation::instance::data::node_rows;
-use crate::ocp::formulation::instance::data::{bounds, path_rows};
-use crate::ocp::formulation::instance::{Initial, Ocp};
-use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::instance::data::node_row_count;
+use crate::ocp::formulation::instance::data::{constraint_bounds, path_row_count};
+use crate::ocp::formulation::instance::{InitialState, Ocp};
+use crate::ocp::formulation::labels::output_name;
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
@@ -18,9 +18,9 @@ use core::fmt::{self, Display, Formatter};
 use core::ops::Range;
 
 /// More names than this are not listed.
-const NAMES: usize = 8;
+const MAX_LISTED_NAMES: usize = 8;
 /// More bounds than this of one variable, which differ from stage to stage, are not listed.
-const RUNS: usize = 4;
+const MAX_LISTED_BOUNDS: usize = 4;
 
 /// The objective, the dynamics, bounds and constraints by name, with the stages at which they hold
 /// and the penalties of soft ones, and how large the problem is.
@@ -64,12 +64,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let [start, end] = [0, intervals].map(|node| get(times, node).to_f64());
         let plural = if intervals == 1 { "" } else { "s" };
         write!(f, "{}: {intervals} interval{plural}, t from {start} to ", names.model)?;
-        match self.free.view().end() {
-            Some(w) => writeln!(f, "{}, which is free", self.name_of_free(w))?,
+        match self.free.view().end_time_index() {
+            Some(w) => writeln!(f, "{}, which is free", self.free_parameter_name(w))?,
             None => writeln!(f, "{end}")?,
         }
-        self.objective(f)?;
-        self.variables(f, &names)?;
+        self.print_objective(f)?;
+        self.print_variables(f, &names)?;
         let arguments = [("x", names.x.len()), ("u", names.u.len()), ("p", names.p.len())];
         f.write_str("  s.t.   x₊ = φ(")?;
         for (i, (name, _)) in arguments.iter().filter(|(_, count)| *count > 0).enumerate() {
@@ -78,14 +78,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         f.write_str(")")?;
         if P::Dynamics::ALGEBRAIC && !names.z.is_empty() {
             f.write_str(", with algebraic states ")?;
-            list(f, names.z)?;
+            print_names(f, names.z)?;
         }
         writeln!(f)?;
-        if self.initial == Initial::Unknown {
+        if self.initial_state == InitialState::Unknown {
             writeln!(f, "         (initial state not said: `fix_initial_state` or `free_initial_state`)")?;
         }
-        let mut count = Count::default();
-        self.bounds(f, &names, &mut count)?;
+        let mut count = ConstraintCounts::default();
+        self.print_bounds(f, &names, &mut count)?;
         let view = self.qp.view();
         for i in marked_indices(view.periodic()) {
             let name = names.x.get(i).copied().unwrap_or_default();
@@ -101,7 +101,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if count.equations > 0 {
             write!(f, ", {} other ones", count.equations)?;
         }
-        write!(f, ", {} bounds", count.sides)?;
+        write!(f, ", {} bounds", count.bounds)?;
         if count.soft > 0 {
             write!(f, ", {} of them soft", count.soft)?;
         }
@@ -110,9 +110,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    fn objective(&self, f: &mut Formatter<'_>) -> fmt::Result {
+    fn print_objective(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let problem = self.problem.parts_ref();
-        let sum = if problem.running { "Σ h " } else { "Σ " };
+        let stage_sum_prefix = if problem.running { "Σ h " } else { "Σ " };
         f.write_str("  min    ")?;
         let mut is_first = true;
         let mut show = |prefix: &str, term: fmt::Arguments<'_>| {
@@ -120,7 +120,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             write!(f, "{plus}{prefix}{term}")
         };
         problem.dynamics.terms(&mut |term| show("Σ ", term))?;
-        problem.stage_cost.terms(&mut |term| show(sum, term))?;
+        problem.stage_cost.terms(&mut |term| show(stage_sum_prefix, term))?;
         problem.terminal_cost.terms(&mut |term| show("", term))?;
         if self.has_arrival_cost() {
             show("", format_args!("½‖x₀ − x̄‖²_W"))?;
@@ -131,72 +131,92 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         writeln!(f)
     }
 
-    fn variables(&self, f: &mut Formatter<'_>, names: &Names) -> fmt::Result {
+    fn print_variables(&self, f: &mut Formatter<'_>, names: &Names) -> fmt::Result {
         f.write_str("  over   ")?;
-        let (own, more) = names.x.split_at(names.own_states());
+        let (model_states, more) = names.x.split_at(names.model_state_count());
         let (linear, integrals) = more.split_at(names.linear.len());
-        let kinds =
-            [("state", own), ("linear control", linear), ("integral", integrals), ("control", names.u)];
+        let kinds = [
+            ("state", model_states),
+            ("linear control", linear),
+            ("integral", integrals),
+            ("control", names.u),
+        ];
         for (i, (kind, names)) in kinds.into_iter().filter(|(_, names)| !names.is_empty()).enumerate() {
             let separator = if i == 0 { "" } else { "; " };
             let plural = if names.len() == 1 { "" } else { "s" };
             write!(f, "{separator}{} {kind}{plural} ", names.len())?;
-            list(f, names)?;
+            print_names(f, names)?;
         }
-        let (copies, free) = (P::Terminal::STARTS, self.free.count() - P::Terminal::STARTS);
+        let (copies, free) =
+            (P::Terminal::INITIAL_STATE_COPIES, self.free.count() - P::Terminal::INITIAL_STATE_COPIES);
         if free > 0 {
             let plural = if free == 1 { "" } else { "s" };
             write!(f, "; {free} free parameter{plural} ")?;
             for w in 0..free {
-                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.name_of_free(copies + w))?;
+                write!(f, "{}{}", if w == 0 { "" } else { ", " }, self.free_parameter_name(copies + w))?;
             }
         }
         writeln!(f)
     }
 
-    fn bounds(&self, f: &mut Formatter<'_>, names: &Names, count: &mut Count) -> fmt::Result {
+    fn print_bounds(
+        &self,
+        f: &mut Formatter<'_>,
+        names: &Names,
+        count: &mut ConstraintCounts,
+    ) -> fmt::Result {
         let (intervals, view, free) = (self.intervals(), self.qp.view(), self.free.count());
         for (i, name) in names.x.iter().enumerate() {
-            runs(f, name, 0..intervals + 1, count, |k| {
-                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.x_bounds(), i))
+            print_bounds_over_stages(f, name, 0..intervals + 1, count, |k| {
+                view.stage(k)
+                    .map_or(BoundPair::UNBOUNDED, |stage| BoundPair::from_bounds(&stage.x_bounds(), i))
             })?;
         }
         for (j, name) in names.u.iter().enumerate() {
-            runs(f, name, 0..intervals, count, |k| {
-                view.stage(k).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), free + j))
+            print_bounds_over_stages(f, name, 0..intervals, count, |k| {
+                view.stage(k)
+                    .map_or(BoundPair::UNBOUNDED, |stage| BoundPair::from_bounds(&stage.u_bounds(), free + j))
             })?;
         }
-        for w in P::Terminal::STARTS..free {
-            let sides = view.stage(0).map_or(Sides::NONE, |stage| Sides::of(&stage.u_bounds(), w));
-            sides.count(count);
-            if sides.has() != [false; 2] {
+        for w in P::Terminal::INITIAL_STATE_COPIES..free {
+            let sides = view
+                .stage(0)
+                .map_or(BoundPair::UNBOUNDED, |stage| BoundPair::from_bounds(&stage.u_bounds(), w));
+            sides.add_to_counts(count);
+            if sides.finite_sides() != [false; 2] {
                 f.write_str("         ")?;
-                sides.write(f, &self.name_of_free(w))?;
-                sides.write_penalties(f)?;
+                sides.print(f, &self.free_parameter_name(w))?;
+                sides.print_penalties(f)?;
                 writeln!(f)?;
             }
         }
         // Bounds in the QP are those of what is linear.
         let layout = self.layout();
-        let [lower, upper] = bounds::<P, T>(self.data.as_ref(), layout);
+        let [lower, upper] = constraint_bounds::<P, T>(self.data.as_ref(), layout);
         let constraint = |k: usize, row: usize| {
-            let place = k * path_rows::<P, T>(layout) + row;
-            let [lower, upper] = [lower, upper].map(|bounds| get(bounds, place).to_f64());
-            let of = |stage: Stage<'_, T>| Sides { lower, upper, ..Sides::of(&stage.g_bounds(), row) };
-            view.stage(k).map_or(Sides::NONE, of)
+            let row_index = k * path_row_count::<P, T>(layout) + row;
+            let [lower, upper] = [lower, upper].map(|bounds| get(bounds, row_index).to_f64());
+            let with_given_bounds = |stage: Stage<'_, T>| BoundPair {
+                lower,
+                upper,
+                ..BoundPair::from_bounds(&stage.g_bounds(), row)
+            };
+            view.stage(k).map_or(BoundPair::UNBOUNDED, with_given_bounds)
         };
         for row in 0..P::Path::ROWS {
-            let name = output::<P::Path, P::Shape, T>(row);
-            runs(f, &name, 0..intervals, count, |k| constraint(k, row))?;
+            let name = output_name::<P::Path, P::Shape, T>(row);
+            print_bounds_over_stages(f, &name, 0..intervals, count, |k| constraint(k, row))?;
         }
         #[cfg(feature = "alloc")]
-        for index in 0..layout.inner {
-            let name = self.inside_name(index).0;
-            runs(f, &name, 0..intervals, count, |k| constraint(k, node_rows::<P, T>() + index))?;
+        for index in 0..layout.inner_rows {
+            let name = self.inner_row_name_and_unit(index).0;
+            print_bounds_over_stages(f, &name, 0..intervals, count, |k| {
+                constraint(k, node_row_count::<P, T>() + index)
+            })?;
         }
         for row in 0..P::Terminal::ROWS {
-            let name = output::<P::Terminal, P::Shape, T>(row);
-            runs(f, &name, intervals..intervals + 1, count, |k| constraint(k, row))?;
+            let name = output_name::<P::Terminal, P::Shape, T>(row);
+            print_bounds_over_stages(f, &name, intervals..intervals + 1, count, |k| constraint(k, row))?;
         }
         Ok(())
     }
@@ -204,41 +224,41 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 /// What there is beside the dynamics.
 #[derive(Default)]
-struct Count {
+struct ConstraintCounts {
     equations: usize,
-    sides: usize,
+    bounds: usize,
     soft: usize,
 }
 
 /// The bounds of one variable at one stage, and their penalties.
 #[derive(Clone, Copy, PartialEq)]
-struct Sides {
+struct BoundPair {
     lower: f64,
     upper: f64,
     /// Linear and quadratic.
-    below: [f64; 2],
-    above: [f64; 2],
+    lower_penalty: [f64; 2],
+    upper_penalty: [f64; 2],
 }
 
-impl Sides {
-    const NONE: Self = Self {
+impl BoundPair {
+    const UNBOUNDED: Self = Self {
         lower: f64::NEG_INFINITY,
         upper: f64::INFINITY,
-        below: [f64::INFINITY, 0.0],
-        above: [f64::INFINITY, 0.0],
+        lower_penalty: [f64::INFINITY, 0.0],
+        upper_penalty: [f64::INFINITY, 0.0],
     };
 
-    fn of<T: Real>(bounds: &Bounds<'_, T>, index: usize) -> Self {
+    fn from_bounds<T: Real>(bounds: &Bounds<'_, T>, index: usize) -> Self {
         let at = |list: &[T]| get(list, index).to_f64();
         Self {
             lower: at(bounds.lower),
             upper: at(bounds.upper),
-            below: [at(bounds.lower_linear), at(bounds.lower_quadratic)],
-            above: [at(bounds.upper_linear), at(bounds.upper_quadratic)],
+            lower_penalty: [at(bounds.lower_linear), at(bounds.lower_quadratic)],
+            upper_penalty: [at(bounds.upper_linear), at(bounds.upper_quadratic)],
         }
     }
 
-    fn has(self) -> [bool; 2] {
+    fn finite_sides(self) -> [bool; 2] {
         [self.lower > f64::NEG_INFINITY, self.upper < f64::INFINITY]
     }
 
@@ -246,23 +266,23 @@ impl Sides {
         self.lower == self.upper
     }
 
-    fn soft(self) -> [bool; 2] {
-        let [below, above] = self.has();
-        [below && self.below[0] < f64::INFINITY, above && self.above[0] < f64::INFINITY]
+    fn soft_sides(self) -> [bool; 2] {
+        let [below, above] = self.finite_sides();
+        [below && self.lower_penalty[0] < f64::INFINITY, above && self.upper_penalty[0] < f64::INFINITY]
     }
 
-    fn count(self, count: &mut Count) {
+    fn add_to_counts(self, count: &mut ConstraintCounts) {
         if self.is_equation() {
             count.equations += 1;
         } else {
-            count.sides += self.has().into_iter().map(usize::from).sum::<usize>();
+            count.bounds += self.finite_sides().into_iter().map(usize::from).sum::<usize>();
         }
-        count.soft += self.soft().into_iter().map(usize::from).sum::<usize>();
+        count.soft += self.soft_sides().into_iter().map(usize::from).sum::<usize>();
     }
 
-    fn write(self, f: &mut Formatter<'_>, name: &dyn Display) -> fmt::Result {
+    fn print(self, f: &mut Formatter<'_>, name: &dyn Display) -> fmt::Result {
         let Self { lower, upper, .. } = self;
-        match self.has() {
+        match self.finite_sides() {
             _ if self.is_equation() => write!(f, "{name} = {lower}"),
             [true, true] => write!(f, "{lower} ≤ {name} ≤ {upper}"),
             [true, false] => write!(f, "{name} ≥ {lower}"),
@@ -270,20 +290,22 @@ impl Sides {
         }
     }
 
-    fn write_penalties(self, f: &mut Formatter<'_>) -> fmt::Result {
-        let has = self.has();
-        match self.soft() {
+    fn print_penalties(self, f: &mut Formatter<'_>) -> fmt::Result {
+        let has = self.finite_sides();
+        match self.soft_sides() {
             [false, false] => Ok(()),
-            [true, true] if self.below == self.above => penalty(f, "soft", self.below),
+            [true, true] if self.lower_penalty == self.upper_penalty => {
+                print_penalty(f, "soft", self.lower_penalty)
+            }
             // The only side there is.
-            [true, false] if !has[1] => penalty(f, "soft", self.below),
-            [false, true] if !has[0] => penalty(f, "soft", self.above),
+            [true, false] if !has[1] => print_penalty(f, "soft", self.lower_penalty),
+            [false, true] if !has[0] => print_penalty(f, "soft", self.upper_penalty),
             [below, above] => {
                 if below {
-                    penalty(f, "soft below", self.below)?;
+                    print_penalty(f, "soft below", self.lower_penalty)?;
                 }
                 if above {
-                    penalty(f, "soft above", self.above)?;
+                    print_penalty(f, "soft above", self.upper_penalty)?;
                 }
                 Ok(())
             }
@@ -291,7 +313,7 @@ impl Sides {
     }
 }
 
-fn penalty(f: &mut Formatter<'_>, what: &str, [linear, quadratic]: [f64; 2]) -> fmt::Result {
+fn print_penalty(f: &mut Formatter<'_>, what: &str, [linear, quadratic]: [f64; 2]) -> fmt::Result {
     write!(f, ", {what}: ")?;
     match (linear != 0.0, quadratic != 0.0) {
         (true, true) => write!(f, "{linear} e + ½ {quadratic} e²"),
@@ -301,47 +323,47 @@ fn penalty(f: &mut Formatter<'_>, what: &str, [linear, quadratic]: [f64; 2]) -> 
 }
 
 /// The bounds of a variable: a line for stages one after the other at which they are the same.
-fn runs(
+fn print_bounds_over_stages(
     f: &mut Formatter<'_>,
     name: &dyn Display,
     stages: Range<usize>,
-    count: &mut Count,
-    at: impl Fn(usize) -> Sides,
+    count: &mut ConstraintCounts,
+    bounds_at: impl Fn(usize) -> BoundPair,
 ) -> fmt::Result {
-    let (mut first, mut lines, mut left) = (stages.start, 0, 0);
+    let (mut first, mut lines, mut unlisted_stages) = (stages.start, 0, 0);
     while first < stages.end {
-        let sides = at(first);
-        let next = (first + 1..stages.end).find(|&k| at(k) != sides).unwrap_or(stages.end);
-        (first..next).for_each(|_| sides.count(count));
-        if sides.has() != [false; 2] {
-            if lines < RUNS {
+        let sides = bounds_at(first);
+        let next = (first + 1..stages.end).find(|&k| bounds_at(k) != sides).unwrap_or(stages.end);
+        (first..next).for_each(|_| sides.add_to_counts(count));
+        if sides.finite_sides() != [false; 2] {
+            if lines < MAX_LISTED_BOUNDS {
                 f.write_str("         ")?;
-                sides.write(f, name)?;
+                sides.print(f, name)?;
                 match next - first {
                     1 => write!(f, " at stage {first}")?,
                     _ => write!(f, " at stages {first}..={}", next - 1)?,
                 }
-                sides.write_penalties(f)?;
+                sides.print_penalties(f)?;
                 writeln!(f)?;
                 lines += 1;
             } else {
-                left += next - first;
+                unlisted_stages += next - first;
             }
         }
         first = next;
     }
-    match left {
+    match unlisted_stages {
         0 => Ok(()),
-        _ => writeln!(f, "         … and other bounds of {name} at {left} more stages"),
+        _ => writeln!(f, "         … and other bounds of {name} at {unlisted_stages} more stages"),
     }
 }
 
 /// Names, of many the first and the last ones.
-fn list(f: &mut Formatter<'_>, names: &[&str]) -> fmt::Result {
-    let half = NAMES / 2;
+fn print_names(f: &mut Formatter<'_>, names: &[&str]) -> fmt::Result {
+    let half = MAX_LISTED_NAMES / 2;
     for (i, name) in names.iter().enumerate() {
         let separator = if i == 0 { "" } else { ", " };
-        if names.len() <= NAMES || i < half || i + half >= names.len() {
+        if names.len() <= MAX_LISTED_NAMES || i < half || i + half >= names.len() {
             write!(f, "{separator}{name}")?;
         } else if i == half {
             write!(f, "{separator}…")?;
@@ -362,7 +384,7 @@ where
         f.debug_struct("Ocp")
             .field("model", &self.names().model)
             .field("intervals", &self.intervals())
-            .field("initial", &self.initial)
+            .field("initial", &self.initial_state)
             .field("iterate", &self.iterate)
             .finish_non_exhaustive()
     }

@@ -1,9 +1,9 @@
 //! What a problem consists of.
 
+use crate::ocp::formulation::functions::argument_checks::{HasArgumentsOf, IsConstraint, IsCost};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
-use crate::ocp::formulation::functions::fits::{HasArgumentsOf, IsConstraint, IsCost};
 use crate::scalar::Real;
 use crate::shape::Shape;
 

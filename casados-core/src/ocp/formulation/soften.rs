@@ -1,21 +1,21 @@
 //! Soft bounds of variables and constraints, by name, stage and side.
 
-use crate::ocp::formulation::check::{Labels, first, range};
+use crate::ocp::formulation::check::{Labels, first_stage, stage_range};
 use crate::ocp::formulation::error::{OcpError, Part, Text};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::{path_rows, split};
-use crate::ocp::formulation::instance::inside::inner_path_row;
-use crate::ocp::formulation::labels::output;
-use crate::ocp::formulation::limit::rows_of;
+use crate::ocp::formulation::instance::data::{path_row_count, split_data};
+use crate::ocp::formulation::instance::inner_points::inner_path_row;
+use crate::ocp::formulation::labels::output_name;
 use crate::ocp::formulation::problem::Formulation;
+use crate::ocp::formulation::variable_bounds::matching_inner_rows;
 use crate::qp::element::get;
 use crate::qp::{Side, StageDims};
 use crate::scalar::Real;
 use crate::structure::name_matches;
 use core::ops::RangeBounds;
 
-const BOTH: &[Side] = &[Side::Lower, Side::Upper];
+const BOTH_SIDES: &[Side] = &[Side::Lower, Side::Upper];
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes bounds soft, of states, controls or constraints: leaving one by `e` costs
@@ -37,7 +37,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         linear: T,
         quadratic: T,
     ) -> Result<&mut Self, OcpError> {
-        self.soften_sides(name, stages, BOTH, [linear, quadratic])
+        self.soften_sides(name, stages, BOTH_SIDES, [linear, quadratic])
     }
 
     /// As [`Ocp::soften`], of lower bounds alone.
@@ -98,19 +98,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         sides: &[Side],
         penalty: [T; 2],
     ) -> Result<&mut Self, OcpError> {
-        let known = self.names();
-        let is_variable =
-            known.x.iter().chain(known.u).chain(known.z).any(|variable| name_matches(name, variable));
-        let is_path = (0..P::Path::ROWS).any(|row| output::<P::Path, _, T>(row).is_meant(name));
-        let is_terminal = (0..P::Terminal::ROWS).any(|row| output::<P::Terminal, _, T>(row).is_meant(name));
-        let end = if !is_variable && (is_path || is_terminal) {
+        let model_names = self.names();
+        let is_variable = model_names
+            .x
+            .iter()
+            .chain(model_names.u)
+            .chain(model_names.z)
+            .any(|variable| name_matches(name, variable));
+        let is_path = (0..P::Path::ROWS).any(|row| output_name::<P::Path, _, T>(row).matches(name));
+        let is_terminal =
+            (0..P::Terminal::ROWS).any(|row| output_name::<P::Terminal, _, T>(row).matches(name));
+        let end_without_bound = if !is_variable && (is_path || is_terminal) {
             self.soften_constraints(name, &stages, [is_path, is_terminal], sides, penalty)?
         } else {
             self.soften_variables(name, &stages, sides, penalty)?
         };
-        match end {
+        match end_without_bound {
             None => Ok(self),
-            Some(end) => Err(OcpError::NoBound { name: Text::new(name), start: first(&stages), end }),
+            Some(end) => Err(OcpError::NoBound { name: Text::new(name), start: first_stage(&stages), end }),
         }
     }
 
@@ -122,30 +127,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         sides: &[Side],
         [linear, quadratic]: [T; 2],
     ) -> Result<Option<usize>, OcpError> {
-        let found = self.find(name, stages)?;
-        let (labels, index) = self.labels(name, first(stages));
+        let stages_by_kind = self.stages_of_name(name, stages)?;
+        let (labels, index) = self.labels_of_name(name, first_stage(stages));
         labels.check_penalty(index, linear, quadratic)?;
-        let of_rows = self.find_inside(name, stages, &found)?;
+        let row_stages = self.inner_row_stages(name, stages, &stages_by_kind)?;
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
-        let rows: &dyn Fn() -> _ = &|| rows_of::<P, T>(&self.inner, name);
-        let place = |k: usize, row: usize| k * path_rows::<P, T>(layout) + row;
-        let given = |side: &Side| if *side == Side::Lower { &*data.lower } else { &*data.upper };
-        let mut is_bounded = of_rows
-            .clone()
-            .any(|k| rows().any(|row| sides.iter().any(|side| get(given(side), place(k, row)).is_finite())));
-        self.each(name, found.clone(), |bounds, index| {
-            let of = |&side: &Side| if side == Side::Lower { &*bounds.lower } else { &*bounds.upper };
-            is_bounded |= sides.iter().map(of).any(|list| get(list, index).is_finite());
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
+        let rows: &dyn Fn() -> _ = &|| matching_inner_rows::<P, T>(&self.inner_points, name);
+        let row_index = |k: usize, row: usize| k * path_row_count::<P, T>(layout) + row;
+        let bounds_of_side = |side: &Side| if *side == Side::Lower { &*data.lower } else { &*data.upper };
+        let mut is_bounded = row_stages.clone().any(|k| {
+            rows()
+                .any(|row| sides.iter().any(|side| get(bounds_of_side(side), row_index(k, row)).is_finite()))
+        });
+        self.for_each_bound(name, stages_by_kind.clone(), |bounds, index| {
+            let bounds_of_side =
+                |&side: &Side| if side == Side::Lower { &*bounds.lower } else { &*bounds.upper };
+            is_bounded |= sides.iter().map(bounds_of_side).any(|list| get(list, index).is_finite());
         });
         if !is_bounded {
-            return Ok(found.iter().chain([&of_rows]).map(|range| range.end).max());
+            return Ok(stages_by_kind.iter().chain([&row_stages]).map(|range| range.end).max());
         }
-        self.each(name, found, |bounds, index| {
+        self.for_each_bound(name, stages_by_kind, |bounds, index| {
             sides.iter().for_each(|&side| bounds.soften_side(index, side, linear, quadratic));
         });
-        for (_, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| of_rows.contains(k)) {
-            for row in rows_of::<P, T>(&self.inner, name) {
+        for (_, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| row_stages.contains(k)) {
+            for row in matching_inner_rows::<P, T>(&self.inner_points, name) {
                 sides.iter().for_each(|&side| stage.g_bounds_mut().soften_side(row, side, linear, quadratic));
             }
         }
@@ -163,31 +170,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<Option<usize>, OcpError> {
         let last = self.intervals();
         let part = if is_path { Part::PathBounds } else { Part::TerminalBounds };
-        let range = range(part, stages, if is_terminal { last + 1 } else { last })?;
+        let range = stage_range(part, stages, if is_terminal { last + 1 } else { last })?;
         let row = match is_path {
-            true => (0..P::Path::ROWS).find(|&row| output::<P::Path, _, T>(row).is_meant(name)),
-            false => (0..P::Terminal::ROWS).find(|&row| output::<P::Terminal, _, T>(row).is_meant(name)),
+            true => (0..P::Path::ROWS).find(|&row| output_name::<P::Path, _, T>(row).matches(name)),
+            false => (0..P::Terminal::ROWS).find(|&row| output_name::<P::Terminal, _, T>(row).matches(name)),
         };
         let labels = Labels::constraints::<P, T>(part, range.start);
         labels.check_penalty(row.unwrap_or(0), linear, quadratic)?;
-        let (layout, points) = (self.layout(), self.inner.count());
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let (layout, points) = (self.layout(), self.inner_points.count());
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         let rows = |k: usize| {
             let count = if k == last { P::Terminal::ROWS } else { P::Path::ROWS };
             let points = if k == last { 0 } else { points };
-            let meant = (0..count).filter(move |&row| match k == last {
-                true => output::<P::Terminal, _, T>(row).is_meant(name),
-                false => output::<P::Path, _, T>(row).is_meant(name),
+            let matching_rows = (0..count).filter(move |&row| match k == last {
+                true => output_name::<P::Terminal, _, T>(row).matches(name),
+                false => output_name::<P::Path, _, T>(row).matches(name),
             });
             // At the node, and at every point.
-            let at = move |row: usize| (1..=points).map(move |point| inner_path_row::<P, T>(row, point));
-            meant.flat_map(move |row| core::iter::once(row).chain(at(row)))
+            let point_rows =
+                move |row: usize| (1..=points).map(move |point| inner_path_row::<P, T>(row, point));
+            matching_rows.flat_map(move |row| core::iter::once(row).chain(point_rows(row)))
         };
         let has_bound = |place: usize| {
-            let of = |&side: &Side| if side == Side::Lower { &*data.lower } else { &*data.upper };
-            sides.iter().map(of).any(|list| get(list, place).is_finite())
+            let bounds_of_side = |&side: &Side| if side == Side::Lower { &*data.lower } else { &*data.upper };
+            sides.iter().map(bounds_of_side).any(|list| get(list, place).is_finite())
         };
-        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * path_rows::<P, T>(layout) + row))) {
+        if !range.clone().any(|k| rows(k).any(|row| has_bound(k * path_row_count::<P, T>(layout) + row))) {
             return Ok(Some(range.end));
         }
         for (k, mut stage) in self.qp.stages_mut().enumerate().filter(|(k, _)| range.contains(k)) {

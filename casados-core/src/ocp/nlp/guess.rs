@@ -19,10 +19,10 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         &mut self,
         mut linearise: impl FnMut(&mut Self) -> Result<(), OcpError>,
         copy: &mut Solution<T, D, M>,
-        perturbs: bool,
+        may_perturb: bool,
     ) -> Result<bool, OcpError> {
         let Err(error) = linearise(self) else {
-            if !perturbs {
+            if !may_perturb {
                 return Ok(false);
             }
             return self.leave_degenerate_start(copy, linearise);
@@ -31,7 +31,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             return Err(error);
         }
         copy.copy_from(&self.iterate);
-        self.clip();
+        self.clip_to_bounds();
         let result = linearise(self);
         if result.is_err() {
             self.iterate.copy_from(copy);
@@ -40,7 +40,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 
     /// Moves states and controls of the iterate into their bounds.
-    pub(in crate::ocp) fn clip(&mut self) {
+    pub(in crate::ocp) fn clip_to_bounds(&mut self) {
         let Self { qp, iterate, .. } = self;
         for (k, stage) in qp.view().stages().enumerate() {
             let Some(point) = iterate.stage_mut(k) else { return };

@@ -111,8 +111,8 @@ impl<T> StartOutcome<T> {
         }
     }
     fn compare(&self, other: &Self) -> Ordering {
-        let ((kind, value), (of_other, against)) = (self.rank(), other.rank());
-        kind.cmp(&of_other).then(value.total_cmp(&against)).then(self.start.cmp(&other.start))
+        let ((kind, value), (other_kind, other_value)) = (self.rank(), other.rank());
+        kind.cmp(&other_kind).then(value.total_cmp(&other_value)).then(self.start.cmp(&other.start))
     }
 }
 
@@ -163,9 +163,9 @@ impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
     where
         S: FnMut(&mut Self) -> Result<Outcome, OcpError>,
     {
-        let model = &*self;
-        let share = |thread: usize, threads: usize| -> Result<Vec<StartOutcome<T>>, OcpError> {
-            let mut ocp = model.clone();
+        let template = &*self;
+        let solve_share = |thread: usize, threads: usize| -> Result<Vec<StartOutcome<T>>, OcpError> {
+            let mut ocp = template.clone();
             let mut solve = solver(&ocp)?;
             let mut outcomes = Vec::new();
             for start in (thread..starts).step_by(threads) {
@@ -174,7 +174,7 @@ impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
             }
             Ok(outcomes)
         };
-        let mut ranked = on_threads(starts, share)?;
+        let mut ranked = run_on_threads(starts, solve_share)?;
         ranked.sort_by(StartOutcome::compare);
         if let Some(best) = ranked.first() {
             self.iterate.copy_from(&best.solution);
@@ -185,19 +185,19 @@ impl<P: Formulation<T> + Clone + Send + Sync, T: Real> HeapOcp<P, T> {
 
 /// All shares of the threads that there are.
 #[cfg(feature = "parallel")]
-fn on_threads<R: Send>(
+fn run_on_threads<R: Send>(
     starts: usize,
-    share: impl Fn(usize, usize) -> Result<Vec<R>, OcpError> + Sync,
+    solve_share: impl Fn(usize, usize) -> Result<Vec<R>, OcpError> + Sync,
 ) -> Result<Vec<R>, OcpError> {
     use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
     let threads = rayon::current_num_threads().min(starts).max(1);
-    let shares = (0..threads).into_par_iter().map(|thread| share(thread, threads));
+    let shares = (0..threads).into_par_iter().map(|thread| solve_share(thread, threads));
     Ok(shares.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 /// The share of the only thread.
 #[cfg(not(feature = "parallel"))]
-fn on_threads<R>(
+fn run_on_threads<R>(
     _starts: usize,
     share: impl Fn(usize, usize) -> Result<Vec<R>, OcpError>,
 ) -> Result<Vec<R>, OcpError> {

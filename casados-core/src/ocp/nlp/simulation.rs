@@ -2,15 +2,15 @@
 
 use crate::integrator::Integrator;
 use crate::model::Dae;
-use crate::ocp::dynamics::begin::{Begin, at};
+use crate::ocp::dynamics::interval_setup::{IntervalSetup, in_interval};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, vector};
-use crate::ocp::formulation::instance::data::{Layout, inputs, split};
-use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::instance::data::{Layout, split_data, stage_variable_count};
+use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::Program;
-use crate::ocp::nlp::degenerate::Perturbed;
+use crate::ocp::nlp::degenerate_start::PerturbedVariables;
 use crate::qp::{Places, Solution, StageDims, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -23,16 +23,16 @@ pub(in crate::ocp) const MAX_SIMULATED_VIOLATION: f64 = 1e3;
 
 /// Violations that are no smaller than that, beside those of a simulation with the controls of the
 /// guess, are those of the guess.
-pub(in crate::ocp) const VIOLATION_OF_GUESS: f64 = 1.1;
+pub(in crate::ocp) const GUESS_VIOLATION_RATIO: f64 = 1.1;
 
 /// Where a second run begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::ocp) enum SecondStart {
+pub(in crate::ocp) enum RestartPoint {
     /// At a simulation with the controls of the guess.
-    Simulated,
+    Simulation,
     /// At one with controls beside them: where violations are stationary, but not smallest, at what
     /// follows from the guess.
-    Perturbed,
+    PerturbedSimulation,
 }
 /// It asks for one after so many steps in a row that lead nowhere.
 pub(in crate::ocp) const RESTART_AFTER: usize = 16;
@@ -45,19 +45,19 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         &mut self,
         guess: &mut Solution<T, D, M>,
         ends: &mut [T],
-        start: SecondStart,
+        start: RestartPoint,
     ) -> bool {
         core::mem::swap(&mut self.iterate, guess);
-        self.clip();
-        if start == SecondStart::Perturbed {
-            self.perturb(Perturbed::Controls);
+        self.clip_to_bounds();
+        if start == RestartPoint::PerturbedSimulation {
+            self.perturb_variables(PerturbedVariables::Controls);
         }
         core::mem::swap(&mut self.iterate, guess);
-        let has_values = self.simulate(guess, ends, &[], f64::INFINITY);
+        let has_values = self.close_gaps_by_simulation(guess, ends, &[], f64::INFINITY);
         if has_values {
             core::mem::swap(&mut self.iterate, guess);
-            self.join_controls();
-            self.join_states();
+            self.equalise_shared_controls();
+            self.equalise_periodic_states();
         }
         has_values
     }
@@ -65,38 +65,38 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// Moves the states of a point to the ends of the intervals before them, until all gaps are
     /// closed. Whether that has values, and ends no farther away than `far` times the gaps that
     /// there were, in `units` if there are any.
-    pub(in crate::ocp) fn simulate(
+    pub(in crate::ocp) fn close_gaps_by_simulation(
         &mut self,
-        at: &mut Solution<T, D, M>,
+        point: &mut Solution<T, D, M>,
         ends: &mut [T],
         units: &[T],
-        far: f64,
+        max_displacement_ratio: f64,
     ) -> bool {
-        self.has_algebraic = false;
-        let (mut farthest, mut gaps) = (0.0, 0.0);
-        for pass in 0..=self.intervals() {
-            if self.evaluate(at, ends).is_err() {
+        self.algebraic_is_current = false;
+        let (mut displacement, mut gaps) = (0.0, 0.0);
+        for sweep in 0..=self.intervals() {
+            if self.evaluate(point, ends).is_err() {
                 return false;
             }
-            let mut moved = 0.0;
-            let (v, mut behind) = (at.view_mut().v, &*ends);
+            let mut sweep_displacement = 0.0;
+            let (v, mut remaining_ends) = (point.view_mut().v, &*ends);
             for place in Places::<T>::new(self.qp().dims).skip(1) {
-                let (ends, next) = behind.split_at_checked(place.nx).unwrap_or_default();
-                behind = next;
+                let (ends, next) = remaining_ends.split_at_checked(place.nx).unwrap_or_default();
+                remaining_ends = next;
                 for (i, (x, &end)) in part_mut(v, place.v, place.nx).iter_mut().zip(ends).enumerate() {
                     let unit = units.get(place.row + i).copied().unwrap_or(T::ONE);
-                    moved += ((end - *x) / unit).abs().to_f64();
+                    sweep_displacement += ((end - *x) / unit).abs().to_f64();
                     *x = end;
                 }
             }
-            if pass == 0 {
-                gaps = moved;
+            if sweep == 0 {
+                gaps = sweep_displacement;
             }
-            farthest += moved;
-            if farthest > far * gaps || !farthest.is_finite() {
+            displacement += sweep_displacement;
+            if displacement > max_displacement_ratio * gaps || !displacement.is_finite() {
                 return false;
             }
-            if moved == 0.0 {
+            if sweep_displacement == 0.0 {
                 break;
             }
         }
@@ -146,14 +146,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         self.roll_out(|ocp, k, end| {
             let layout @ Layout { intervals, .. } = ocp.layout();
-            let data = split::<P, T>(ocp.data.as_mut(), layout);
+            let data = split_data::<P, T>(ocp.data.as_mut(), layout);
             let (v, _) = ocp.iterate.variables_and_costates();
-            let (ld, np) = (padded_len::<T>(inputs::<P::Shape>(layout.free)), P::Shape::NP);
+            let (ld, np) =
+                (padded_len::<T>(stage_variable_count::<P::Shape>(layout.free_count)), P::Shape::NP);
             // Of two intervals, since the last one of a horizon may end with a map.
             let times = data.times.get(k..(k + 3).min(intervals + 1)).unwrap_or_default();
             let (v, p) = (v.get(k * ld..).unwrap_or_default(), data.p.get(k * np..).unwrap_or_default());
             let mut has_end = false;
-            let nodes = nodes::<P::Shape, T>(v, &[], &[], (p, ocp.free.view()), times);
+            let nodes = interval_nodes::<P::Shape, T>(v, &[], &[], (p, ocp.free.view()), times);
             let Problem { dynamics, .. } = ocp.problem.parts();
             let result = dynamics.simulate(&nodes, &mut |interval, step| {
                 if interval == 0 {
@@ -194,13 +195,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         self.roll_out(|ocp, k, end| {
             let layout = ocp.layout();
-            let data = split::<P, T>(ocp.data.as_mut(), layout);
+            let data = split_data::<P, T>(ocp.data.as_mut(), layout);
             let (v, _) = ocp.iterate.variables_and_costates();
-            let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, ocp.free.view()), data.times);
+            let nodes = interval_nodes::<P::Shape, T>(v, &[], &[], (data.p, ocp.free.view()), data.times);
             let Some(interval) = nodes.iter().nth(k) else { return Ok(()) };
-            at(k, integrator.begin(&interval))?;
+            in_interval(k, integrator.begin(&interval))?;
             let result = integrator.solve(&vector(interval.x), &vector(interval.u), interval.h);
-            copy_common(end, at(k, result)?.x.as_slice());
+            copy_common(end, in_interval(k, result)?.x.as_slice());
             Ok(())
         })
     }
@@ -211,25 +212,25 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         mut integrate: impl FnMut(&mut Self, usize, &mut [T]) -> Result<(), OcpError>,
     ) -> Result<&mut Self, OcpError> {
         self.check()?;
-        self.clip();
-        self.join_controls();
+        self.clip_to_bounds();
+        self.equalise_shared_controls();
         self.iterate.multipliers_mut().fill(T::ZERO);
-        self.has_algebraic = false;
+        self.algebraic_is_current = false;
         let mut memory = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         let end = part_mut(memory.as_mut(), 0, P::Shape::NX);
         for interval in 0..self.intervals() {
-            integrate(self, interval, end).map_err(|error| self.end_of_simulation(interval, error))?;
+            integrate(self, interval, end).map_err(|error| self.simulation_error(interval, error))?;
             Labels::states::<P, T>(Part::States, interval + 1).check_finite(end)?;
             if let Some(next) = self.iterate.stage_mut(interval + 1) {
                 copy_common(next.x, end);
             }
         }
-        self.join_states();
+        self.equalise_periodic_states();
         Ok(self)
     }
 
     /// The error of an interval, with the largest state at its start.
-    fn end_of_simulation(&self, interval: usize, error: OcpError) -> OcpError {
+    fn simulation_error(&self, interval: usize, error: OcpError) -> OcpError {
         let OcpError::Integration { error, .. } = error else { return error };
         let x = self.iterate.stage(interval).map_or(&[][..], |stage| stage.x);
         let names = <P::Dynamics as Dynamics<T>>::NAMES.x;

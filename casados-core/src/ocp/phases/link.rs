@@ -2,9 +2,11 @@
 
 use crate::function::{ArrayV, Function};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::constraint::{Constraint, Constraints, Spot};
-use crate::ocp::formulation::functions::point::{Terms, There, read};
+use crate::ocp::formulation::free_parameters::FreeParametersView;
+use crate::ocp::formulation::functions::constraint::{Constraint, ConstraintContext, Constraints};
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, QuadraticTerms, write_variables,
+};
 use crate::qp::element::set;
 use crate::qp::{copy_common, part_mut};
 use crate::scalar::Real;
@@ -20,7 +22,7 @@ pub struct PhaseEnd<'a, T> {
     pub(in crate::ocp) x: &'a [T],
     /// Free parameters, and where they are among those of the model.
     pub(in crate::ocp) w: &'a [T],
-    pub(in crate::ocp) free: Free<'a>,
+    pub(in crate::ocp) free: FreeParametersView<'a>,
     /// The parameters that were set.
     pub(in crate::ocp) p: &'a [T],
     pub(in crate::ocp) t: T,
@@ -31,11 +33,11 @@ pub struct PhaseEnd<'a, T> {
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseDims {
     /// `NX`, `NU`, `NP`, `NZ` of the phase that ends.
-    pub(in crate::ocp) ends: [usize; 4],
+    pub(in crate::ocp) ending_dims: [usize; 4],
     /// States of the phase that ends, and of the one that begins, without linear controls and
     /// integrals.
-    pub(in crate::ocp) own: usize,
-    pub(in crate::ocp) begins: usize,
+    pub(in crate::ocp) model_states: usize,
+    pub(in crate::ocp) next_states: usize,
     /// The last stage of the phase that ends, and whether its time is known there.
     pub(in crate::ocp) stage: usize,
     pub(in crate::ocp) is_timed: bool,
@@ -71,7 +73,7 @@ pub trait Link<T: Real> {
     ) -> Result<(), OcpError>;
     /// Adds its second derivatives with these multipliers.
     #[doc(hidden)]
-    fn curve(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut Terms<'_, T>);
+    fn add_hessian(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut QuadraticTerms<'_, T>);
 }
 
 /// The states go on as they are.
@@ -94,7 +96,7 @@ impl<T: Real> Link<T> for Continuous {
         true
     }
     fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
-        mismatch("Continuous", "output", [dims.begins, dims.own])
+        check_dimension("Continuous", "output", [dims.next_states, dims.model_states])
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
         copy_common(values, end.x);
@@ -110,7 +112,7 @@ impl<T: Real> Link<T> for Continuous {
         (0..values.len()).for_each(|i| set(columns, i * ld + i, T::ONE));
         Ok(())
     }
-    fn curve(&mut self, _: PhaseEnd<'_, T>, _: &[T], _: &mut Terms<'_, T>) {}
+    fn add_hessian(&mut self, _: PhaseEnd<'_, T>, _: &[T], _: &mut QuadraticTerms<'_, T>) {}
 }
 
 /// The states of the next phase are a function of the states and parameters at the end of a phase:
@@ -147,10 +149,10 @@ impl<F: Function, T: Real> Jump<F, T> {
         Self { function, v: Zeroable::zeroed() }
     }
 
-    fn read(&mut self, PhaseEnd { x, w, free, p, t, .. }: PhaseEnd<'_, T>) {
+    fn load_variables(&mut self, PhaseEnd { x, w, free, p, t, .. }: PhaseEnd<'_, T>) {
         let begin = 2 * F::Shape::NX + F::Shape::NZ + F::Shape::NU;
-        read::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
-        free.write(part_mut(self.v.as_mut(), begin, F::Shape::NP), w);
+        write_variables::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
+        free.write_parameters(part_mut(self.v.as_mut(), begin, F::Shape::NP), w);
     }
 }
 
@@ -174,19 +176,19 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
         F::STRUCTURE.hessian.is_empty()
     }
     fn check(&self, dims: PhaseDims) -> Result<(), OcpError> {
-        let own = [F::Shape::NX, F::Shape::NU, F::Shape::NP, F::Shape::NZ];
+        let function_dims = [F::Shape::NX, F::Shape::NU, F::Shape::NP, F::Shape::NZ];
         let name = F::STRUCTURE.name;
         for (argument, (expected, found)) in
-            ["x", "u", "p", "z"].into_iter().zip(dims.ends.into_iter().zip(own))
+            ["x", "u", "p", "z"].into_iter().zip(dims.ending_dims.into_iter().zip(function_dims))
         {
-            mismatch(name, argument, [expected, found])?;
+            check_dimension(name, argument, [expected, found])?;
         }
-        mismatch(name, "output", [dims.begins, F::Outputs::NY])?;
-        There { z: false, u: false, stage: dims.stage, t: dims.is_timed }.check::<F>()
+        check_dimension(name, "output", [dims.next_states, F::Outputs::NY])?;
+        AvailableVariables { z: false, u: false, stage: dims.stage, t: dims.is_timed }.check::<F>()
     }
     fn value(&mut self, end: PhaseEnd<'_, T>, values: &mut [T]) -> Result<(), OcpError> {
-        self.read(end);
-        self.function.value(&self.v, values, Spot::new(end.stage, end.free, &[]))
+        self.load_variables(end);
+        self.function.value(&self.v, values, ConstraintContext::new(end.stage, end.free, &[]))
     }
     fn linearise(
         &mut self,
@@ -194,17 +196,32 @@ impl<F: Function, T: Real> Link<T> for Jump<F, T> {
         values: &mut [T],
         (columns, ld): (&mut [T], usize),
     ) -> Result<(), OcpError> {
-        self.read(end);
-        self.function.linearise(&self.v, values, columns, ld, Spot::new(end.stage, end.free, &[]))
+        self.load_variables(end);
+        self.function.linearise(
+            &self.v,
+            values,
+            columns,
+            ld,
+            ConstraintContext::new(end.stage, end.free, &[]),
+        )
     }
-    fn curve(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut Terms<'_, T>) {
-        self.read(end);
-        self.function.curve(&self.v, multipliers, Spot::new(end.stage, end.free, &[]), terms);
+    fn add_hessian(&mut self, end: PhaseEnd<'_, T>, multipliers: &[T], terms: &mut QuadraticTerms<'_, T>) {
+        self.load_variables(end);
+        self.function.add_hessian(
+            &self.v,
+            multipliers,
+            ConstraintContext::new(end.stage, end.free, &[]),
+            terms,
+        );
     }
 }
 
 /// # Errors
 /// [`OcpError::LinkDimension`]
-fn mismatch(link: &'static str, what: &'static str, [expected, found]: [usize; 2]) -> Result<(), OcpError> {
+fn check_dimension(
+    link: &'static str,
+    what: &'static str,
+    [expected, found]: [usize; 2],
+) -> Result<(), OcpError> {
     if expected == found { Ok(()) } else { Err(OcpError::LinkDimension { link, what, expected, found }) }
 }

@@ -17,7 +17,7 @@
 mod link;
 mod phase;
 mod program;
-mod transfer;
+mod stage_conversion;
 
 pub use link::{Continuous, Jump, Link};
 #[doc(hidden)]
@@ -25,10 +25,10 @@ pub use link::{PhaseDims, PhaseEnd};
 pub use program::PhaseDynamics;
 
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::FreeParameters;
+use crate::ocp::formulation::free_parameters::FreeParameters;
 use crate::ocp::formulation::functions::dynamics::SecondOrder;
-use crate::ocp::formulation::instance::inside::InnerPoints;
-use crate::ocp::formulation::instance::{HeapOcp, Initial, Ocp};
+use crate::ocp::formulation::instance::inner_points::InnerPoints;
+use crate::ocp::formulation::instance::{HeapOcp, InitialState, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::ends;
 use crate::qp::{
@@ -39,8 +39,8 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
-use phase::{Phase, Size};
-use transfer::Place;
+use phase::{Phase, PhaseSize};
+use stage_conversion::StagePosition;
 
 /// Problems that follow one another, solved as one: other models, other horizons, other controls.
 ///
@@ -96,24 +96,24 @@ use transfer::Place;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Phases<'a, T = f64> {
-    phases: Vec<Joined<'a, T>>,
+    phases: Vec<JoinedPhase<'a, T>>,
     /// A point that is tried, as one of each phase; none before they are joined.
-    trials: Vec<Trial<T>>,
+    trial_points: Vec<TrialPoint<T>>,
     /// The first state of all, as far as it is given.
-    start: Vec<T>,
+    initial_state: Vec<T>,
 }
 
 /// A point of a phase, and the ends of its intervals and constraints there.
-struct Trial<T> {
-    at: HeapSolution<T>,
+struct TrialPoint<T> {
+    point: HeapSolution<T>,
     ends: Vec<T>,
 }
 
 /// A phase, and what follows it.
-struct Joined<'a, T> {
+struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
     link: Option<Box<dyn Link<T> + 'a>>,
-    size: Size,
+    size: PhaseSize,
     /// The first of its stages among all.
     first: usize,
 }
@@ -130,7 +130,7 @@ impl<'a, T: Real> Phases<'a, T> {
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
     {
-        Self { phases: vec![Joined::new(first)], trials: Vec::new(), start: Vec::new() }
+        Self { phases: vec![JoinedPhase::new(first)], trial_points: Vec::new(), initial_state: Vec::new() }
     }
 
     /// With another phase, which begins where the link says.
@@ -142,7 +142,7 @@ impl<'a, T: Real> Phases<'a, T> {
         if let Some(last) = self.phases.last_mut() {
             last.link = Some(Box::new(link));
         }
-        self.phases.push(Joined::new(next));
+        self.phases.push(JoinedPhase::new(next));
         self
     }
 
@@ -159,40 +159,42 @@ impl<'a, T: Real> Phases<'a, T> {
     pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
-        let mut decided: Vec<usize> = self.phases.iter().map(|phase| phase.size.decided()).collect();
-        decided.push(0);
-        let mut decided = decided.into_iter();
+        let mut start_variables: Vec<usize> =
+            self.phases.iter().map(|phase| phase.size.start_variable_count()).collect();
+        start_variables.push(0);
+        let mut decided = start_variables.into_iter();
         dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
         for (phase, decided) in self.phases.iter_mut().zip(decided) {
             phase.first = dims.len();
-            let of_phase = phase.problem.qp().dims();
-            try_reserve(&mut dims, of_phase.len())?;
+            let phase_dims = phase.problem.qp().dims();
+            try_reserve(&mut dims, phase_dims.len())?;
             let (nx, free) = (phase.size.nx, phase.size.free);
-            dims.extend(of_phase.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
+            dims.extend(phase_dims.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
                 last.nu = decided;
             }
-            try_reserve(&mut self.trials, 1)?;
-            self.trials.push(Trial { at: Solution::new(of_phase)?, ends: zeros(ends(of_phase))? });
+            try_reserve(&mut self.trial_points, 1)?;
+            self.trial_points
+                .push(TrialPoint { point: Solution::new(phase_dims)?, ends: zeros(ends(phase_dims))? });
         }
-        let (rows, scratch) = (dims.iter().map(|stage| stage.ng).sum::<usize>(), scratch::<T>(&dims));
+        let (rows, scratch) = (dims.iter().map(|stage| stage.ng).sum::<usize>(), scratch_len::<T>(&dims));
         let mut ocp = Ocp {
             qp: Qp::new(&dims)?,
             iterate: Solution::new(&dims)?,
             data: zeros(2 * rows + scratch)?,
             // The start has no states.
-            initial: Initial::Fixed,
+            initial_state: InitialState::Fixed,
             problem: self,
             objective: T::ZERO,
-            stages: [T::ZERO; 2],
+            stage_residuals: [T::ZERO; 2],
             free: FreeParameters::default(),
-            inner: InnerPoints::default(),
+            inner_points: InnerPoints::default(),
             step_length: None,
-            has_algebraic: false,
+            algebraic_is_current: false,
         };
         let Ocp { problem, qp, iterate, data, .. } = &mut ocp;
         problem.write_bounds(qp, data.get_mut(..2 * rows).unwrap_or_default());
-        problem.store(iterate);
+        problem.store_iterates(iterate);
         Ok(ocp)
     }
 
@@ -200,26 +202,27 @@ impl<'a, T: Real> Phases<'a, T> {
     /// Those of [`Phases::join`].
     fn check(&mut self) -> Result<(), OcpError> {
         for (index, phase) in self.phases.iter_mut().enumerate() {
-            if let Some(what) = phase.problem.refused(index == 0) {
+            if let Some(what) = phase.problem.unsupported_feature(index == 0) {
                 return Err(OcpError::Phase { phase: index, model: phase.problem.names().model, what });
             }
             phase.problem.check()?;
             phase.size = phase.problem.size();
-            phase.size.given = if index == 0 { phase.size.given } else { phase.size.own };
+            phase.size.given_states =
+                if index == 0 { phase.size.given_states } else { phase.size.model_states };
         }
-        self.start = self.given_start()?;
+        self.initial_state = self.given_initial_state()?;
         for (phase, next) in self.phases.iter().zip(self.phases.iter().skip(1)) {
             if let Some(link) = &phase.link {
-                link.check(phase.problem.dims(next.size.own))?;
+                link.check(phase.problem.link_dims(next.size.model_states))?;
             }
         }
         Ok(())
     }
 
     /// The first state of all, as far as it is given.
-    fn given_start(&self) -> Result<Vec<T>, OcpError> {
-        let Some(Joined { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
-        let mut start = zeros(size.given)?;
+    fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
+        let Some(JoinedPhase { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let mut start = zeros(size.given_states)?;
         if let Some(first) = problem.qp().stage(0) {
             copy_common(&mut start, first.x_bounds().lower);
         }
@@ -227,12 +230,12 @@ impl<'a, T: Real> Phases<'a, T> {
     }
 
     /// How large the phase behind each one is.
-    fn nexts(&self) -> Vec<Option<Size>> {
+    fn next_sizes(&self) -> Vec<Option<PhaseSize>> {
         self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
     }
 
     /// The phase of a stage of the whole; none of the start.
-    fn at(&self, stage: usize) -> Option<(usize, &Joined<'a, T>)> {
+    fn at(&self, stage: usize) -> Option<(usize, &JoinedPhase<'a, T>)> {
         self.phases.iter().enumerate().rev().find(|(_, phase)| phase.first <= stage)
     }
 
@@ -241,24 +244,24 @@ impl<'a, T: Real> Phases<'a, T> {
     fn write_bounds(&mut self, qp: &mut Qp<T, Vec<StageDims>, Vec<T>>, given: &mut [T]) {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
-        let mut before = stages.next();
-        for (index, Joined { problem, size, .. }) in self.phases.iter_mut().enumerate() {
+        let mut previous_stage = stages.next();
+        for (index, JoinedPhase { problem, size, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
                 if k == 0
-                    && let Some(mut before) = before.take()
+                    && let Some(mut previous) = previous_stage.take()
                 {
-                    transfer::decided_bounds(*size, &from, &mut before);
+                    stage_conversion::write_start_variable_bounds(*size, &from, &mut previous);
                 }
                 let Some(mut to) = stages.next() else { return };
-                let place = match (index, k) {
-                    (0, 0) => Place::Start,
-                    (_, 0) => Place::Begin,
-                    _ => Place::Inside,
+                let position = match (index, k) {
+                    (0, 0) => StagePosition::FirstStage,
+                    (_, 0) => StagePosition::PhaseStart,
+                    _ => StagePosition::InteriorStage,
                 };
-                transfer::bounds(*size, &from, &mut to, place);
-                before = Some(to);
+                stage_conversion::copy_stage_bounds(*size, &from, &mut to, position);
+                previous_stage = Some(to);
             }
-            for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given()) {
+            for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given_constraint_bounds()) {
                 let (own, behind) = core::mem::take(to).split_at_mut(from.len());
                 own.copy_from_slice(from);
                 *to = behind;
@@ -267,21 +270,22 @@ impl<'a, T: Real> Phases<'a, T> {
     }
 
     /// The iterates of all phases as that of the whole.
-    fn store(&self, to: &mut HeapSolution<T>) {
-        let firsts = || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
-        let nexts = firsts().skip(1).map(Some).chain([None]);
+    fn store_iterates(&self, to: &mut HeapSolution<T>) {
+        let first_stages =
+            || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
+        let nexts = first_stages().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
             let next = next.and_then(|(size, first)| Some((size, first?)));
             let last = phase.size.intervals;
             let stages = phase.problem.iterate().stages().enumerate();
             stages.map(move |(k, stage)| (phase.size, stage, next.filter(|_| k == last)))
         });
-        let mut start = firsts().next().and_then(|(size, first)| Some((size, first?)));
+        let mut start = first_stages().next().and_then(|(size, first)| Some((size, first?)));
         to.each_stage_mut(|to| {
             if let Some((size, first)) = start.take() {
-                transfer::decide(size, &first, to.u, to.u_lower, to.u_upper);
+                stage_conversion::write_start_variables(size, &first, to.u, to.u_lower, to.u_upper);
             } else if let Some((size, from, next)) = stages.next() {
-                transfer::store(size, &from, to, next);
+                stage_conversion::store_phase_stage(size, &from, to, next);
             }
         });
     }
@@ -289,13 +293,13 @@ impl<'a, T: Real> Phases<'a, T> {
     /// The part of each phase in a point of the whole, as its iterate.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
-        for Joined { problem, size, .. } in &mut self.phases {
-            before = transfer::load(*size, &mut stages, problem.iterate_mut(), before);
+        for JoinedPhase { problem, size, .. } in &mut self.phases {
+            before = stage_conversion::load_phase(*size, &mut stages, problem.iterate_mut(), before);
         }
     }
 }
 
-impl<'a, T: Real> Joined<'a, T> {
+impl<'a, T: Real> JoinedPhase<'a, T> {
     fn new<P>(problem: &'a mut HeapOcp<P, T>) -> Self
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
@@ -306,7 +310,7 @@ impl<'a, T: Real> Joined<'a, T> {
 }
 
 /// Room for two matrices and a vector over the variables of a stage, or for four vectors.
-fn scratch<T>(dims: &[StageDims]) -> usize {
+fn scratch_len<T>(dims: &[StageDims]) -> usize {
     let of_stage = |stage: &StageDims| {
         let n = stage.nx + stage.nu;
         (2 * n + 4) * padded_len::<T>(n)

@@ -3,7 +3,7 @@
 use super::link::{PhaseDims, PhaseEnd};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
-use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Convexification;
@@ -25,51 +25,51 @@ pub(super) struct Kind {
 
 /// How large a phase is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Size {
+pub(super) struct PhaseSize {
     /// States.
     pub nx: usize,
     /// Free parameters.
     pub free: usize,
     /// States without linear controls and integrals.
-    pub own: usize,
+    pub model_states: usize,
     /// Linear controls.
-    pub linear: usize,
+    pub linear_controls: usize,
     /// States whose start the link says; those up to `own + linear` behind them are decided.
-    pub given: usize,
+    pub given_states: usize,
     pub intervals: usize,
 }
 
-impl Size {
+impl PhaseSize {
     /// The states that are decided where the phase begins.
-    pub fn states(&self) -> Range<usize> {
-        self.given..self.own + self.linear
+    pub fn free_start_states(&self) -> Range<usize> {
+        self.given_states..self.model_states + self.linear_controls
     }
 
     /// How much is decided there: these states, then the parameters.
-    pub fn decided(&self) -> usize {
-        self.states().len() + self.free
+    pub fn start_variable_count(&self) -> usize {
+        self.free_start_states().len() + self.free
     }
 }
 
 /// A phase, whatever its problem is.
 pub(super) trait Phase<T: Real> {
-    fn size(&self) -> Size;
+    fn size(&self) -> PhaseSize;
     fn names(&self) -> Names;
     /// What a link at its end is to fit that leads to so many states.
-    fn dims(&self, begins: usize) -> PhaseDims;
+    fn link_dims(&self, begins: usize) -> PhaseDims;
     /// What a phase cannot be, of the first one or of another; then its start is free.
-    fn refused(&mut self, is_first: bool) -> Option<&'static str>;
+    fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str>;
     fn check(&mut self) -> Result<(), OcpError>;
     fn qp(&self) -> QpView<'_, T>;
     fn iterate(&self) -> &HeapSolution<T>;
     fn iterate_mut(&mut self) -> &mut HeapSolution<T>;
     /// Bounds of constraints as they were given.
-    fn given(&mut self) -> [&[T]; 2];
+    fn given_constraint_bounds(&mut self) -> [&[T]; 2];
     /// Writes the QP at the iterate; the objective.
     fn linearise(&mut self, kind: Kind) -> Result<T, OcpError>;
-    fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
+    fn evaluate(&mut self, trial_point: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
     /// The end at this point of the last stage.
-    fn end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
+    fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
     fn derivative(&self, error: &QpError) -> Option<OcpError>;
     fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>);
@@ -77,40 +77,44 @@ pub(super) trait Phase<T: Real> {
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// The first state of the iterate, as far as it is given.
-    fn begin_where_it_is_given(&mut self) {
-        let own = self.names().own_states();
+    fn set_given_initial_state(&mut self) {
+        let model_states = self.names().model_state_count();
         let (Some(bounds), Some(first)) = (self.qp.view().stage(0), self.iterate.stage_mut(0)) else {
             return;
         };
-        copy_common(first.x.get_mut(..own).unwrap_or_default(), bounds.x_bounds().lower);
+        copy_common(first.x.get_mut(..model_states).unwrap_or_default(), bounds.x_bounds().lower);
     }
 }
 
 impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<P, T> {
-    fn size(&self) -> Size {
+    fn size(&self) -> PhaseSize {
         let names = self.names();
-        Size {
+        PhaseSize {
             nx: P::Shape::NX,
             free: self.free.count(),
-            own: names.own_states(),
-            linear: names.linear.len(),
-            given: if self.initial == Initial::Free { 0 } else { names.own_states() },
+            model_states: names.model_state_count(),
+            linear_controls: names.linear.len(),
+            given_states: if self.initial_state == InitialState::Free {
+                0
+            } else {
+                names.model_state_count()
+            },
             intervals: self.intervals(),
         }
     }
     fn names(&self) -> Names {
         <P::Dynamics as Dynamics<T>>::NAMES
     }
-    fn dims(&self, begins: usize) -> PhaseDims {
+    fn link_dims(&self, begins: usize) -> PhaseDims {
         PhaseDims {
-            ends: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
-            own: self.names().own_states(),
-            begins,
+            ending_dims: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
+            model_states: self.names().model_state_count(),
+            next_states: begins,
             stage: self.intervals(),
-            is_timed: self.free.view().end().is_none(),
+            is_timed: self.free.view().end_time_index().is_none(),
         }
     }
-    fn refused(&mut self, is_first: bool) -> Option<&'static str> {
+    fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str> {
         let free = self.free.count();
         if P::Dynamics::LIFTED {
             return Some("collocation, whose stages are variables: take an integrator");
@@ -121,16 +125,16 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         if marked_indices(self.qp.view().shared()).any(|control| control >= free) {
             return Some("shared controls: take free parameters of the model, `free`");
         }
-        if !is_first && matches!(self.initial, Initial::Fixed | Initial::Partly) {
+        if !is_first && matches!(self.initial_state, InitialState::Fixed | InitialState::PartlyFixed) {
             return Some("an initial state of its own: the link before it says what it is");
         }
-        if is_first && self.initial != Initial::Free {
-            self.begin_where_it_is_given();
+        if is_first && self.initial_state != InitialState::Free {
+            self.set_given_initial_state();
         }
         if !is_first {
-            self.initial = Initial::Free;
+            self.initial_state = InitialState::Free;
         }
-        self.join_controls();
+        self.equalise_shared_controls();
         None
     }
     fn check(&mut self) -> Result<(), OcpError> {
@@ -143,10 +147,10 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         &self.iterate
     }
     fn iterate_mut(&mut self) -> &mut HeapSolution<T> {
-        self.has_algebraic = false;
+        self.algebraic_is_current = false;
         &mut self.iterate
     }
-    fn given(&mut self) -> [&[T]; 2] {
+    fn given_constraint_bounds(&mut self) -> [&[T]; 2] {
         let Parts { given, .. } = <P as Program<T>>::split(self);
         given
     }
@@ -161,7 +165,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError> {
         self.evaluate(at, ends)
     }
-    fn end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T> {
+    fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T> {
         let (stage, np, data) = (self.intervals(), P::Shape::NP, self.data.as_slice());
         PhaseEnd {
             stage,
@@ -176,7 +180,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         self.name(field, stage, index, side)
     }
     fn derivative(&self, error: &QpError) -> Option<OcpError> {
-        self.derivative(error)
+        self.non_finite_derivative(error)
     }
     fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>) {
         self.convexity_and_violation(asks)

@@ -1,13 +1,13 @@
 //! What solvers ask of phases: each answers for its stages, and links for what is between them.
 
 use super::link::{Link, PhaseEnd};
-use super::phase::{Kind, Size};
-use super::{Joined, Phases, Trial, transfer};
+use super::phase::{Kind, PhaseSize};
+use super::{JoinedPhase, Phases, TrialPoint, stage_conversion};
 use crate::linalg::dot;
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
-use crate::ocp::formulation::functions::point::Terms;
+use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact, GaussNewton};
@@ -170,10 +170,10 @@ fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
 }
 
 /// Ends of the intervals of a phase, with its parameters as states that stay, and its constraints.
-fn write_ends<T: Real>(size: Size, trial: &Trial<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
-    let Size { nx, free, intervals, .. } = size;
+fn write_ends<T: Real>(size: PhaseSize, trial: &TrialPoint<T>, ends: &mut &mut [T], values: &mut &mut [T]) {
+    let PhaseSize { nx, free, intervals, .. } = size;
     let (phi, g) = trial.ends.split_at_checked(intervals * nx).unwrap_or_default();
-    for (k, point) in trial.at.stages().enumerate().take(intervals) {
+    for (k, point) in trial.point.stages().enumerate().take(intervals) {
         let (x, w) = take_mut(ends, nx + free).split_at_mut_checked(nx).unwrap_or_default();
         copy_common(x, part(phi, k * nx, nx));
         copy_common(w, point.u);
@@ -181,50 +181,52 @@ fn write_ends<T: Real>(size: Size, trial: &Trial<T>, ends: &mut &mut [T], values
     copy_common(take_mut(values, g.len()), g);
 }
 
-impl<T: Real> Joined<'_, T> {
+impl<T: Real> JoinedPhase<'_, T> {
     /// Where the next phase begins: what the link makes of the end, and what is decided there.
     fn write_start(
         &mut self,
-        next: Size,
-        trial: &Trial<T>,
-        whole: &SolutionStage<'_, T>,
+        next: PhaseSize,
+        trial: &TrialPoint<T>,
+        last_stage: &SolutionStage<'_, T>,
         start: &mut [T],
     ) -> Result<(), OcpError> {
-        let (Some(link), Some(last)) = (&mut self.link, trial.at.stages().next_back()) else { return Ok(()) };
-        link.value(self.problem.end(last), part_mut(start, 0, next.given))?;
-        transfer::begin(next, whole.u, start);
+        let (Some(link), Some(last)) = (&mut self.link, trial.point.stages().next_back()) else {
+            return Ok(());
+        };
+        link.value(self.problem.phase_end(last), part_mut(start, 0, next.given_states))?;
+        stage_conversion::write_start_state(next, last_stage.u, start);
         Ok(())
     }
 }
 
 /// Where the next phase begins in the QP, at the last stage of a phase and its point `v` with
 /// multipliers `pi`.
-fn write_link<T: Real>(
+fn write_link_to_qp<T: Real>(
     link: &mut dyn Link<T>,
     end: PhaseEnd<'_, T>,
-    [size, next]: [Size; 2],
+    [size, next]: [PhaseSize; 2],
     arrays: &mut Arrays<'_, T>,
     (v, pi): (&[T], &[T]),
     scratch: &mut [T],
     Kind { exact, convexification }: Kind,
 ) -> Result<(), OcpError> {
-    let Arrays { n, ld, next: states, matrix, hessian, gradient, offset, .. } = arrays;
+    let Arrays { n, ld, next: next_state_count, matrix, hessian, gradient, offset, .. } = arrays;
     let (n, ld) = (*n, *ld);
-    let columns = part_mut(matrix, 0, *states * ld);
+    let columns = part_mut(matrix, 0, *next_state_count * ld);
     columns.fill(T::ZERO);
     offset.fill(T::ZERO);
-    link.linearise(end, part_mut(offset, 0, next.given), (&mut *columns, ld))?;
-    for (offset, column) in offset.iter_mut().zip(columns.chunks_exact(ld.max(1))).take(next.given) {
+    link.linearise(end, part_mut(offset, 0, next.given_states), (&mut *columns, ld))?;
+    for (offset, column) in offset.iter_mut().zip(columns.chunks_exact(ld.max(1))).take(next.given_states) {
         *offset = *offset - dot(column, v);
     }
-    let own = size.nx + size.free;
-    transfer::begin_columns(next, own, columns, ld);
+    let variable_count = size.nx + size.free;
+    stage_conversion::write_start_columns(next, variable_count, columns, ld);
     if exact {
         // The gradient of what is quadratic is `∇f − H v`: with another `H`.
         add_symmetric(gradient, hessian, ld, v, n);
-        let mut terms = Terms { free: end.free, gradient: &mut [], hessian, ld };
-        link.curve(end, part(pi, 0, next.given), &mut terms);
-        convexify(convexification, hessian, ld, own, scratch);
+        let mut terms = QuadraticTerms { free: end.free, gradient: &mut [], hessian, ld };
+        link.add_hessian(end, part(pi, 0, next.given_states), &mut terms);
+        convexify(convexification, hessian, ld, variable_count, scratch);
         let product = part_mut(scratch, 0, ld);
         product.fill(T::ZERO);
         add_symmetric(product, hessian, ld, v, n);
@@ -237,27 +239,28 @@ impl<T: Real> Phases<'_, T> {
     /// The objective at some point; in `ends` the ends of all intervals, and constraints.
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
-        at: &Solution<T, D, M>,
+        trial_point: &Solution<T, D, M>,
         (mut ends, mut values): (&mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
-        let (mut objective, mut stages) = (T::ZERO, at.stages());
-        let mut nexts: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
-        let Phases { phases, trials, start } = self;
-        let mut nexts = nexts.drain(..);
-        let mut before = stages.next();
-        if let (Some(size), Some(decided)) = (nexts.next(), before) {
+        let (mut objective, mut stages) = (T::ZERO, trial_point.stages());
+        let mut next_sizes: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
+        let Phases { phases, trial_points: trials, initial_state: start } = self;
+        let mut nexts = next_sizes.drain(..);
+        let mut previous_stage = stages.next();
+        if let (Some(size), Some(start_variables)) = (nexts.next(), previous_stage) {
             let first = take_mut(&mut ends, size.nx + size.free);
             copy_common(first, start);
-            transfer::begin(size, decided.u, first);
+            stage_conversion::write_start_state(size, start_variables.u, first);
         }
         for (phase, trial) in phases.iter_mut().zip(trials) {
-            let last = transfer::load(phase.size, &mut stages, &mut trial.at, before);
-            objective = objective + phase.problem.evaluate(&trial.at, &mut trial.ends)?;
+            let last =
+                stage_conversion::load_phase(phase.size, &mut stages, &mut trial.point, previous_stage);
+            objective = objective + phase.problem.evaluate(&trial.point, &mut trial.ends)?;
             write_ends(phase.size, trial, &mut ends, &mut values);
             if let (Some(next), Some(last)) = (nexts.next(), last) {
                 phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
             }
-            before = last;
+            previous_stage = last;
         }
         Ok(objective)
     }
@@ -266,32 +269,41 @@ impl<T: Real> Phases<'_, T> {
     fn write_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: &mut Qp<T, D, M>,
-        at: &Solution<T, D, M>,
+        iterate: &Solution<T, D, M>,
         scratch: &mut [T],
         kind: Kind,
     ) -> Result<(), OcpError> {
-        let ((v, _), mut begin) = (at.variables_and_costates(), 0);
-        let (mut stages, mut points) = (qp.stages_mut(), at.stages());
-        let nexts = self.nexts();
+        let ((v, _), mut begin) = (iterate.variables_and_costates(), 0);
+        let (mut stages, mut points) = (qp.stages_mut(), iterate.stages());
+        let next_sizes = self.next_sizes();
         if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
         {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
-            copy_common(offset, &self.start);
-            transfer::begin_columns(first.size, point.x.len(), matrix, ld);
+            copy_common(offset, &self.initial_state);
+            stage_conversion::write_start_columns(first.size, point.x.len(), matrix, ld);
             begin += ld;
         }
-        for (Joined { problem, link, size, .. }, next) in self.phases.iter_mut().zip(nexts) {
-            for (from, at) in problem.qp().stages().zip(problem.iterate().stages()) {
+        for (JoinedPhase { problem, link, size, .. }, next) in self.phases.iter_mut().zip(next_sizes) {
+            for (from, stage_point) in problem.qp().stages().zip(problem.iterate().stages()) {
                 let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
                 let mut arrays = to.arrays();
-                transfer::qp(*size, &from, &mut arrays);
+                stage_conversion::copy_stage_qp(*size, &from, &mut arrays);
                 let v = part(v, begin, arrays.ld);
                 begin += arrays.ld;
                 // The last stage of a phase leads nowhere in its own QP.
-                if let (Some(next), Some(link), true) = (next, &mut *link, at.dynamics.is_empty()) {
-                    let (end, sizes, at) = (problem.end(at), [*size, next], (v, point.dynamics));
-                    write_link(link.as_mut(), end, sizes, &mut arrays, at, scratch, kind)?;
+                if let (Some(next), Some(link), true) = (next, &mut *link, stage_point.dynamics.is_empty()) {
+                    let (end, sizes, point_and_costates) =
+                        (problem.phase_end(stage_point), [*size, next], (v, point.dynamics));
+                    write_link_to_qp(
+                        link.as_mut(),
+                        end,
+                        sizes,
+                        &mut arrays,
+                        point_and_costates,
+                        scratch,
+                        kind,
+                    )?;
                 }
             }
         }
@@ -300,20 +312,21 @@ impl<T: Real> Phases<'_, T> {
 
     /// A constraint of the QP by its name in its phase.
     fn name_of_row(&self, (field, stage, index): (QpField, usize, usize), side: Side) -> ConstraintName {
-        let nothing = (Part::Dimensions, "");
-        let find = || {
+        let unnamed = (Part::Dimensions, "");
+        let find_name = || {
             let found = self.at(stage);
-            let decides = found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
-            let (number, place) = if decides && field == QpField::ControlBounds {
+            let has_start_variables =
+                found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
+            let (number, place) = if has_start_variables && field == QpField::ControlBounds {
                 let number = found.map_or(0, |(number, _)| number + 1);
-                let Size { given, .. } = self.phases.get(number)?.size;
-                let states = self.phases.get(number)?.size.states().len();
+                let PhaseSize { given_states: given, .. } = self.phases.get(number)?.size;
+                let states = self.phases.get(number)?.size.free_start_states().len();
                 let state = (QpField::StateBounds, 0, given + index);
                 let parameter = index.checked_sub(states);
                 (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
             } else {
                 let (number, phase) = found?;
-                let (k, Size { nx, free, .. }) = (stage - phase.first, phase.size);
+                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.size);
                 let place = match field {
                     QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
                     QpField::ControlBounds => (field, k, index + free),
@@ -324,7 +337,7 @@ impl<T: Real> Phases<'_, T> {
             let name = self.phases.get(number)?.problem.name(place, side);
             Some(ConstraintName { phase: Some(number), ..name })
         };
-        let (part, name) = nothing;
-        find().unwrap_or(ConstraintName { part, stage, name, output: 0, point: 0, side, phase: None })
+        let (part, name) = unnamed;
+        find_name().unwrap_or(ConstraintName { part, stage, name, output: 0, point: 0, side, phase: None })
     }
 }

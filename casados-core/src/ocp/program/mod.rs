@@ -2,10 +2,10 @@
 
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Nodes, StageAction};
-use crate::ocp::formulation::instance::data::{Data, split};
-use crate::ocp::formulation::instance::{Ocp, nodes};
+use crate::ocp::formulation::instance::data::{Data, split_data};
+use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::formulation::program::curvature::{Curvature, Slopes};
+use crate::ocp::formulation::program::curvature::{Curvature, FirstOrder};
 use crate::ocp::formulation::program::{Parts, Program};
 use crate::qp::{QpError, QpField, Side, Solution, StageDims};
 use crate::scalar::Real;
@@ -25,7 +25,7 @@ impl<P: Formulation<T>, T: Real> Program<T> for P {
     fn slopes<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> Result<(), OcpError> {
-        ocp.linearise(Slopes)
+        ocp.linearise(FirstOrder)
     }
 
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
@@ -41,7 +41,7 @@ impl<P: Formulation<T>, T: Real> Program<T> for P {
     ) -> Parts<'_, T, D, M> {
         let layout = ocp.layout();
         let Ocp { qp, iterate, data, .. } = ocp;
-        let Data { lower, upper, scratch, .. } = split::<P, T>(data.as_mut(), layout);
+        let Data { lower, upper, scratch, .. } = split_data::<P, T>(data.as_mut(), layout);
         Parts { qp, iterate, given: [lower, upper], scratch }
     }
 
@@ -54,14 +54,14 @@ impl<P: Formulation<T>, T: Real> Program<T> for P {
         (field, stage, index): (QpField, usize, usize),
         side: Side,
     ) -> ConstraintName {
-        ocp.name_of_row(field, stage, index, side)
+        ocp.constraint_name(field, stage, index, side)
     }
 
     fn derivative<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &Ocp<Self, T, D, M>,
         error: &QpError,
     ) -> Option<OcpError> {
-        ocp.derivative_without_value(error)
+        ocp.find_non_finite_derivative(error)
     }
 
     fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
@@ -71,29 +71,35 @@ impl<P: Formulation<T>, T: Real> Program<T> for P {
         ocp.convexity_and_violation(asks)
     }
 
-    fn begin_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn initialise_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> Result<(), OcpError> {
         let layout = ocp.layout();
-        let data = split::<P, T>(ocp.data.as_mut(), layout);
+        let data = split_data::<P, T>(ocp.data.as_mut(), layout);
         let (v, multipliers) = ocp.iterate.variables_and_costates();
         let p = (&*data.p, ocp.free.view());
-        ocp.problem.parts().dynamics.begin_stages(&nodes::<P::Shape, T>(v, multipliers, &[], p, data.times))
+        ocp.problem.parts().dynamics.initialise_stages(&interval_nodes::<P::Shape, T>(
+            v,
+            multipliers,
+            &[],
+            p,
+            data.times,
+        ))
     }
 
-    fn expand_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn expand_stage_steps<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         step: &Solution<T, D, M>,
     ) -> Result<(), OcpError> {
         let layout = ocp.layout();
-        let data = split::<P, T>(ocp.data.as_mut(), layout);
+        let data = split_data::<P, T>(ocp.data.as_mut(), layout);
         let (v, multipliers) = ocp.iterate.variables_and_costates();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], (data.p, ocp.free.view()), data.times);
+        let nodes = interval_nodes::<P::Shape, T>(v, multipliers, &[], (data.p, ocp.free.view()), data.times);
         let (step, _) = step.variables_and_costates();
-        ocp.problem.parts().dynamics.expand_stages(&nodes, &Nodes { v: step, ..nodes })
+        ocp.problem.parts().dynamics.expand_stage_steps(&nodes, &Nodes { v: step, ..nodes })
     }
 
-    fn move_stages(&mut self, action: StageAction<T>) {
-        self.parts().dynamics.move_stages(action);
+    fn apply_stage_action(&mut self, action: StageAction<T>) {
+        self.parts().dynamics.apply_stage_action(action);
     }
 }

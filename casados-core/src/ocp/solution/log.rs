@@ -201,7 +201,7 @@ mod tests {
     use alloc::vec::Vec;
 
     /// What stands below the rows.
-    fn marks(rows: &[Iteration]) -> Vec<alloc::string::String> {
+    fn explained_marks(rows: &[Iteration]) -> Vec<alloc::string::String> {
         Log(rows).to_string().lines().skip(1 + rows.len()).map(ToString::to_string).collect()
     }
 
@@ -221,13 +221,13 @@ mod tests {
         let plain = Iteration::default();
         let elastic = Iteration { elastic: true, corrected: true, ..plain };
         let corrected = Iteration { corrected: true, ..plain };
-        assert!(marks(&[plain]).is_empty());
+        assert!(explained_marks(&[plain]).is_empty());
         assert_eq!(
-            marks(&[plain, elastic]),
+            explained_marks(&[plain, elastic]),
             ["e: elastic mode or restoration phase: hard bounds have penalties"]
         );
         assert_eq!(
-            marks(&[corrected, elastic]),
+            explained_marks(&[corrected, elastic]),
             [
                 "e: elastic mode or restoration phase: hard bounds have penalties",
                 "s: second-order correction"

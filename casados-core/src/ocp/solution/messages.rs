@@ -75,11 +75,11 @@ impl fmt::Display for OcpError {
         match self {
             Self::UnknownName { name, known } => {
                 write!(f, "`{}` has no variable `{}` of this kind. States:", known.model, name.as_str())?;
-                list(f, known.x)?;
+                write_names(f, known.x)?;
                 for (kind, names) in [("; controls:", known.u), ("; algebraic states:", known.z)] {
                     if !names.is_empty() {
                         f.write_str(kind)?;
-                        list(f, names)?;
+                        write_names(f, names)?;
                     }
                 }
                 Ok(())
@@ -105,12 +105,12 @@ impl fmt::Display for OcpError {
             ),
             Self::Length { part, stage, expected, found } => {
                 let elements = if *found == 1 { "element" } else { "elements" };
-                stage_of(f, *part, *stage)?;
+                write_stage(f, *part, *stage)?;
                 write!(f, "{part} {} {found} {elements} instead of {expected}", part.verb())?;
                 f.write_str(if *expected == 0 { ": the problem has none" } else { "" })
             }
             Self::InvalidValue { part, stage, name, index, value } => {
-                stage_of(f, *part, *stage)?;
+                write_stage(f, *part, *stage)?;
                 let (what, allowed) = match part {
                     Part::Penalty => ("a penalty of ", "at least 0, and finite if quadratic"),
                     _ if part.is_bound() => {
@@ -122,7 +122,7 @@ impl fmt::Display for OcpError {
                     _ => ("", "finite"),
                 };
                 f.write_str(what)?;
-                named(f, *part, name, *index)?;
+                write_element_name(f, *part, name, *index)?;
                 write!(f, " is {value}: it must be {allowed}")
             }
             Self::InvalidArrivalWeight { states: [i, j], value, allowed } => {
@@ -147,7 +147,7 @@ impl fmt::Display for OcpError {
             }
             Self::CrossedBounds { part, stage, name, index, lower, upper } => {
                 write!(f, "stage {stage}: the lower bound {lower} of ")?;
-                named(f, *part, name, *index)?;
+                write_element_name(f, *part, name, *index)?;
                 write!(f, " is above the upper bound {upper}")
             }
             Self::Missing { part: Part::Times, .. } => f.write_str(
@@ -237,7 +237,7 @@ impl fmt::Display for OcpError {
             ),
             Self::UnknownParameter { name, known } => {
                 write!(f, "`{}` has no parameter `{}`: its parameters are", known.model, name.as_str())?;
-                list(f, known.p)
+                write_names(f, known.p)
             }
             Self::OutOfRange { name, value, lower, upper } => {
                 write!(f, "the guess {value} of `{name}` is outside of its range, {lower} to {upper}")
@@ -262,7 +262,7 @@ impl fmt::Display for OcpError {
 }
 
 /// Where it is, unless it is in one place alone.
-fn stage_of(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result {
+fn write_stage(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result {
     match part {
         Part::InitialState | Part::TerminalReference | Part::Memory => Ok(()),
         _ => write!(f, "stage {stage}: "),
@@ -270,7 +270,7 @@ fn stage_of(f: &mut fmt::Formatter<'_>, part: Part, stage: usize) -> fmt::Result
 }
 
 /// One of the elements of a part, which are outputs of a function or have names of their own.
-fn named(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fmt::Result {
+fn write_element_name(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fmt::Result {
     match part {
         Part::PathBounds | Part::TerminalBounds | Part::Reference | Part::TerminalReference => {
             write!(f, "output {index} of `{name}`")
@@ -279,7 +279,7 @@ fn named(f: &mut fmt::Formatter<'_>, part: Part, name: &str, index: usize) -> fm
     }
 }
 
-fn list(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
+fn write_names(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
     for (i, name) in names.iter().enumerate() {
         let comma = if i == 0 { "" } else { "," };
         write!(f, "{comma} `{name}`")?;

@@ -1,5 +1,8 @@
 //! Results: how a run ended, its log, solutions by name, and their derivatives.
 
+pub(in crate::ocp) mod convexity;
+#[cfg(feature = "alloc")]
+mod largest_violation;
 pub(in crate::ocp) mod log;
 pub(in crate::ocp) mod messages;
 pub(in crate::ocp) mod outcome;
@@ -7,10 +10,7 @@ pub(in crate::ocp) mod outcome;
 pub(in crate::ocp) mod sensitivities;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod trajectory;
-pub(in crate::ocp) mod verdict;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod verification;
-#[cfg(feature = "alloc")]
-mod violated;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod warnings;

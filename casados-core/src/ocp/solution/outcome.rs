@@ -165,7 +165,7 @@ impl Outcome {
     }
 
     /// Counts what an iteration took.
-    pub(in crate::ocp) fn count(&mut self, row: &Iteration) {
+    pub(in crate::ocp) fn add_iteration(&mut self, row: &Iteration) {
         self.qp_iterations += row.qp_iterations;
         self.times.linearise += row.times.linearise;
         self.times.qp += row.times.qp;
@@ -207,12 +207,12 @@ impl Outcome {
 
 impl Status {
     /// Whether it says itself which constraint is violated.
-    pub(in crate::ocp) fn names_a_constraint(&self) -> bool {
+    pub(in crate::ocp) fn names_constraint(&self) -> bool {
         matches!(self, Self::Infeasible { .. } | Self::InfeasibleQp { .. })
     }
 
     /// What it is.
-    fn what(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write_description(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Converged => f.write_str("converged"),
             Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
@@ -235,7 +235,7 @@ impl Status {
     }
 
     /// What to do about it.
-    fn way_out(&self) -> &'static str {
+    fn remedy(&self) -> &'static str {
         match self {
             Self::Converged | Self::Acceptable | Self::Stopped | Self::OutOfTime => "",
             Self::MaxIterations => {
@@ -261,8 +261,8 @@ impl Status {
 
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.what(f)?;
-        f.write_str(self.way_out())
+        self.write_description(f)?;
+        f.write_str(self.remedy())
     }
 }
 
@@ -271,29 +271,29 @@ impl fmt::Display for Outcome {
         let Self { status, iterations, objective, residuals, .. } = self;
         match status {
             Status::Converged if !self.is_convex => f.write_str("converged to a local solution")?,
-            _ => status.what(f)?,
+            _ => status.write_description(f)?,
         }
         write!(f, " after {iterations} iterations: objective {objective:.8e}, {residuals}")?;
         if let Some((constraint, violation)) = &self.violated {
             write!(f, "; largest violation: {violation:.2e} of {constraint}")?;
         }
-        f.write_str(status.way_out())
+        f.write_str(status.remedy())
     }
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Completes the outcome of a run.
-    pub(in crate::ocp) fn complete(&mut self, outcome: &mut Outcome) {
-        let asks = !outcome.is_solved() && !outcome.status.names_a_constraint();
-        let (is_convex, violated) = P::complete(self, asks);
+    pub(in crate::ocp) fn complete_outcome(&mut self, outcome: &mut Outcome) {
+        let needs_violation = !outcome.is_solved() && !outcome.status.names_constraint();
+        let (is_convex, violated) = P::complete(self, needs_violation);
         outcome.is_convex = is_convex;
-        if asks {
+        if needs_violation {
             outcome.violated = violated;
         }
     }
 
     /// The status of a run whose violations cannot be made smaller.
-    pub(in crate::ocp) fn status_of_worst(&self, worst: &Violation) -> Status {
+    pub(in crate::ocp) fn infeasible_status(&self, worst: &Violation) -> Status {
         let Violation { field, stage, index, side, violation } = *worst;
         Status::Infeasible { constraint: self.name(field, stage, index, side), violation }
     }
@@ -302,12 +302,12 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     ///
     /// # Errors
     /// [`OcpError::NonFiniteDerivative`] if there is no such QP.
-    pub(in crate::ocp) fn status_of_error(&self, error: QpError) -> Result<Status, OcpError> {
+    pub(in crate::ocp) fn qp_failure_status(&self, error: QpError) -> Result<Status, OcpError> {
         match (self.infeasible(&error), error) {
             (Some(constraint), QpError::Infeasible { violation, .. }) => {
                 Ok(Status::InfeasibleQp { constraint, violation })
             }
-            _ => self.derivative(&error).map_or(Ok(Status::QpFailed(error)), Err),
+            _ => self.non_finite_derivative(&error).map_or(Ok(Status::QpFailed(error)), Err),
         }
     }
 }

@@ -2,13 +2,13 @@
 
 use crate::integrator::Integrator;
 use crate::model::{Dae, VectorX};
-use crate::ocp::dynamics::begin::{Begin, at};
+use crate::ocp::dynamics::interval_setup::{IntervalSetup, in_interval};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
+use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
 use crate::ocp::formulation::functions::dynamics::{Dynamics, Interval, vector};
-use crate::ocp::formulation::instance::data::{Node, path_rows, split};
-use crate::ocp::formulation::instance::{HeapOcp, nodes};
-use crate::ocp::formulation::labels::output;
+use crate::ocp::formulation::instance::data::{Node, path_row_count, split_data};
+use crate::ocp::formulation::instance::{HeapOcp, interval_nodes};
+use crate::ocp::formulation::labels::output_name;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::get;
 use crate::qp::{Bounds, Side, SolutionStage, part, zeros};
@@ -21,7 +21,7 @@ use core::cmp::Ordering;
 use core::fmt;
 
 /// Pieces of an interval at whose ends bounds are looked at.
-const PIECES: usize = 8;
+const PIECES_PER_INTERVAL: usize = 8;
 
 /// What an iterate is worth, by an integrator with error control: [`Ocp::verify`].
 ///
@@ -177,12 +177,12 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             });
         }
         let (layout, free) = (self.layout(), self.free.view());
-        let data = split::<P, T>(&mut self.data, layout);
+        let data = split_data::<P, T>(&mut self.data, layout);
         let Problem { path, .. } = self.problem.parts();
         let (v, _) = self.iterate.variables_and_costates();
-        let nodes = nodes::<P::Shape, T>(v, &[], &[], (data.p, free), data.times);
-        let sizes = largest_states::<T>(self.iterate.stages(), P::Shape::NX)?;
-        let mut inside = Inside::new::<P>()?;
+        let nodes = interval_nodes::<P::Shape, T>(v, &[], &[], (data.p, free), data.times);
+        let sizes = state_magnitudes::<T>(self.iterate.stages(), P::Shape::NX)?;
+        let mut interval_violations = IntervalViolations::new::<P>()?;
         let names = <P::Dynamics as Dynamics<T>>::NAMES.x;
         let (mut defects, mut violations) = (Vec::new(), Vec::new());
         let mut stages = self.qp.view().stages().zip(self.iterate.stages()).peekable();
@@ -190,14 +190,14 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             let Some((stage, point)) = stages.next() else { break };
             let next = stages.peek();
             let mut x: VectorX<I::Model, T> = vector(interval.x);
-            inside.begin();
-            for piece in 1..=PIECES {
-                let h = interval.h / T::from_whole(PIECES);
+            interval_violations.reset();
+            for piece in 1..=PIECES_PER_INTERVAL {
+                let h = interval.h / T::from_whole(PIECES_PER_INTERVAL);
                 let start = interval.t + T::from_whole(piece - 1) * h;
-                at(k, integrator.begin(&Interval { t: start, ..interval }))?;
-                let end = at(k, integrator.solve(&x, &vector(interval.u), h))?;
+                in_interval(k, integrator.begin(&Interval { t: start, ..interval }))?;
+                let end = in_interval(k, integrator.solve(&x, &vector(interval.u), h))?;
                 x = end.x;
-                if piece == PIECES {
+                if piece == PIECES_PER_INTERVAL {
                     break;
                 }
                 let time = start + h;
@@ -207,13 +207,23 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                     reference: &[],
                     factor: T::ONE,
                 };
-                let here = SolutionStage { x: x.as_slice(), ..point };
-                node.read::<P::Shape>(&mut inside.point, &here, end.z.as_slice(), free);
-                path.value(&inside.point, &mut inside.g, Spot::new(k, free, &[]))?;
+                let inner_stage = SolutionStage { x: x.as_slice(), ..point };
+                node.write_variables::<P::Shape>(
+                    &mut interval_violations.point,
+                    &inner_stage,
+                    end.z.as_slice(),
+                    free,
+                );
+                path.value(
+                    &interval_violations.point,
+                    &mut interval_violations.g,
+                    ConstraintContext::new(k, free, &[]),
+                )?;
                 let states = next.map(|(next, _)| [stage.x_bounds(), next.x_bounds()]);
-                inside.states(x.as_slice(), states, time);
-                let rows = |limits: &[T]| part(limits, k * path_rows::<P, T>(layout), P::Path::ROWS).to_vec();
-                inside.constraints([rows(data.lower), rows(data.upper)], time);
+                interval_violations.check_states(x.as_slice(), states, time);
+                let rows =
+                    |limits: &[T]| part(limits, k * path_row_count::<P, T>(layout), P::Path::ROWS).to_vec();
+                interval_violations.check_constraints([rows(data.lower), rows(data.upper)], time);
             }
             for (i, &end) in x.as_slice().iter().enumerate() {
                 let (state, size) = (names.get(i).copied().unwrap_or(""), get(&sizes, i));
@@ -221,16 +231,17 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 defects.push(Defect { state, interval: k, amount, relative: amount.abs() / size });
             }
             let duration = free.duration(point.u);
-            inside.report::<P>(k, duration, &mut violations);
+            interval_violations.append_violations::<P>(k, duration, &mut violations);
         }
-        let by_part = |a: &InnerViolation<T>, b: &InnerViolation<T>| b.relative.partial_cmp(&a.relative);
-        violations.sort_by(|a, b| by_part(a, b).unwrap_or(Ordering::Equal));
+        let by_relative_amount =
+            |a: &InnerViolation<T>, b: &InnerViolation<T>| b.relative.partial_cmp(&a.relative);
+        violations.sort_by(|a, b| by_relative_amount(a, b).unwrap_or(Ordering::Equal));
         Ok(Verification { defects, violations, intervals: layout.intervals })
     }
 }
 
 /// The largest value of every state at any node, at least one.
-fn largest_states<'a, T: Real + 'a>(
+fn state_magnitudes<'a, T: Real + 'a>(
     stages: impl Iterator<Item = SolutionStage<'a, T>>,
     nx: usize,
 ) -> Result<Vec<T>, OcpError> {
@@ -245,70 +256,82 @@ fn largest_states<'a, T: Real + 'a>(
 }
 
 /// The largest violations inside of an interval: of states, then of path constraints.
-struct Inside<V, T> {
+struct IntervalViolations<V, T> {
     point: V,
     g: Vec<T>,
     /// Amount of both sides, the time, and the bound.
-    worst: Vec<[Worst<T>; 2]>,
+    largest_violations: Vec<[LargestViolation<T>; 2]>,
     states: usize,
 }
 
 #[derive(Clone, Copy)]
-struct Worst<T> {
+struct LargestViolation<T> {
     amount: T,
     time: T,
     bound: T,
 }
 
-impl<V: Zeroable, T: Real> Inside<V, T> {
+impl<V: Zeroable, T: Real> IntervalViolations<V, T> {
     fn new<P: Formulation<T>>() -> Result<Self, OcpError> {
-        Ok(Self { point: V::zeroed(), g: zeros(P::Path::ROWS)?, worst: Vec::new(), states: P::Shape::NX })
+        Ok(Self {
+            point: V::zeroed(),
+            g: zeros(P::Path::ROWS)?,
+            largest_violations: Vec::new(),
+            states: P::Shape::NX,
+        })
     }
 
-    fn begin(&mut self) {
-        let none = Worst { amount: T::ZERO, time: T::ZERO, bound: T::ZERO };
-        self.worst.clear();
-        self.worst.resize(self.states + self.g.len(), [none; 2]);
+    fn reset(&mut self) {
+        let none = LargestViolation { amount: T::ZERO, time: T::ZERO, bound: T::ZERO };
+        self.largest_violations.clear();
+        self.largest_violations.resize(self.states + self.g.len(), [none; 2]);
     }
 
     /// A value beside its bounds.
-    fn note(&mut self, index: usize, value: T, [lower, upper]: [T; 2], time: T) {
-        let Some(worst) = self.worst.get_mut(index) else { return };
+    fn update_largest(&mut self, index: usize, value: T, [lower, upper]: [T; 2], time: T) {
+        let Some(worst) = self.largest_violations.get_mut(index) else { return };
         for (worst, (amount, bound)) in worst.iter_mut().zip([(lower - value, lower), (value - upper, upper)])
         {
             if amount > worst.amount {
-                *worst = Worst { amount, time, bound };
+                *worst = LargestViolation { amount, time, bound };
             }
         }
     }
 
-    fn states(&mut self, x: &[T], bounds: Option<[Bounds<'_, T>; 2]>, time: T) {
+    fn check_states(&mut self, x: &[T], bounds: Option<[Bounds<'_, T>; 2]>, time: T) {
         let Some([here, next]) = bounds else { return };
         for (i, &x) in x.iter().enumerate() {
             let [low, other_low] = [here.lower, next.lower].map(|bounds| get(bounds, i));
             let [high, other_high] = [here.upper, next.upper].map(|bounds| get(bounds, i));
             let lower = if other_low < low { other_low } else { low };
             let upper = if other_high > high { other_high } else { high };
-            self.note(i, x, [lower, upper], time);
+            self.update_largest(i, x, [lower, upper], time);
         }
     }
 
-    fn constraints(&mut self, [lower, upper]: [Vec<T>; 2], time: T) {
+    fn check_constraints(&mut self, [lower, upper]: [Vec<T>; 2], time: T) {
         for row in 0..self.g.len() {
             let (value, bounds) = (get(&self.g, row), [get(&lower, row), get(&upper, row)]);
-            self.note(self.states + row, value, bounds, time);
+            self.update_largest(self.states + row, value, bounds, time);
         }
     }
 
     /// Adds what was found, by name; times are multiplied by the duration of their unit.
-    fn report<P: Formulation<T>>(&self, interval: usize, duration: T, to: &mut Vec<InnerViolation<T>>) {
+    fn append_violations<P: Formulation<T>>(
+        &self,
+        interval: usize,
+        duration: T,
+        to: &mut Vec<InnerViolation<T>>,
+    ) {
         let states = <P::Dynamics as Dynamics<T>>::NAMES.x;
-        for (i, worst) in self.worst.iter().enumerate() {
-            for (&Worst { amount, time, bound }, side) in worst.iter().zip([Side::Lower, Side::Upper]) {
+        for (i, worst) in self.largest_violations.iter().enumerate() {
+            for (&LargestViolation { amount, time, bound }, side) in
+                worst.iter().zip([Side::Lower, Side::Upper])
+            {
                 if amount > T::ZERO {
                     let name = match i.checked_sub(self.states) {
                         None => states.get(i).map_or_else(String::new, |name| name.to_string()),
-                        Some(row) => output::<P::Path, P::Shape, T>(row).to_string(),
+                        Some(row) => output_name::<P::Path, P::Shape, T>(row).to_string(),
                     };
                     let (time, relative) = (duration * time, amount / bound.abs().max(T::ONE));
                     to.push(InnerViolation { name, interval, time, side, amount, relative });

@@ -2,9 +2,9 @@
 
 use crate::linalg::dot;
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
-use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::problem::Formulation;
-use crate::ocp::formulation::program::curvature::Slopes;
+use crate::ocp::formulation::program::curvature::FirstOrder;
 use crate::qp::element::get;
 use crate::qp::{Bounds, Places, QpField, Side, part};
 use crate::scalar::Real;
@@ -13,10 +13,10 @@ use alloc::vec::Vec;
 use core::fmt;
 
 /// A ratio of sizes of two variables that is too large for double precision and one tolerance.
-const WIDE_RATIO: f64 = 1e8;
+const MAX_SIZE_RATIO: f64 = 1e8;
 /// A gradient vanishes where the constraint changes by no more than this part of its violation, if
 /// a variable changes by its size or by one.
-const VANISHING_GRADIENT: f64 = 1e-8;
+const VANISHING_GRADIENT_RATIO: f64 = 1e-8;
 
 /// What may be a mistake in a problem: [`Ocp::warnings`].
 ///
@@ -115,25 +115,26 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// # Errors
     /// Those of [`Ocp::linearise`](crate::ocp::Ocp::linearise)
     pub fn warnings(&mut self) -> Result<Vec<Warning>, OcpError> {
-        self.linearise(Slopes)?;
+        self.linearise(FirstOrder)?;
         let mut found = Vec::new();
-        self.guesses_outside(&mut found);
-        self.vanishing_gradients(&mut found);
-        self.unreachable_ends(&mut found);
-        self.far_units(&mut found);
+        self.warn_guesses_outside_bounds(&mut found);
+        self.warn_vanishing_gradients(&mut found);
+        self.warn_unreachable_ends(&mut found);
+        self.warn_different_magnitudes(&mut found);
         Ok(found)
     }
 
     /// A warning for each variable, of its worst stage.
-    fn guesses_outside(&self, found: &mut Vec<Warning>) {
+    fn warn_guesses_outside_bounds(&self, found: &mut Vec<Warning>) {
         // Beyond it by most: of every variable, by where it is in a stage.
         let mut worst: Vec<(QpField, usize, f64, Warning)> = Vec::new();
-        let given = usize::from(matches!(self.initial, Initial::Fixed | Initial::Partly));
+        let fixed_stages =
+            usize::from(matches!(self.initial_state, InitialState::Fixed | InitialState::PartlyFixed));
         for (stage, (view, point)) in self.qp().stages().zip(self.iterate().stages()).enumerate() {
             let states = (QpField::StateBounds, point.x, view.x_bounds());
             let controls = (QpField::ControlBounds, point.u, view.u_bounds());
             for (field, values, bounds) in [states, controls] {
-                if field == QpField::StateBounds && stage < given {
+                if field == QpField::StateBounds && stage < fixed_stages {
                     continue;
                 }
                 for (index, &value) in values.iter().enumerate() {
@@ -160,7 +161,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 
     /// A warning for each constraint, of its first stage.
-    fn vanishing_gradients(&self, found: &mut Vec<Warning>) {
+    fn warn_vanishing_gradients(&self, found: &mut Vec<Warning>) {
         let (qp, (v, _)) = (self.qp(), self.iterate().variables_and_costates());
         for (place, stage) in Places::<T>::new(qp.dims()).zip(qp.stages()) {
             let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
@@ -172,7 +173,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                     if value < lower { (Side::Lower, lower - value) } else { (Side::Upper, value - upper) };
                 let changes = row.iter().zip(here).map(|(&g, &v)| g.abs() * v.abs().max(T::ONE));
                 let largest = changes.fold(T::ZERO, |largest, change| largest.max(change));
-                if violation > T::ZERO && largest <= T::from_f64(VANISHING_GRADIENT) * violation {
+                if violation > T::ZERO && largest <= T::from_f64(VANISHING_GRADIENT_RATIO) * violation {
                     let constraint = self.name(QpField::GeneralBounds, place.stage, i, side);
                     let is_known = found.iter().any(|warning| {
                         matches!(warning, Warning::VanishingGradient { constraint: known, .. }
@@ -187,36 +188,36 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 
     /// A warning for each bound of the last stage, of states and of terminal constraints.
-    fn unreachable_ends(&self, found: &mut Vec<Warning>) {
+    fn warn_unreachable_ends(&self, found: &mut Vec<Warning>) {
         let (qp, last, nx) = (self.qp(), self.intervals(), P::Shape::NX);
         let Some(stage) = qp.stage(last) else { return };
         let view = stage.arrays();
         let (states, rows) = (stage.x_bounds(), stage.g_bounds());
-        let mut end: Vec<T> = Vec::new();
+        let mut coefficients: Vec<T> = Vec::new();
         let of_states = (0..nx).map(|i| (QpField::StateBounds, i, &states));
         let of_rows = (0..rows.lower.len()).map(|i| (QpField::GeneralBounds, i, &rows));
         for (field, index, bounds) in of_states.chain(of_rows) {
             let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, index));
             let [soft_below, soft_above] =
                 [bounds.lower_linear, bounds.upper_linear].map(|list| get(list, index).is_finite());
-            end.clear();
+            coefficients.clear();
             if field == QpField::StateBounds {
-                end.extend((0..view.n).map(|i| if i == index { T::ONE } else { T::ZERO }));
+                coefficients.extend((0..view.n).map(|i| if i == index { T::ONE } else { T::ZERO }));
             } else {
-                end.extend(part(view.matrix, (view.next + index) * view.ld, view.n));
+                coefficients.extend(part(view.matrix, (view.next + index) * view.ld, view.n));
             }
             if !(lower.is_finite() || upper.is_finite()) {
                 continue;
             }
-            let Some(value) = self.only_end(&end) else { continue };
+            let Some(value) = self.unique_end_value(&coefficients) else { continue };
             let (side, limit, soft) = if value < lower {
                 (Side::Lower, lower, soft_below)
             } else {
                 (Side::Upper, upper, soft_above)
             };
-            let beyond = if side == Side::Lower { lower - value } else { value - upper };
+            let violation = if side == Side::Lower { lower - value } else { value - upper };
             let size = limit.abs().max(T::ONE);
-            if !soft && beyond > T::from_f64(VANISHING_GRADIENT) * size {
+            if !soft && violation > T::from_f64(VANISHING_GRADIENT_RATIO) * size {
                 let bound = self.name(field, last, index, side);
                 let (value, limit) = (value.to_f64(), limit.to_f64());
                 found.push(Warning::UnreachableEnd { bound, value, limit });
@@ -226,11 +227,11 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
 
     /// A linear function of the last stage at all ends that the linearisation has, if it has one
     /// alone.
-    fn only_end(&self, end: &[T]) -> Option<T> {
+    fn unique_end_value(&self, coefficients: &[T]) -> Option<T> {
         let (qp, nx) = (self.qp(), P::Shape::NX);
-        let (of_states, of_others) = end.split_at_checked(nx)?;
-        let least = T::from_f64(VANISHING_GRADIENT);
-        let is_zero = |slopes: &[T], size: T| slopes.iter().all(|slope| slope.abs() <= least * size);
+        let (of_states, of_others) = coefficients.split_at_checked(nx)?;
+        let tolerance = T::from_f64(VANISHING_GRADIENT_RATIO);
+        let is_zero = |slopes: &[T], size: T| slopes.iter().all(|slope| slope.abs() <= tolerance * size);
         let largest = |list: &[T]| list.iter().fold(T::ZERO, |largest, value| largest.max(value.abs()));
         let mut slopes = of_states.to_vec();
         let mut value = T::ZERO;
@@ -242,28 +243,28 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
             let (view, bounds) = (stage.arrays(), stage.u_bounds());
             let size = largest(&slopes);
             value = value + dot(&slopes, part(view.offset, 0, nx));
-            let mut before: Vec<T> = (0..view.n).map(|_| T::ZERO).collect();
+            let mut previous_slopes: Vec<T> = (0..view.n).map(|_| T::ZERO).collect();
             for (row, &slope) in view.matrix.chunks_exact(view.ld.max(1)).zip(&slopes) {
-                before.iter_mut().zip(row).for_each(|(to, &by)| *to = *to + slope * by);
+                previous_slopes.iter_mut().zip(row).for_each(|(to, &by)| *to = *to + slope * by);
             }
-            for (j, &by) in before.iter().skip(nx).enumerate() {
+            for (j, &slope) in previous_slopes.iter().skip(nx).enumerate() {
                 // A control that is given is no way out.
                 let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, j));
-                if by.abs() > least * size && lower < upper {
+                if slope.abs() > tolerance * size && lower < upper {
                     return None;
                 }
-                value = value + if lower < upper { T::ZERO } else { by * lower };
+                value = value + if lower < upper { T::ZERO } else { slope * lower };
             }
-            before.truncate(nx);
-            slopes = before;
+            previous_slopes.truncate(nx);
+            slopes = previous_slopes;
             if k == 0 {
                 let bounds = stage.x_bounds();
-                for (i, &by) in slopes.iter().enumerate() {
+                for (i, &slope) in slopes.iter().enumerate() {
                     let [lower, upper] = [bounds.lower, bounds.upper].map(|list| get(list, i));
-                    if by.abs() > least * size && lower < upper {
+                    if slope.abs() > tolerance * size && lower < upper {
                         return None;
                     }
-                    value = value + if lower < upper { T::ZERO } else { by * lower };
+                    value = value + if lower < upper { T::ZERO } else { slope * lower };
                 }
             }
         }
@@ -271,7 +272,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     }
 
     /// A warning of the smallest and the largest variable.
-    fn far_units(&self, found: &mut Vec<Warning>) {
+    fn warn_different_magnitudes(&self, found: &mut Vec<Warning>) {
         let mut sizes: Vec<(&'static str, f64)> = Vec::new();
         let mut add = |name: &'static str, values: &[T]| {
             let sizes_of = values.iter().map(|value| value.abs().to_f64()).filter(|size| size.is_finite());
@@ -296,7 +297,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let small = known().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let large = known().reduce(|a, b| if b.1 > a.1 { b } else { a });
         if let (Some(small), Some(large)) = (small, large)
-            && large.1 > WIDE_RATIO * small.1
+            && large.1 > MAX_SIZE_RATIO * small.1
         {
             found.push(Warning::FarUnits { small, large });
         }

@@ -234,7 +234,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
         let limits = ResidualTolerances::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
-        T::compiled::<Runs>(Run {
+        T::run_precompiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
             limits,

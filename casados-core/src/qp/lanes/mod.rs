@@ -134,7 +134,7 @@ pub fn solve<T: Real>(
         try_reserve(list, count)?;
     }
     together.pending.extend((0..count).map(|index| index as u32));
-    T::compiled::<Solves>(Solve { together, size, problems, options, start });
+    T::run_precompiled::<Solves>(Solve { together, size, problems, options, start });
     Ok(())
 }
 

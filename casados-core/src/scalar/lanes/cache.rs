@@ -5,12 +5,12 @@
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// What machines have that do not tell: half a megabyte or more.
-const USUAL: usize = 1 << 19;
+const DEFAULT_CACHE_SIZE: usize = 1 << 19;
 
 /// What the processor said: asking takes long, above all in a virtual machine. Zero until somebody
 /// does.
 #[cfg(target_arch = "x86_64")]
-static BYTES: AtomicUsize = AtomicUsize::new(0);
+static CACHE_SIZE: AtomicUsize = AtomicUsize::new(0);
 
 /// For tests: from now on the second-level cache has so many bytes, if machines of this kind are
 /// asked for it; zero stands for what the machine says.
@@ -18,7 +18,7 @@ static BYTES: AtomicUsize = AtomicUsize::new(0);
 #[cfg(feature = "testing")]
 pub fn limit_cache(bytes: usize) {
     #[cfg(target_arch = "x86_64")]
-    BYTES.store(bytes, Ordering::Relaxed);
+    CACHE_SIZE.store(bytes, Ordering::Relaxed);
     #[cfg(not(target_arch = "x86_64"))]
     let _ = bytes;
 }
@@ -26,10 +26,14 @@ pub fn limit_cache(bytes: usize) {
 /// Bytes of the second-level cache.
 #[cfg(target_arch = "x86_64")]
 pub fn second_level_cache() -> usize {
-    match BYTES.load(Ordering::Relaxed) {
+    match CACHE_SIZE.load(Ordering::Relaxed) {
         0 => {
-            let bytes = if cfg!(miri) { USUAL } else { ask().unwrap_or(USUAL) };
-            BYTES.store(bytes, Ordering::Relaxed);
+            let bytes = if cfg!(miri) {
+                DEFAULT_CACHE_SIZE
+            } else {
+                cache_size_from_cpuid().unwrap_or(DEFAULT_CACHE_SIZE)
+            };
+            CACHE_SIZE.store(bytes, Ordering::Relaxed);
             bytes
         }
         bytes => bytes,
@@ -39,7 +43,7 @@ pub fn second_level_cache() -> usize {
 /// Bytes of the second-level cache.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn second_level_cache() -> usize {
-    USUAL
+    DEFAULT_CACHE_SIZE
 }
 
 /// What the processor says, in kilobytes in the upper half of a register: AMD64 Architecture
@@ -47,7 +51,7 @@ pub fn second_level_cache() -> usize {
 /// 8000_0006h.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, unused_unsafe)]
-fn ask() -> Option<usize> {
+fn cache_size_from_cpuid() -> Option<usize> {
     use core::arch::x86_64::__cpuid;
     const FUNCTION: u32 = 0x8000_0006;
     // SAFETY: every processor of this architecture has the instruction, and functions that it does

@@ -65,7 +65,10 @@ pub(crate) use side_by_side;
 #[cfg(target_arch = "x86_64")]
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
-        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
+        fn run_in_widest_register<C: crate::scalar::Widest<Self>>(
+            lanes: usize,
+            computation: C,
+        ) -> Result<C::Output, C> {
             use crate::scalar::lanes::{self, Level, level, may_be};
             if const { may_be(Level::Avx512) } && level() == Level::Avx512 && lanes >= $most {
                 return Ok(computation.call::<lanes::$avx512<$most>>());
@@ -80,7 +83,10 @@ macro_rules! widest_register {
 #[cfg(not(target_arch = "x86_64"))]
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
-        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
+        fn run_in_widest_register<C: crate::scalar::Widest<Self>>(
+            lanes: usize,
+            computation: C,
+        ) -> Result<C::Output, C> {
             use crate::scalar::lanes::{Level, level};
             if level() < Level::Base || lanes < $few {
                 return Err(computation);

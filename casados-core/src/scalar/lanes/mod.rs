@@ -114,21 +114,21 @@ macro_rules! registers {
 }
 
 /// The level that is used; [`UNKNOWN`] until somebody asks.
-static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
-const UNKNOWN: u8 = u8::MAX;
+static SIMD_LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN_LEVEL);
+const UNKNOWN_LEVEL: u8 = u8::MAX;
 
 /// For tests: from now on no calculation of the process uses wider registers than these, nor such
 /// as the machine does not have.
 #[doc(hidden)]
-pub fn limit(limit: Level) {
-    LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
+pub fn limit_level(limit: Level) {
+    SIMD_LEVEL.store(widest_level(limit) as u8, Ordering::Relaxed);
 }
 
 /// The registers that the build names (`-C target-cpu=native`): every machine has them that may run
 /// the program, and there is code for no others.
-const NAMED: Option<Level> = if is_named(Level::Avx512) {
+const BUILD_LEVEL: Option<Level> = if is_enabled_by_build(Level::Avx512) {
     Some(Level::Avx512)
-} else if is_named(Level::Avx2) {
+} else if is_enabled_by_build(Level::Avx2) {
     Some(Level::Avx2)
 } else {
     None
@@ -137,7 +137,7 @@ const NAMED: Option<Level> = if is_named(Level::Avx512) {
 /// Whether this may be the [`level`] of a machine that runs the program. Without `std` nobody asks
 /// the machine, and it has what the program was compiled for.
 pub const fn may_be(level: Level) -> bool {
-    match NAMED {
+    match BUILD_LEVEL {
         Some(named) => level as u8 == named as u8,
         None => cfg!(feature = "std") || (level as u8) <= Level::Base as u8,
     }
@@ -150,15 +150,15 @@ pub const AVX2: bool = may_be(Level::Avx2) || may_be(Level::Avx512);
 /// where it does.
 #[inline(always)]
 pub fn level() -> Level {
-    if let Some(named) = NAMED {
+    if let Some(named) = BUILD_LEVEL {
         return named;
     }
-    let level = match LEVEL.load(Ordering::Relaxed) {
+    let level = match SIMD_LEVEL.load(Ordering::Relaxed) {
         level if level == Level::Single as u8 => Level::Single,
         level if level == Level::Base as u8 => Level::Base,
         level if level == Level::Avx2 as u8 => Level::Avx2,
         level if level == Level::Avx512 as u8 => Level::Avx512,
-        _ => find(),
+        _ => detect_level(),
     };
     // What there cannot be the compiler leaves out.
     match level {
@@ -168,19 +168,19 @@ pub fn level() -> Level {
 }
 
 #[cold]
-fn find() -> Level {
-    limit(Level::Avx512);
-    widest(Level::Avx512)
+fn detect_level() -> Level {
+    limit_level(Level::Avx512);
+    widest_level(Level::Avx512)
 }
 
 /// The widest registers that this machine has, up to a limit.
-fn widest(limit: Level) -> Level {
+fn widest_level(limit: Level) -> Level {
     let levels = [Level::Avx512, Level::Avx2, Level::Base];
     levels.into_iter().find(|&level| level <= limit && is_there(level)).unwrap_or(Level::Single)
 }
 
 /// Whether the build says that every machine has these registers.
-const fn is_named(level: Level) -> bool {
+const fn is_enabled_by_build(level: Level) -> bool {
     macro_rules! has {
         ($($feature:tt)*) => { $(cfg!(target_feature = $feature))&&* };
     }

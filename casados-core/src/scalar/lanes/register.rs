@@ -22,14 +22,14 @@ mod parts;
 /// Both in one register, inside of a function for AVX-512.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub(super) fn join(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
+pub(super) fn join_halves(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
     F64x8(avx512_f64::join(a.0, b.0))
 }
 
 /// Both halves.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub(super) fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
+pub(super) fn split_halves(joined: F64x8<8>) -> [F64x4<4>; 2] {
     avx512_f64::halves(joined.0).map(F64x4)
 }
 

@@ -2,7 +2,7 @@
 //! abreast, so that the processor works on some while others wait for themselves.
 
 use super::functions::{CallWithEight, CallWithFour, Double, Elementary, Two};
-use super::register::{F64x4, apart, join};
+use super::register::{F64x4, join_halves, split_halves};
 use core::marker::PhantomData;
 
 /// The first and the last arguments of two functions, and of four.
@@ -99,7 +99,7 @@ pub struct Abreast<F, const K: usize, const R: usize>(PhantomData<F>);
 
 /// The arguments of a function.
 #[inline(always)]
-fn arguments<D: Copy, const K: usize>(first: D, last: D) -> [D; K] {
+fn first_and_last_arguments<D: Copy, const K: usize>(first: D, last: D) -> [D; K] {
     let mut all = [first; K];
     if K > 1 {
         all[K - 1] = last;
@@ -111,7 +111,7 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithFou
     type Output = [[D; R]; 2];
     #[inline(always)]
     fn call([a, b, c, d]: [D; 4]) -> Self::Output {
-        let results = F::inside(arguments(Two(a, c), Two(b, d)));
+        let results = F::inside(first_and_last_arguments(Two(a, c), Two(b, d)));
         let mut apart = [[a; R]; 2];
         for (r, Two(first, second)) in results.into_iter().enumerate() {
             [apart[0][r], apart[1][r]] = [first, second];
@@ -124,7 +124,8 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithEig
     type Output = [[D; R]; 4];
     #[inline(always)]
     fn call([a, b, c, d, e, f, g, h]: [D; 8]) -> Self::Output {
-        let results = F::inside(arguments(Two(Two(a, c), Two(e, g)), Two(Two(b, d), Two(f, h))));
+        let results =
+            F::inside(first_and_last_arguments(Two(Two(a, c), Two(e, g)), Two(Two(b, d), Two(f, h))));
         let mut apart = [[a; R]; 4];
         for (r, Two(Two(first, second), Two(third, fourth))) in results.into_iter().enumerate() {
             [apart[0][r], apart[1][r], apart[2][r], apart[3][r]] = [first, second, third, fourth];
@@ -141,10 +142,10 @@ impl<F: Elementary<K, R>, const K: usize, const R: usize> CallWithFour<F64x4<4>>
     type Output = [[F64x4<4>; R]; 2];
     #[inline(always)]
     fn call([a, b, c, d]: [F64x4<4>; 4]) -> Self::Output {
-        let joined = F::inside(arguments(join(a, c), join(b, d)));
+        let joined = F::inside(first_and_last_arguments(join_halves(a, c), join_halves(b, d)));
         let mut results = [[a; R]; 2];
         for r in 0..R {
-            [results[0][r], results[1][r]] = apart(joined[r]);
+            [results[0][r], results[1][r]] = split_halves(joined[r]);
         }
         results
     }
@@ -154,11 +155,14 @@ impl<F: Elementary<K, R>, const K: usize, const R: usize> CallWithEight<F64x4<4>
     type Output = [[F64x4<4>; R]; 4];
     #[inline(always)]
     fn call([a, b, c, d, e, f, g, h]: [F64x4<4>; 8]) -> Self::Output {
-        let joined = F::inside(arguments(Two(join(a, c), join(e, g)), Two(join(b, d), join(f, h))));
+        let joined = F::inside(first_and_last_arguments(
+            Two(join_halves(a, c), join_halves(e, g)),
+            Two(join_halves(b, d), join_halves(f, h)),
+        ));
         let mut results = [[a; R]; 4];
         for (r, Two(first, second)) in joined.into_iter().enumerate() {
-            [results[0][r], results[1][r]] = apart(first);
-            [results[2][r], results[3][r]] = apart(second);
+            [results[0][r], results[1][r]] = split_halves(first);
+            [results[2][r], results[3][r]] = split_halves(second);
         }
         results
     }

@@ -5,16 +5,16 @@
 //! numbers, so that its rounding error does not count. Polynomials are those of FreeBSD's
 //! `k_sinf.c`, `k_cosf.c` and `e_asinf.c`.
 
-use super::{ROUND, ordered_sum, polynomial, product, sqrt, sum};
+use super::{ROUNDING_SHIFT, exact_ordered_sum, exact_product, exact_sum, polynomial, sqrt};
 use core::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4};
 
 /// `(sin r − r)/r³` in `r²`
-const SIN: [f32; 4] = [2.718_311_5e-6, -1.983_933_5e-4, 8.333_33e-3, -0.166_666_67];
+const SIN_POLYNOMIAL: [f32; 4] = [2.718_311_5e-6, -1.983_933_5e-4, 8.333_33e-3, -0.166_666_67];
 /// `(cos r − 1 + r²/2)/r⁴` in `r²`
-const COS: [f32; 3] = [2.439_044_9e-5, -1.388_676_4e-3, 0.041_666_623];
+const COS_POLYNOMIAL: [f32; 3] = [2.439_044_9e-5, -1.388_676_4e-3, 0.041_666_623];
 
 /// π/2 in three pieces of 12 bits, and what is left. (As bits, for they must be exact.)
-const PI_2: [f32; 4] = [
+const PI_2_PARTS: [f32; 4] = [
     f32::from_bits(0x3FC9_0000),
     f32::from_bits(0x39FD_A000),
     f32::from_bits(0x33A2_2000),
@@ -22,35 +22,35 @@ const PI_2: [f32; 4] = [
 ];
 
 /// Integers below 2¹² times a piece of 12 bits are exact.
-const LIMIT: f32 = 3000.0;
+const MAX_REDUCED_ARGUMENT: f32 = 3000.0;
 
 /// The digits of 2/π, 32 zeros first.
-const TWO_OVER_PI: [u32; 8] =
+const TWO_OVER_PI_DIGITS: [u32; 8] =
     [0, 0xA2F9_836E, 0x4E44_1529, 0xFC27_57D1, 0xF534_DDC0, 0xDB62_9599, 0x3C43_9041, 0xFE51_63AB];
 
 /// `n` modulo 4 and `r` as a sum, for a finite `a ≥ 0`.
 #[inline(always)]
-fn reduce(a: f32) -> (u32, (f32, f32)) {
-    if a >= LIMIT {
-        return reduce_large(a);
+fn reduce_modulo_pi_2(a: f32) -> (u32, (f32, f32)) {
+    if a >= MAX_REDUCED_ARGUMENT {
+        return reduce_large_argument(a);
     }
-    let shifted = a * FRAC_2_PI + ROUND;
-    let n = shifted - ROUND;
-    let first = a - n * PI_2[0];
-    let second = sum(first, -(n * PI_2[1]));
-    let third = sum(second.0, -(n * PI_2[2]));
-    (shifted.to_bits(), ordered_sum(third.0, (third.1 + second.1) - n * PI_2[3]))
+    let shifted = a * FRAC_2_PI + ROUNDING_SHIFT;
+    let n = shifted - ROUNDING_SHIFT;
+    let first = a - n * PI_2_PARTS[0];
+    let second = exact_sum(first, -(n * PI_2_PARTS[1]));
+    let third = exact_sum(second.0, -(n * PI_2_PARTS[2]));
+    (shifted.to_bits(), exact_ordered_sum(third.0, (third.1 + second.1) - n * PI_2_PARTS[3]))
 }
 
 /// The product of the 24 digits of `a` with those of 2/π that matter: quarter turns in the upper
 /// two bits of 64, and what is left of one below.
 #[cold]
-fn reduce_large(a: f32) -> (u32, (f32, f32)) {
+fn reduce_large_argument(a: f32) -> (u32, (f32, f32)) {
     let bits = a.to_bits();
     let mantissa = u64::from(bits & 0x007F_FFFF | 0x0080_0000);
     // Digits of 2/π before these give whole turns only.
     let begin = (bits >> 23).saturating_sub(120);
-    let word = |index: u32| u64::from(*TWO_OVER_PI.get(index as usize).unwrap_or(&0));
+    let word = |index: u32| u64::from(*TWO_OVER_PI_DIGITS.get(index as usize).unwrap_or(&0));
     let (first, shift) = (begin / 32, begin % 32);
     let digits = |index: u32| (word(first + index) << 32 | word(first + index + 1)) << shift >> 32;
     // The digits weigh 2⁻³², 2⁻⁶⁴ and 2⁻⁹⁶.
@@ -61,10 +61,10 @@ fn reduce_large(a: f32) -> (u32, (f32, f32)) {
     let rest = fraction.wrapping_sub(n << 62) as i64;
     let high = rest as f32;
     let low = (rest - high as i64) as f32;
-    const UNIT: f32 = 1.0 / (1_u64 << 62) as f32;
-    let (r, error) = product(high * UNIT, FRAC_PI_2);
-    let low = error + (high * UNIT) * FRAC_PI_2_LOW + (low * UNIT) * FRAC_PI_2;
-    (n as u32, ordered_sum(r, low))
+    const FIXED_POINT_UNIT: f32 = 1.0 / (1_u64 << 62) as f32;
+    let (r, error) = exact_product(high * FIXED_POINT_UNIT, FRAC_PI_2);
+    let low = error + (high * FIXED_POINT_UNIT) * FRAC_PI_2_LOW + (low * FIXED_POINT_UNIT) * FRAC_PI_2;
+    (n as u32, exact_ordered_sum(r, low))
 }
 
 /// What π/2 lacks as `f32`.
@@ -72,17 +72,17 @@ const FRAC_PI_2_LOW: f32 = -4.371_139e-8;
 
 /// `(sin r, cos r)` as sums.
 #[inline(always)]
-fn near_zero((r, low): (f32, f32)) -> ((f32, f32), (f32, f32)) {
+fn sin_cos_reduced((r, low): (f32, f32)) -> ((f32, f32), (f32, f32)) {
     let square = r * r;
     let half = 0.5 * square;
-    let sin = (r, r * square * polynomial(square, SIN) + (low - low * half));
-    let one = ordered_sum(1.0, -half);
-    (sin, (one.0, one.1 + (square * square * polynomial(square, COS) - r * low)))
+    let sin = (r, r * square * polynomial(square, SIN_POLYNOMIAL) + (low - low * half));
+    let one = exact_ordered_sum(1.0, -half);
+    (sin, (one.0, one.1 + (square * square * polynomial(square, COS_POLYNOMIAL) - r * low)))
 }
 
 /// A number with its sign changed where a bit of `n` is set.
 #[inline(always)]
-fn signed(a: f32, n: u32) -> f32 {
+fn flip_sign_by_bit(a: f32, n: u32) -> f32 {
     f32::from_bits(a.to_bits() ^ (n & 2) << 30)
 }
 
@@ -92,12 +92,12 @@ pub fn sin_cos(a: f32) -> (f32, f32) {
     if !a.is_finite() {
         return (f32::NAN, f32::NAN);
     }
-    let (n, r) = reduce(a.abs());
-    let (sin, cos) = near_zero(r);
+    let (n, r) = reduce_modulo_pi_2(a.abs());
+    let (sin, cos) = sin_cos_reduced(r);
     let (sin, cos) = (sin.0 + sin.1, cos.0 + cos.1);
     let (sin, cos) = if n & 1 == 0 { (sin, cos) } else { (cos, sin) };
-    let sign = f32::from_bits(signed(sin, n).to_bits() ^ a.to_bits() & 0x8000_0000);
-    (sign, signed(cos, n.wrapping_add(1)))
+    let sign = f32::from_bits(flip_sign_by_bit(sin, n).to_bits() ^ a.to_bits() & 0x8000_0000);
+    (sign, flip_sign_by_bit(cos, n.wrapping_add(1)))
 }
 
 /// `sin a`
@@ -122,12 +122,12 @@ pub fn tan(a: f32) -> f32 {
     if a.abs() < 1e-4 {
         return a + a * (a * a) * (1.0 / 3.0);
     }
-    let (n, r) = reduce(a.abs());
-    let (sin, cos) = near_zero(r);
-    let (sin, cos) = (ordered_sum(sin.0, sin.1), ordered_sum(cos.0, cos.1));
+    let (n, r) = reduce_modulo_pi_2(a.abs());
+    let (sin, cos) = sin_cos_reduced(r);
+    let (sin, cos) = (exact_ordered_sum(sin.0, sin.1), exact_ordered_sum(cos.0, cos.1));
     let (above, below) = if n & 1 == 0 { (sin, cos) } else { ((-cos.0, -cos.1), sin) };
     let quotient = above.0 / below.0;
-    let (back, error) = product(quotient, below.0);
+    let (back, error) = exact_product(quotient, below.0);
     let rest = ((above.0 - back) - error) + (above.1 - quotient * below.1);
     let tan = quotient + rest / below.0;
     if a < 0.0 { -tan } else { tan }
@@ -135,8 +135,8 @@ pub fn tan(a: f32) -> f32 {
 
 /// `arcsin a`, beyond ½ by `arcsin a = π/2 − 2 arcsin √((1 − a)/2)`.
 pub fn asin(a: f32) -> f32 {
-    const P: [f32; 3] = [-8.656_363e-3, -4.274_342e-2, 1.666_658_7e-1];
-    let ratio = |z: f32| z * polynomial(z, P) / (1.0 - 7.066_296e-1 * z);
+    const ASIN_POLYNOMIAL: [f32; 3] = [-8.656_363e-3, -4.274_342e-2, 1.666_658_7e-1];
+    let ratio = |z: f32| z * polynomial(z, ASIN_POLYNOMIAL) / (1.0 - 7.066_296e-1 * z);
     let magnitude = a.abs();
     if magnitude < 0.5 {
         return a + a * ratio(a * a);

@@ -59,7 +59,7 @@ mod instruction {
 
 /// `a 2ⁿ`, rounded once, for `a` near 1 and `|n| ≤ 250`.
 #[inline(always)]
-fn times_power(a: f32, n: i32) -> f32 {
+fn scale_by_power_of_two(a: f32, n: i32) -> f32 {
     let half = n / 2;
     let power = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
     a * power(half) * power(n - half)
@@ -68,32 +68,37 @@ fn times_power(a: f32, n: i32) -> f32 {
 /// `2ᵃ = 2ⁿ 2ʳ`, `|r| ≤ ½`, with the polynomial of S. Moshier's Cephes for `(2ʳ − 1)/r`, its
 /// largest term as a sum.
 pub fn exp2(a: f32) -> f32 {
-    const P: [f32; 5] = [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1];
+    const EXP2_POLYNOMIAL: [f32; 5] =
+        [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1];
     // What ln 2 lacks as `f32`.
     const LN_2_LOW: f32 = -1.904_654_3e-9;
     // Comparisons with NaN are false: it stays.
     let a = if a > 130.0 { 130.0 } else { a };
     let a = if a < -152.0 { -152.0 } else { a };
-    let n = (a + ROUND) - ROUND;
+    let n = (a + ROUNDING_SHIFT) - ROUNDING_SHIFT;
     let r = a - n;
-    let (linear, rest) = product(r, core::f32::consts::LN_2);
-    let (one, low) = ordered_sum(1.0, linear);
-    times_power(one + (low + (rest + r * LN_2_LOW + r * r * polynomial(r, P))), n as i32)
+    let (linear, rest) = exact_product(r, core::f32::consts::LN_2);
+    let (one, low) = exact_ordered_sum(1.0, linear);
+    scale_by_power_of_two(
+        one + (low + (rest + r * LN_2_LOW + r * r * polynomial(r, EXP2_POLYNOMIAL))),
+        n as i32,
+    )
 }
 
 /// `eᵃ = 2ⁿ eʳ`, `|r| ≤ ln 2 / 2`, with the polynomial of S. Moshier's Cephes for
 /// `(eʳ − 1 − r)/r²`, its largest terms as a sum.
 pub fn exp(a: f32) -> f32 {
-    const P: [f32; 6] = [1.987_569_2e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
+    const EXP_POLYNOMIAL: [f32; 6] =
+        [1.987_569_2e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
     /// ln 2 as 355/512, whose products with `n` are exact, and what that is too large by.
     const LN_2: [f32; 2] = [f32::from_bits(0x3F31_8000), 2.121_944_4e-4];
     // Comparisons with NaN are false: it stays.
     let a = if a > 90.0 { 90.0 } else { a };
     let a = if a < -105.0 { -105.0 } else { a };
-    let n = (a * core::f32::consts::LOG2_E + ROUND) - ROUND;
-    let (r, rest) = sum(a - n * LN_2[0], n * LN_2[1]);
-    let (one, low) = ordered_sum(1.0, r);
-    times_power(one + (low + (rest + r * r * polynomial(r, P))), n as i32)
+    let n = (a * core::f32::consts::LOG2_E + ROUNDING_SHIFT) - ROUNDING_SHIFT;
+    let (r, rest) = exact_sum(a - n * LN_2[0], n * LN_2[1]);
+    let (one, low) = exact_ordered_sum(1.0, r);
+    scale_by_power_of_two(one + (low + (rest + r * r * polynomial(r, EXP_POLYNOMIAL))), n as i32)
 }
 
 /// `∛a`: a guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of Halley's
@@ -103,15 +108,16 @@ pub fn cbrt(a: f32) -> f32 {
     if !(magnitude > 0.0 && magnitude <= f32::MAX) {
         return a + a;
     }
-    let (up, back) = scale(magnitude, [1e-30, 1e30], [EIGHT_BITS * EIGHT_BITS * EIGHT_BITS, EIGHT_BITS]);
+    let (up, back) =
+        power_of_two_scaling(magnitude, [1e-30, 1e30], [TWO_TO_8 * TWO_TO_8 * TWO_TO_8, TWO_TO_8]);
     let scaled = magnitude * up;
     let mut root = f32::from_bits(scaled.to_bits() / 3 + 709_958_130);
     for _ in 0..2 {
         let cube = root * root * root;
         root *= (scaled + scaled + cube) / (scaled + cube + cube);
     }
-    let (square, low) = product(root, root);
-    let (cube, rest) = product(square, root);
+    let (square, low) = exact_product(root, root);
+    let (cube, rest) = exact_product(square, root);
     root -= ((cube - scaled) + (rest + low * root)) / (3.0 * square);
     (root * back).copysign(a)
 }
@@ -123,23 +129,24 @@ pub fn hypot(a: f32, b: f32) -> f32 {
         return f32::INFINITY;
     }
     let (long, short) = if a < b { (b, a) } else { (a, b) };
-    let (up, down) = scale(long, [1e-8, 1e18], [NINETY_BITS, NINETY_BITS]);
+    let (up, down) = power_of_two_scaling(long, [1e-8, 1e18], [TWO_TO_90, TWO_TO_90]);
     let (long, short) = (long * up, short * up);
-    let ((long_square, low), (short_square, lower)) = (product(long, long), product(short, short));
-    let (sum, rest) = ordered_sum(long_square, short_square);
+    let ((long_square, low), (short_square, lower)) =
+        (exact_product(long, long), exact_product(short, short));
+    let (sum, rest) = exact_ordered_sum(long_square, short_square);
     let rest = rest + (low + lower);
     let root = sqrt(sum);
-    let (back, error) = product(root, root);
+    let (back, error) = exact_product(root, root);
     let rest = ((sum - back) - error) + rest;
     if root == 0.0 { long + short } else { (root + rest / (root + root)) * down }
 }
 
-const EIGHT_BITS: f32 = 256.0;
-const NINETY_BITS: f32 = (1_u128 << 90) as f32;
+const TWO_TO_8: f32 = 256.0;
+const TWO_TO_90: f32 = (1_u128 << 90) as f32;
 
 /// What brings a number between bounds, and its result back: powers of two and their reciprocals.
 #[inline(always)]
-fn scale(a: f32, [low, high]: [f32; 2], [up, down]: [f32; 2]) -> (f32, f32) {
+fn power_of_two_scaling(a: f32, [low, high]: [f32; 2], [up, down]: [f32; 2]) -> (f32, f32) {
     if a < low {
         (up, 1.0 / down)
     } else if a > high {
@@ -156,18 +163,18 @@ pub fn acosh(a: f32) -> f32 {
 
 /// `1.5 · 2²³`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
 /// last bits.
-const ROUND: f32 = 12_582_912.0;
+const ROUNDING_SHIFT: f32 = 12_582_912.0;
 
 /// `a + b` and what rounding took, for `|a| ≥ |b|`.
 #[inline(always)]
-fn ordered_sum(a: f32, b: f32) -> (f32, f32) {
+fn exact_ordered_sum(a: f32, b: f32) -> (f32, f32) {
     let [high, low] = super::fast_two_sum(a, b);
     (high, low)
 }
 
 /// `a + b` and what rounding took.
 #[inline(always)]
-fn sum(a: f32, b: f32) -> (f32, f32) {
+fn exact_sum(a: f32, b: f32) -> (f32, f32) {
     let [high, low] = super::two_sum(a, b);
     (high, low)
 }
@@ -175,7 +182,7 @@ fn sum(a: f32, b: f32) -> (f32, f32) {
 /// `a b` and what rounding took (Dekker), of numbers whose product neither overflows nor
 /// underflows.
 #[inline(always)]
-fn product(a: f32, b: f32) -> (f32, f32) {
+fn exact_product(a: f32, b: f32) -> (f32, f32) {
     let halves = |a: f32| {
         let scaled = a * 4097.0;
         let upper = scaled - (scaled - a);

@@ -4,10 +4,10 @@ use std::format;
 use std::string::String;
 
 /// Every how many-th number is tried: a prime, so that no pattern of bits is left out.
-const STRIDE: usize = if cfg!(debug_assertions) { 9973 } else { 997 };
+const ARGUMENT_STRIDE: usize = if cfg!(debug_assertions) { 9973 } else { 997 };
 
 /// The distance of a result from the exact one in units in the last place of that.
-fn units(result: f32, exact: f64) -> f64 {
+fn error_in_ulps(result: f32, exact: f64) -> f64 {
     let rounded = exact as f32;
     if exact.is_nan() || rounded.is_infinite() || result.is_nan() {
         return if result == rounded || exact.is_nan() && result.is_nan() { 0.0 } else { f64::INFINITY };
@@ -19,9 +19,9 @@ fn units(result: f32, exact: f64) -> f64 {
 /// The largest error, and where it is.
 fn largest(f: impl Fn(f32) -> f32, exact: impl Fn(f64) -> f64) -> (f64, f32) {
     let mut largest = (0.0, 0.0);
-    for bits in (0..=u32::MAX).step_by(STRIDE) {
+    for bits in (0..=u32::MAX).step_by(ARGUMENT_STRIDE) {
         let a = f32::from_bits(bits);
-        let error = units(f(a), exact(f64::from(a)));
+        let error = error_in_ulps(f(a), exact(f64::from(a)));
         if error > largest.0 {
             largest = (error, a);
         }
@@ -57,7 +57,7 @@ fn errors_are_below_their_bounds() {
 fn errors_of_functions_of_two_numbers() {
     let mut worst = [(0.0, 0.0, 0.0); 3];
     let mut state = 1_u64;
-    for _ in 0..4_000_000_000 / STRIDE {
+    for _ in 0..4_000_000_000 / ARGUMENT_STRIDE {
         // Bits at random, then one of both near the other.
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let a = f32::from_bits((state >> 32) as u32);
@@ -68,9 +68,9 @@ fn errors_of_functions_of_two_numbers() {
         };
         let (x, y) = (f64::from(a), f64::from(b));
         let errors = [
-            units(super::hypot(a, b), x.hypot(y)),
-            units(libm::atan2f(a, b), x.atan2(y)),
-            units(libm::powf(a, b), x.powf(y)),
+            error_in_ulps(super::hypot(a, b), x.hypot(y)),
+            error_in_ulps(libm::atan2f(a, b), x.atan2(y)),
+            error_in_ulps(libm::powf(a, b), x.powf(y)),
         ];
         for (worst, error) in worst.iter_mut().zip(errors) {
             if error > worst.0 {

@@ -6,36 +6,40 @@ use super::*;
 impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// How the model at a stage or at the end of the step differs from that at its start: by a
     /// branch, or by no more than the pieces of its splines.
-    pub(super) fn change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange> {
+    pub(super) fn branch_change(&mut self, start: &StepContext<'_, M, T>) -> Option<BranchChange> {
         if const { M::BRANCHES == 0 } {
             return None;
         }
-        let before = Branches::of::<M, T>(start.point);
+        let before = Branches::at_point::<M, T>(start.start_point);
         let mut point = ArrayV::<M, T>::zeroed();
         let mut change = None;
-        for at in &self.memory.branches {
-            change = change.max(before.change(*at));
+        for at in &self.memory.stage_branches {
+            change = change.max(before.change_to(*at));
         }
-        if self.estimates(start, &mut point) {
-            change = change.max(before.change(Branches::of::<M, T>(&point)));
+        if self.estimate_point(start, &mut point) {
+            change = change.max(before.change_to(Branches::at_point::<M, T>(&point)));
         }
         change
     }
 
     /// Where the stages are beside borders: since this was asked last, and from where the branches
     /// are those of the `jacobian`.
-    pub(super) fn sides(&mut self, jacobian: Branches) -> Sides {
-        let mut sides = Sides::default();
+    pub(super) fn update_surface_crossing(&mut self, jacobian: Branches) -> SurfaceCrossing {
+        let mut sides = SurfaceCrossing::default();
         if const { M::BRANCHES == 0 } {
             return sides;
         }
         let mut point = ArrayV::<M, T>::zeroed();
         for stage in 0..S {
-            take(self.memory.points[stage / GROUP].as_ref(), stage % GROUP, point.as_mut());
-            let at = Branches::of::<M, T>(&point);
-            let before = core::mem::replace(&mut self.memory.branches[stage], at);
-            sides.passed |= before.change(at) == Some(BranchChange::Switch);
-            sides.beyond |= jacobian.change(at) == Some(BranchChange::Switch);
+            copy_lane(
+                self.memory.stage_points[stage / STAGES_PER_GROUP].as_ref(),
+                stage % STAGES_PER_GROUP,
+                point.as_mut(),
+            );
+            let at = Branches::at_point::<M, T>(&point);
+            let before = core::mem::replace(&mut self.memory.stage_branches[stage], at);
+            sides.crossed_last |= before.change_to(at) == Some(BranchChange::Switch);
+            sides.off_jacobian_branch |= jacobian.change_to(at) == Some(BranchChange::Switch);
         }
         sides
     }

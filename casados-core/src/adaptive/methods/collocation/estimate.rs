@@ -10,45 +10,45 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// state that was reached: of stiff components this is their error, which no method with
     /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
     /// the estimate. The second, of the states, is that of [`DefectFilter`].
-    pub(super) fn estimate(
+    pub(super) fn estimate_from_point(
         &mut self,
         start: &StepContext<'_, M, T>,
         at_end: bool,
         residuals: &mut usize,
-    ) -> Result<f64, Failure> {
-        self.defect(start.h, residuals)?;
+    ) -> Result<f64, NewtonFailure> {
+        self.estimate_from_defect(start.h, residuals)?;
         let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
-        let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
-        let first = norm(errors, start.scale.as_ref());
-        let larger = self.second(first, start);
-        if at_end || !start.known || larger <= first.max(SAFE_ESTIMATE) {
+        let errors = self.memory.error_estimate.as_ref().get(..counted).unwrap_or_default();
+        let first = norm(errors, start.estimator_scale.as_ref());
+        let larger = self.second_estimate(first, start);
+        if at_end || !start.derivatives_are_known || larger <= first.max(SAFE_ESTIMATE) {
             return Ok(larger);
         }
         // Newton's method leaves a residual of algebraic equations at the start, which does not
         // shrink with the step: not of this step, and without it only the second estimate is below
         // its tolerance.
-        let mut defect = self.memory.f_point;
-        self.memory.point = *start.point;
-        self.evaluate_point(residuals)?;
-        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.f_point.as_ref()) {
+        let mut defect = self.memory.defect_residual;
+        self.memory.defect_point = *start.start_point;
+        self.evaluate_point_residual(residuals)?;
+        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.defect_residual.as_ref()) {
             *defect = *defect - *left;
         }
-        self.filter(start.h, &mut defect);
-        Ok(self.second(first, start))
+        self.filter_residual(start.h, &mut defect);
+        Ok(self.second_estimate(first, start))
     }
 
     /// The larger one of an estimate and the second one, of the defect that was filtered last.
-    fn second(&self, first: f64, start: &StepContext<'_, M, T>) -> f64 {
+    fn second_estimate(&self, first: f64, start: &StepContext<'_, M, T>) -> f64 {
         let [error, divided] = self.filtered_defect(start.h);
         let mut relative = RelativeErrors::default();
-        let user_ratio = start.scale.as_ref().iter().zip(start.user_ratio.as_ref());
+        let user_ratio = start.estimator_scale.as_ref().iter().zip(start.user_ratio.as_ref());
         for ((error, divided), (scale, user_ratio)) in
             error.as_ref().iter().zip(divided.as_ref()).zip(user_ratio)
         {
             let user_ratio = *scale * *user_ratio;
             relative.add((*error * user_ratio).to_f64(), (*divided * user_ratio).to_f64());
         }
-        self.scheme.defect_filter.larger(first, start.tolerance_ratio, &relative)
+        self.scheme.defect_filter.max_estimate(first, start.tolerance_ratio, &relative)
     }
 
     /// The larger one of an estimate at the end of a step and the same at its start: of what ends
@@ -57,51 +57,51 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     /// nothing new: no filter makes more of what is neither stiff nor turns, and where the estimate
     /// is held against the tolerance that was asked for it counts `tolerance_ratio /
     /// ORDER_REDUCTION_RATIO` times at most.
-    pub(super) fn larger_at_start(
+    pub(super) fn max_with_start_estimate(
         &mut self,
         start: &StepContext<'_, M, T>,
         error: f64,
         residuals: &mut usize,
-    ) -> Result<f64, Failure> {
+    ) -> Result<f64, NewtonFailure> {
         let (nx, mut changes) = (M::Shape::NX, ArrayK::<M, T>::zeroed());
-        self.memory.point = *start.point;
-        let Memory { point, y, .. } = &mut *self.memory;
-        combine(&self.scheme.lagrange, y.as_ref(), changes.as_mut());
+        self.memory.defect_point = *start.start_point;
+        let StageMemory { defect_point: point, stage_unknowns: y, .. } = &mut *self.memory;
+        weighted_stage_sums(&self.scheme.lagrange_at_start, y.as_ref(), changes.as_mut());
         for (index, change) in changes.as_mut().iter_mut().enumerate() {
-            let old = &mut point[variable::<M>(index)];
+            let old = &mut point[variable_of_unknown::<M>(index)];
             let slope = *change;
             *change = slope - *old;
             *old = slope;
         }
-        let unfiltered = self.scheme.basis.values().scaled(start.h).get(0).0.to_f64().abs()
-            * norm(&changes.as_ref()[..nx], start.scale.as_ref());
+        let unfiltered = self.scheme.basis.eigenvalues().scaled(start.h).get(0).0.to_f64().abs()
+            * norm(&changes.as_ref()[..nx], start.estimator_scale.as_ref());
         let undoubted = SAFE_ESTIMATE * (ORDER_REDUCTION_RATIO / start.tolerance_ratio).min(1.0);
         if unfiltered <= 2.0 * error.max(undoubted) {
             return Ok(error);
         }
-        let at_end = self.memory.error;
-        self.defect(start.h, residuals)?;
-        let first = norm(&self.memory.error.as_ref()[..nx], start.scale.as_ref());
-        self.memory.error = at_end;
-        let at_start = self.second(first, start);
+        let at_end = self.memory.error_estimate;
+        self.estimate_from_defect(start.h, residuals)?;
+        let first = norm(&self.memory.error_estimate.as_ref()[..nx], start.estimator_scale.as_ref());
+        self.memory.error_estimate = at_end;
+        let at_start = self.second_estimate(first, start);
         // Written so that NaN stays.
         Ok(if at_start <= error { error } else { at_start })
     }
 
     /// The residual at the point that is there.
-    pub(super) fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { point, f_point, .. } = &mut *self.memory;
+    pub(super) fn evaluate_point_residual(&mut self, residuals: &mut usize) -> Result<(), NewtonFailure> {
+        let StageMemory { defect_point: point, defect_residual: f_point, .. } = &mut *self.memory;
         *residuals += 1;
         M::residual::<T>(point, f_point);
-        if find_non_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
+        if find_non_finite(f_point.as_ref()).is_some() { Err(NewtonFailure::NotFinite) } else { Ok(()) }
     }
 
     /// The estimated error of `(x, z)` from the defect at the point that is there.
-    fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        self.evaluate_point(residuals)?;
-        let mut error = self.memory.f_point;
-        self.filter(h, &mut error);
-        self.memory.error = error;
+    fn estimate_from_defect(&mut self, h: T, residuals: &mut usize) -> Result<(), NewtonFailure> {
+        self.evaluate_point_residual(residuals)?;
+        let mut error = self.memory.defect_residual;
+        self.filter_residual(h, &mut error);
+        self.memory.error_estimate = error;
         Ok(())
     }
 }

@@ -5,13 +5,13 @@ mod rounding;
 mod stepper;
 
 use crate::adaptive::engine::{Engine, Kind};
-use crate::adaptive::pairs::Pair;
-use crate::adaptive::point::At;
+use crate::adaptive::pairs::EmbeddedPair;
+use crate::adaptive::point::ModelPoint;
 use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
-use crate::adaptive::step::{Accepted, After, Run, Span, Workspace};
-use crate::adaptive::step_size::{ExplicitStep, PiController, first_length};
+use crate::adaptive::step::{AcceptedStepOutput, After, Run, Span, Workspace};
+use crate::adaptive::step_size::{ExplicitStep, PiController, first_step_size};
 use crate::adaptive::tape::Entry;
-use crate::adaptive::tolerances::{Tolerances, mean, norm};
+use crate::adaptive::tolerances::{Tolerances, norm, root_mean_square};
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
 use crate::integrator::Integrator as _;
@@ -27,7 +27,7 @@ use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use core::any::Any;
 use core::marker::PhantomData;
-use stepper::{Stepper, Take};
+use stepper::{ExplicitStepper, PairStepper};
 
 /// Where rounding errors limit the steps, their number is inversely proportional to the tolerance:
 /// tolerances that need `max_steps`, times this, need half as many.
@@ -35,77 +35,92 @@ const TOLERANCE_MARGIN: f64 = 2.0;
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
-    engine: Option<Box<dyn Take<M, T> + Send + Sync>>,
+    stepper: Option<Box<dyn ExplicitStepper<M, T> + Send + Sync>>,
     /// The integrator with steps of equal size, which exists for explicit models alone.
-    replay: Option<Box<dyn Any + Send + Sync>>,
+    fixed_step_integrator: Option<Box<dyn Any + Send + Sync>>,
     method: PhantomData<fn() -> B>,
 }
 
 impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
     fn default() -> Self {
-        Self { engine: None, replay: None, method: PhantomData }
+        Self { stepper: None, fixed_step_integrator: None, method: PhantomData }
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
-    fn erk(&mut self) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
-        if self.replay.is_none() {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    fn fixed_step_erk(&mut self) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        if self.fixed_step_integrator.is_none() {
             let erk: Box<Erk<M, B, S, T, Heap>> = Box::new(Erk::new(Options::default())?);
-            self.replay = Some(erk);
+            self.fixed_step_integrator = Some(erk);
         }
         // It is one, whatever the type system knows.
-        let erk = self.replay.as_mut().and_then(|replay| replay.downcast_mut::<Erk<M, B, S, T, Heap>>());
+        let erk = self
+            .fixed_step_integrator
+            .as_mut()
+            .and_then(|replay| replay.downcast_mut::<Erk<M, B, S, T, Heap>>());
         erk.ok_or(Error::NoResult)
     }
 
     /// At the start of a step.
-    fn go(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
-        let erk = self.erk()?;
+    fn prepare_replay(&mut self, step: &AcceptedStep<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        let erk = self.fixed_step_erk()?;
         if M::Shape::NP > 0 {
-            erk.set_parameters(step.at.p)?;
+            erk.set_parameters(step.start.p)?;
         }
-        erk.set_time(step.at.t)?;
+        erk.set_time(step.start.t)?;
         Ok(erk)
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for Steps<M, B, T, S> {
     fn solve(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.go(step)?.solve_with_quadrature(step.at.x, step.at.u, step.h, along)
+        self.prepare_replay(step)?.solve_with_quadrature(step.start.x, step.start.u, step.h, integrand)
     }
 
     fn forward(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        self.go(step)?.forward_with_quadrature(step.at.x, step.at.u, step.h, along)
+        self.prepare_replay(step)?.forward_with_quadrature(step.start.x, step.start.u, step.h, integrand)
     }
 
     fn hessian(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.go(step)?.hessian_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
+        self.prepare_replay(step)?.hessian_with_quadrature(
+            step.start.x,
+            step.start.u,
+            step.h,
+            lambda,
+            integrand,
+        )
     }
 
     fn adjoint(
         &mut self,
         step: &AcceptedStep<'_, M, T>,
         lambda: &VectorX<M, T>,
-        along: OptionalIntegrand<'_, '_, M, T>,
+        integrand: OptionalIntegrand<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.go(step)?.adjoint_with_quadrature(step.at.x, step.at.u, step.h, lambda, along)
+        self.prepare_replay(step)?.adjoint_with_quadrature(
+            step.start.x,
+            step.start.u,
+            step.h,
+            lambda,
+            integrand,
+        )
     }
 
     fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {
-        self.erk()?.slopes(weights, to)
+        self.fixed_step_erk()?.slopes(weights, to)
     }
 
     fn stages(&mut self, _: usize) -> Result<&[T], Error> {
@@ -113,11 +128,11 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> StepDifferentiator<M, T> for S
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
-    fn open(&mut self) -> Result<&mut (dyn Take<M, T> + Send + Sync), Error> {
-        Ok(match &mut self.engine {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    fn open(&mut self) -> Result<&mut (dyn ExplicitStepper<M, T> + Send + Sync), Error> {
+        Ok(match &mut self.stepper {
             Some(engine) => &mut **engine,
-            none => &mut **none.insert(Box::new(Stepper::<M, B, T, S>::new()?)),
+            none => &mut **none.insert(Box::new(PairStepper::<M, B, T, S>::new()?)),
         })
     }
 
@@ -129,43 +144,44 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
         span: Span<T>,
         after: After<'_, M, T>,
     ) -> Result<(), Error> {
-        run.place(x0, &ArrayK::<M, T>::zeroed(), span.start);
+        run.write_start(x0, &ArrayK::<M, T>::zeroed(), span.start);
         run.begin_sensitivities(x0, span.start)?;
         let nx = M::Shape::NX;
         let step = self.open()?;
-        step.go(run.base.point.as_ref(), x0.as_slice());
+        step.go(run.workspace.point.as_ref(), x0.as_slice());
         let result = integrate_steps::<M, B, T, S>(step, run, span, after);
-        run.statistics.residuals += step.count();
-        run.base.point.as_mut()[nx..2 * nx].copy_from_slice(match &result {
+        run.statistics.residuals += step.take_evaluation_count();
+        run.workspace.point.as_mut()[nx..2 * nx].copy_from_slice(match &result {
             Ok(end) => end.as_slice(),
             Err(_) => x0.as_slice(),
         });
         result?;
-        run.finish();
+        run.write_result();
         Ok(())
     }
 }
 
 /// The steps of an interval; the state at its end.
-fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
-    step: &mut dyn Take<M, T>,
+fn integrate_steps<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
+    step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
     span: Span<T>,
     after: After<'_, M, T>,
 ) -> Result<VectorX<M, T>, Error> {
     let nx = M::Shape::NX;
     let mut x = VectorX::<M, T>::zeroed();
-    x.as_mut_slice().copy_from_slice(&run.base.point.as_ref()[nx..2 * nx]);
+    x.as_mut_slice().copy_from_slice(&run.workspace.point.as_ref()[nx..2 * nx]);
     let length = span.end - span.start;
     let direction = if length < T::ZERO { -1.0 } else { 1.0 };
     let longest = length.to_f64().abs().min(run.options.max_step);
     if length == T::ZERO {
         return Ok(x);
     }
-    let rtol = run.base.tolerances.rtol.as_ref().iter().map(|rtol| rtol.to_f64());
+    let rtol = run.workspace.tolerances.rtol.as_ref().iter().map(|rtol| rtol.to_f64());
     let unit = Scalar::powf(rtol.fold(0.0, f64::max), 1.0 / B::CONTROL.order);
     let mut t = span.start;
-    let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
+    let mut h =
+        T::from_f64(direction * initial_step_size::<M, B, T, S>(step, run, &x, t, direction, longest)?);
     let mut controller = PiController::new(B::CONTROL);
     let mut refusal = Refusal::Error;
     let (mut rejected, mut tried) = (false, 0);
@@ -177,10 +193,10 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         if tried >= run.options.max_steps {
             return Err(too_many_steps(step, t, tried, (span.end - t) / h));
         }
-        run.check_step(t, h, refusal)?;
+        run.check_step_size(t, h, refusal)?;
         tried += 1;
-        let most = B::GLOBAL_ERROR_FACTOR.count((length / h).to_f64(), unit);
-        let [error, of_derivatives] = attempt::<M, B, T, S>(step, run, &x, t, h, most);
+        let most = B::GLOBAL_ERROR_FACTOR.evaluate((length / h).to_f64(), unit);
+        let [error, of_derivatives] = attempt_step::<M, B, T, S>(step, run, &x, t, h, most);
         if !(error + of_derivatives).is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -188,9 +204,13 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
-        let taken = ExplicitStep { t: direction * t.to_f64(), h: h.to_f64().abs(), change: step.change() };
+        let taken = ExplicitStep {
+            t: direction * t.to_f64(),
+            h: h.to_f64().abs(),
+            branch_change: step.branch_change(),
+        };
         let error = controller.error_of_difference::<T>(taken, error).max(of_derivatives);
-        let factor = controller.factor::<T>(taken, error);
+        let factor = controller.step_size_factor::<T>(taken, error);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
@@ -200,20 +220,20 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.statistics.steps += 1;
         if let Some(sensitivities) = &mut run.sensitivities {
-            sensitivities.accept();
+            sensitivities.accept_step();
         }
-        if run.record {
+        if run.record_steps {
             run.tape.push(t, h, 0, x.as_slice(), &[])?;
         }
         let end = if last { span.end } else { t + h };
         let mut evaluate = |time: T, dense: &mut Dense<M, T>| step.interpolate(t, h, (time - t) / h, dense);
-        let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
-        after(&mut accepted, &mut run.base.dense)?;
+        let mut accepted = AcceptedStepOutput { evaluate_dense: &mut evaluate, end, stop: false };
+        after(&mut accepted, &mut run.workspace.dense)?;
         if accepted.stop {
             return Ok(x);
         }
-        x.as_mut_slice().copy_from_slice(step.end());
-        step.advance();
+        x.as_mut_slice().copy_from_slice(step.end_state());
+        step.move_to_end();
         t = end;
         if last {
             return Ok(x);
@@ -228,16 +248,16 @@ fn integrate_steps<M: Ode, B: Pair<S>, T: Real, const S: usize>(
 }
 
 /// The error of a run whose steps do not suffice, with so many left at the present length.
-fn too_many_steps<M: Dae, T: Real>(step: &dyn Take<M, T>, t: T, steps: usize, left: T) -> Error {
+fn too_many_steps<M: Dae, T: Real>(step: &dyn ExplicitStepper<M, T>, t: T, steps: usize, left: T) -> Error {
     let needed = 1.0 + left.to_f64() / steps as f64;
-    let rounding = step.is_below_rounding().then_some(TOLERANCE_MARGIN * needed);
+    let rounding = step.is_limited_by_rounding().then_some(TOLERANCE_MARGIN * needed);
     Error::TooManySteps { t: t.to_f64(), steps, stiff: rounding.is_none() && step.is_stiff(), rounding }
 }
 
 /// Takes a step from `x`: its error relative to what is tolerated, which counts so often at most,
 /// and that of derivatives if they take part; NaN if there is none.
-fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
-    step: &mut dyn Take<M, T>,
+fn attempt_step<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
+    step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
     x: &VectorX<M, T>,
     t: T,
@@ -245,17 +265,24 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     most: f64,
 ) -> [f64; 2] {
     let error = step.take(t, h).and_then(|()| {
-        let (rtol, atol) = (run.base.tolerances.rtol.as_ref(), run.base.tolerances.atol.as_ref());
-        step.error(t, h, most, rtol, atol)
+        let (rtol, atol) = (run.workspace.tolerances.rtol.as_ref(), run.workspace.tolerances.atol.as_ref());
+        step.estimate_error(t, h, most, rtol, atol)
     });
     let error = error.unwrap_or(f64::NAN);
     match &mut run.sensitivities {
         Some(sensitivities) if error <= 1.0 => {
             let Workspace { point, u, parameters, tolerances: Tolerances { rtol, atol, .. }, .. } =
-                &*run.base;
-            let taken = AcceptedStep { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
+                &*run.workspace;
+            let taken = AcceptedStep {
+                start: ModelPoint { x, u, p: parameters, t },
+                h,
+                stage_unknowns: &[],
+                order_index: 0,
+                stages_are_solved: true,
+            };
             let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
-            let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
+            let other =
+                sensitivities.explicit_error::<B, S>(&taken, step.end_state(), point.as_ref(), tolerances);
             [error, other.unwrap_or(f64::NAN)]
         }
         _ => [error, 0.0],
@@ -263,8 +290,8 @@ fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
 }
 
 /// The length of the first step.
-fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
-    step: &mut dyn Take<M, T>,
+fn initial_step_size<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
+    step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
     x: &VectorX<M, T>,
     t: T,
@@ -277,20 +304,20 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         return Ok(given.min(longest));
     }
     let mut scale = VectorX::<M, T>::zeroed();
-    let Tolerances { rtol, atol, .. } = &run.base.tolerances;
+    let Tolerances { rtol, atol, .. } = &run.workspace.tolerances;
     let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
     for ((scale, (rtol, atol)), x) in scale.as_mut_slice().iter_mut().zip(tolerances).zip(x.as_slice()) {
         *scale = T::ONE / (*atol + *rtol * x.abs());
     }
     let scale = scale.as_slice();
     let (size, speed) = (norm(x.as_slice(), scale), norm(slope.as_slice(), scale));
-    let length = first_length([size, speed], longest, 1.0 / B::CONTROL.order, |length| {
+    let length = first_step_size([size, speed], longest, 1.0 / B::CONTROL.order, |length| {
         let h = T::from_f64(direction * length);
         let mut other = *x;
         for (other, slope) in other.as_mut_slice().iter_mut().zip(slope.as_slice()) {
             *other = *other + h * *slope;
         }
-        step.go(run.base.point.as_ref(), other.as_slice());
+        step.go(run.workspace.point.as_ref(), other.as_slice());
         let mut sum = 0.0;
         if let Ok(second) = step.slope(t + h) {
             for ((second, slope), scale) in second.iter().zip(slope.as_slice()).zip(scale) {
@@ -298,9 +325,9 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
                 sum += change * change;
             }
         }
-        mean(sum, scale.len())
+        root_mean_square(sum, scale.len())
     });
-    step.go(run.base.point.as_ref(), x.as_slice());
+    step.go(run.workspace.point.as_ref(), x.as_slice());
     step.slope(t)?;
     Ok(length)
 }

@@ -22,48 +22,53 @@ const LIMITING_ERROR: f64 = 0.1;
 #[derive(Clone, Copy, Debug)]
 pub struct RoundingErrors {
     /// The state of a shift register.
-    signs: u64,
+    generator_state: u64,
     /// The mean square of the rounding errors of steps of length one, relative to the tolerance.
-    square: Option<f64>,
+    mean_square: Option<f64>,
     attempts: usize,
     /// Steps limited by rounding errors less those that are not.
-    limited: i64,
+    limited_minus_unlimited: i64,
 }
 
 impl Default for RoundingErrors {
     fn default() -> Self {
-        Self { signs: 0x9E37_79B9_7F4A_7C15, square: None, attempts: 0, limited: 0 }
+        Self {
+            generator_state: 0x9E37_79B9_7F4A_7C15,
+            mean_square: None,
+            attempts: 0,
+            limited_minus_unlimited: 0,
+        }
     }
 }
 
 impl RoundingErrors {
     /// Whether they are to be measured before this attempt.
-    pub fn are_due(&mut self) -> bool {
+    pub fn is_measurement_due(&mut self) -> bool {
         let due = self.attempts.is_multiple_of(ATTEMPTS_PER_MEASUREMENT);
         self.attempts += 1;
         due
     }
 
     /// 1 or −1 (G. Marsaglia, Xorshift RNGs, J. Stat. Softw. 8 (2003)).
-    pub fn sign(&mut self) -> f64 {
-        self.signs ^= self.signs << 13;
-        self.signs ^= self.signs >> 7;
-        self.signs ^= self.signs << 17;
-        if self.signs >> 63 == 0 { 1.0 } else { -1.0 }
+    pub fn random_sign(&mut self) -> f64 {
+        self.generator_state ^= self.generator_state << 13;
+        self.generator_state ^= self.generator_state >> 7;
+        self.generator_state ^= self.generator_state << 17;
+        if self.generator_state >> 63 == 0 { 1.0 } else { -1.0 }
     }
 
     /// Takes a measured rounding error of a step of length `h` into the mean.
-    pub fn measured(&mut self, error: f64, h: f64) {
+    pub fn record_measurement(&mut self, error: f64, h: f64) {
         let square = (error / h) * (error / h);
         if square.is_finite() {
-            self.square = Some(self.square.map_or(square, |before| 0.5 * (before + square)));
+            self.mean_square = Some(self.mean_square.map_or(square, |before| 0.5 * (before + square)));
         }
     }
 
     /// The truncation error in a difference of the methods over a step of length `h`:
     /// `√(d² − rounding²)`, since variances add up.
     pub fn truncation_error(&self, difference: f64, h: f64) -> f64 {
-        let square = difference * difference - self.square.unwrap_or(0.0) * h * h;
+        let square = difference * difference - self.mean_square.unwrap_or(0.0) * h * h;
         // Written so that NaN stays.
         if square < 0.0 { 0.0 } else { Scalar::sqrt(square) }
     }
@@ -71,12 +76,12 @@ impl RoundingErrors {
     /// Counts an attempt with this error estimate, of which so much is truncation error.
     pub fn count_attempt(&mut self, estimate: f64, truncation: f64) {
         let limits = estimate > LIMITING_ERROR && truncation < estimate;
-        self.limited += if limits { 1 } else { -1 };
+        self.limited_minus_unlimited += if limits { 1 } else { -1 };
     }
 
     /// Whether rounding errors limited most of the attempts.
-    pub fn limit_steps(&self) -> bool {
-        self.limited > 0
+    pub fn limited_most_attempts(&self) -> bool {
+        self.limited_minus_unlimited > 0
     }
 }
 
@@ -85,21 +90,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn variances_add_up() {
+    fn truncation_error_without_rounding() {
         let mut rounding = RoundingErrors::default();
         assert_eq!(rounding.truncation_error(5.0, 0.1), 5.0);
-        rounding.measured(0.3, 0.1);
+        rounding.record_measurement(0.3, 0.1);
         assert!((rounding.truncation_error(0.5, 0.1) - 0.4).abs() < 1e-15);
         assert_eq!(rounding.truncation_error(0.3, 0.2), 0.0);
         assert!(rounding.truncation_error(f64::NAN, 0.1).is_nan());
-        rounding.measured(f64::NAN, 0.1);
+        rounding.record_measurement(f64::NAN, 0.1);
         assert!((rounding.truncation_error(0.5, 0.1) - 0.4).abs() < 1e-15);
     }
 
     #[test]
-    fn signs_are_fair() {
+    fn random_signs() {
         let mut rounding = RoundingErrors::default();
-        let sum: f64 = (0..10_000).map(|_| rounding.sign()).sum();
+        let sum: f64 = (0..10_000).map(|_| rounding.random_sign()).sum();
         // Five standard deviations.
         assert!(sum.abs() < 500.0, "{sum}");
     }

@@ -2,9 +2,9 @@
 
 use super::rounding::RoundingErrors;
 use crate::adaptive::discontinuity::{BranchChange, Branches};
-use crate::adaptive::pairs::Pair;
+use crate::adaptive::pairs::EmbeddedPair;
 use crate::adaptive::tolerances::norm;
-use crate::erk::{Grid, Own, Point, Record, Scheme};
+use crate::erk::{Grid, Scheme, StagePoint, StepRecord, UnitStride};
 use crate::error::{Error, Place};
 use crate::finite::check_output;
 use crate::memory::allocate;
@@ -19,22 +19,22 @@ use core::marker::PhantomData;
 /// Memory of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-struct Memory<M: Ode, T: Real, const S: usize> {
-    point: Point<M, T>,
-    record: Record<M, T, S>,
+struct StepMemory<M: Ode, T: Real, const S: usize> {
+    point: StagePoint<M, T>,
+    stage_record: StepRecord<M, T, S>,
     /// The state at the end of the step, and its derivative there.
-    end: ArrayX<M, T>,
-    end_slope: ArrayX<M, T>,
+    end_state: ArrayX<M, T>,
+    end_derivative: ArrayX<M, T>,
     difference: ArrayX<M, T>,
     scale: ArrayX<M, T>,
     /// Stages for dense output.
-    more: [ArrayX<M, T>; 3],
+    dense_stages: [ArrayX<M, T>; 3],
     /// The branches of the model at the start of the step, and at its end.
-    branches: [Branches; 2],
+    end_branches: [Branches; 2],
 }
 
 /// A step of an explicit pair.
-pub trait Take<M: Dae, T: Real> {
+pub trait ExplicitStepper<M: Dae, T: Real> {
     /// Goes to the start of a step.
     fn go(&mut self, inputs: &[T], x: &[T]);
     /// The derivative at the start.
@@ -57,13 +57,13 @@ pub trait Take<M: Dae, T: Real> {
     ///
     /// # Errors
     /// A value that is not finite.
-    fn error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    fn estimate_error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// How the step that was taken changes the branches of the model, if it does.
-    fn change(&self) -> Option<BranchChange>;
+    fn branch_change(&self) -> Option<BranchChange>;
     /// The state at the end.
-    fn end(&self) -> &[T];
+    fn end_state(&self) -> &[T];
     /// The end is the next start.
-    fn advance(&mut self);
+    fn move_to_end(&mut self);
     /// The polynomial of the step that was taken.
     ///
     /// # Errors
@@ -73,38 +73,38 @@ pub trait Take<M: Dae, T: Real> {
     /// errors may count more than once.
     fn is_stiff(&self) -> bool;
     /// Whether rounding errors limited most of the steps since the start of the run.
-    fn is_below_rounding(&self) -> bool;
+    fn is_limited_by_rounding(&self) -> bool;
     /// How often the model was evaluated since this was asked for last.
-    fn count(&mut self) -> usize;
+    fn take_evaluation_count(&mut self) -> usize;
 }
 
-pub struct Stepper<M: Ode, B, T: Real, const S: usize> {
+pub struct PairStepper<M: Ode, B, T: Real, const S: usize> {
     scheme: Scheme<M, T, S>,
-    memory: Box<Memory<M, T, S>>,
+    memory: Box<StepMemory<M, T, S>>,
     /// How the step that was taken changes the branches of the model, if it does.
-    change: Option<BranchChange>,
+    branch_change: Option<BranchChange>,
     /// Steps at the bound of stability less those that are not.
-    at_bound: i64,
+    stability_limited_minus_unlimited: i64,
     rounding: RoundingErrors,
     method: PhantomData<fn() -> B>,
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S> {
     pub fn new() -> Result<Self, Error> {
         Ok(Self {
             scheme: Scheme::new(&B::TABLEAU),
             memory: allocate()?,
-            change: None,
-            at_bound: 0,
+            branch_change: None,
+            stability_limited_minus_unlimited: 0,
             rounding: RoundingErrors::default(),
             method: PhantomData,
         })
     }
 
     /// The derivative at a state.
-    fn evaluate(
+    fn evaluate_derivative(
         scheme: &Scheme<M, T, S>,
-        point: &mut Point<M, T>,
+        point: &mut StagePoint<M, T>,
         x: &[T],
         t: T,
         slope: &mut ArrayX<M, T>,
@@ -119,7 +119,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S> {
     /// How often an error counts that counts so often at most: once where the Jacobian takes it
     /// back, as where it is damped, and by [`Pair::GLOBAL_ERROR_FACTOR`] where it turns it or lets
     /// it grow. The last stage `Y` is at the end, as the step is; of the difference `d` of the two
@@ -130,10 +130,11 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
         if count <= 1.0 {
             return 1.0;
         }
-        let Memory { record, end_slope, difference, scale, .. } = &mut *self.memory;
+        let StepMemory { stage_record: record, end_derivative: end_slope, difference, scale, .. } =
+            &mut *self.memory;
         let Some(last) = record.k.last() else { return 1.0 };
         difference.as_mut().fill(T::ZERO);
-        combine(&B::FSAL_DIFFERENCE, &record.k, difference.as_mut());
+        weighted_stage_sum(&B::FSAL_DIFFERENCE, &record.k, difference.as_mut());
         let (mut along, mut distances, mut changes) = (T::ZERO, T::ZERO, T::ZERO);
         let slopes = end_slope.as_ref().iter().zip(last.as_ref());
         for ((distance, (end, last)), scale) in difference.as_ref().iter().zip(slopes).zip(scale.as_ref()) {
@@ -144,37 +145,38 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
         }
         // Scales have the factor `h`, and so have the changes.
         let is_at_bound = changes.to_f64() > B::STABILITY_BOUND * B::STABILITY_BOUND * distances.to_f64();
-        self.at_bound += if is_at_bound { 1 } else { -1 };
+        self.stability_limited_minus_unlimited += if is_at_bound { 1 } else { -1 };
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
         let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
         if damped.is_nan() { count } else { count + (1.0 - count) * damped.min(1.0) }
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> PairStepper<M, B, T, S> {
     /// Measures the rounding error of the difference in a step of this length, with the scales of
     /// the step that was taken: see [`RoundingErrors`].
     fn measure_rounding(&mut self, t: T, size: f64) {
         let Self { scheme, memory, rounding, .. } = self;
-        let Memory { point, record, more: [slope, ..], difference, scale, .. } = &mut **memory;
+        let StepMemory { point, stage_record: record, dense_stages: [slope, ..], difference, scale, .. } =
+            &mut **memory;
         for (to, x) in difference.as_mut().iter_mut().zip(record.x.as_ref()) {
-            *to = *x * T::from_f64(1.0 + 2.0 * T::EPSILON * rounding.sign());
+            *to = *x * T::from_f64(1.0 + 2.0 * T::EPSILON * rounding.random_sign());
         }
         // Next to the states there need be no value.
-        if Self::evaluate(scheme, point, difference.as_ref(), t, slope).is_err() {
+        if Self::evaluate_derivative(scheme, point, difference.as_ref(), t, slope).is_err() {
             return;
         }
         for (slope, start) in slope.as_mut().iter_mut().zip(record.k[0].as_ref()) {
             *slope = *slope - *start;
         }
-        let (stages, last) = B::DIFFERENCE;
+        let (stages, last) = B::ERROR_COEFFICIENTS;
         let squares = stages.iter().fold(last * last, |sum, e| sum + e * e);
-        rounding.measured(Scalar::sqrt(squares) * norm(slope.as_ref(), scale.as_ref()), size);
+        rounding.record_measurement(Scalar::sqrt(squares) * norm(slope.as_ref(), scale.as_ref()), size);
     }
 }
 
 /// `Σ_i e_i k_i`
-fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
+fn weighted_stage_sum<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
     for (coefficient, stage) in coefficients.iter().zip(stages) {
         if *coefficient != 0.0 {
             let coefficient = T::from_f64(*coefficient);
@@ -185,10 +187,10 @@ fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
+impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> ExplicitStepper<M, T> for PairStepper<M, B, T, S> {
     fn go(&mut self, inputs: &[T], x: &[T]) {
-        (self.at_bound, self.rounding) = (0, RoundingErrors::default());
-        let Memory { point, record, .. } = &mut *self.memory;
+        (self.stability_limited_minus_unlimited, self.rounding) = (0, RoundingErrors::default());
+        let StepMemory { point, stage_record: record, .. } = &mut *self.memory;
         point.variables_mut().copy_from_slice(inputs);
         // An explicit model is evaluated at `ẋ = 0`.
         point.variables_mut()[..M::Shape::NX].fill(T::ZERO);
@@ -196,39 +198,50 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     }
 
     fn slope(&mut self, t: T) -> Result<&[T], Error> {
-        let Memory { point, record, branches, .. } = &mut *self.memory;
-        Self::evaluate(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
-        branches[0] = Branches::of::<M, Own<T>>(&point.v);
+        let StepMemory { point, stage_record: record, end_branches: branches, .. } = &mut *self.memory;
+        Self::evaluate_derivative(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
+        branches[0] = Branches::at_point::<M, UnitStride<T>>(&point.v);
         Ok(record.k[0].as_ref())
     }
 
     fn take(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, record, end, branches, .. } = &mut *self.memory;
-        let grid = Grid { start: t, h, steps: 1, compensated: false };
-        self.change = None;
+        let StepMemory { point, stage_record: record, end_state: end, end_branches: branches, .. } =
+            &mut *self.memory;
+        let grid = Grid { start_time: t, h, steps: 1, compensated: false };
+        self.branch_change = None;
         for stage in 1..S {
             let at = Place { step: 0, stage, iteration: 0 };
-            point.go(&self.scheme, &grid, record, at)?;
+            point.move_to_stage(&self.scheme, &grid, record, at)?;
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
-            self.change = self.change.max(branches[0].change(Branches::of::<M, Own<T>>(&point.v)));
+            self.branch_change = self
+                .branch_change
+                .max(branches[0].change_to(Branches::at_point::<M, UnitStride<T>>(&point.v)));
         }
-        record.end(&self.scheme, &grid, 0, end, None, &mut point.non_finite)
+        record.advance(&self.scheme, &grid, 0, end, None, &mut point.non_finite)
     }
 
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, end, end_slope, branches, .. } = &mut *self.memory;
-        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)?;
-        branches[1] = Branches::of::<M, Own<T>>(&point.v);
-        self.change = self.change.max(branches[0].change(branches[1]));
+        let StepMemory { point, end_state: end, end_derivative: end_slope, end_branches: branches, .. } =
+            &mut *self.memory;
+        Self::evaluate_derivative(&self.scheme, point, end.as_ref(), t + h, end_slope)?;
+        branches[1] = Branches::at_point::<M, UnitStride<T>>(&point.v);
+        self.branch_change = self.branch_change.max(branches[0].change_to(branches[1]));
         Ok(())
     }
 
-    fn error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
-        let (stages, last) = B::DIFFERENCE;
+    fn estimate_error(&mut self, t: T, h: T, most: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+        let (stages, last) = B::ERROR_COEFFICIENTS;
         if last != 0.0 {
             self.arrive(t, h)?;
         }
-        let Memory { record, end, end_slope, difference, scale, .. } = &mut *self.memory;
+        let StepMemory {
+            stage_record: record,
+            end_state: end,
+            end_derivative: end_slope,
+            difference,
+            scale,
+            ..
+        } = &mut *self.memory;
         let states = record.x.as_ref().iter().zip(end.as_ref());
         for (((scale, (before, after)), rtol), atol) in
             scale.as_mut().iter_mut().zip(states).zip(rtol).zip(atol)
@@ -237,15 +250,15 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         }
         let mut difference_of = |coefficients: &[f64; S]| {
             difference.as_mut().fill(T::ZERO);
-            combine(coefficients, &record.k, difference.as_mut());
+            weighted_stage_sum(coefficients, &record.k, difference.as_mut());
             if last != 0.0 {
-                combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
+                weighted_stage_sum(&[last], core::slice::from_ref(end_slope), difference.as_mut());
             }
             norm(difference.as_ref(), scale.as_ref())
         };
         let fine = difference_of(&stages);
         let coarse = B::THIRD_ORDER.as_ref().map(difference_of);
-        let error = B::combined(fine, coarse);
+        let error = B::combined_estimate(fine, coarse);
         // Written so that NaN stays.
         if error > 1.0 {
             return Ok(error);
@@ -258,53 +271,67 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
             return Ok(error);
         }
         let size = h.to_f64().abs();
-        if self.rounding.are_due() {
+        if self.rounding.is_measurement_due() {
             self.measure_rounding(t, size);
         }
-        let truncation = B::combined(self.rounding.truncation_error(fine, size), coarse);
+        let truncation = B::combined_estimate(self.rounding.truncation_error(fine, size), coarse);
         self.rounding.count_attempt(error, count * truncation);
         Ok(error + (count - 1.0) * truncation)
     }
 
-    fn change(&self) -> Option<BranchChange> {
-        self.change
+    fn branch_change(&self) -> Option<BranchChange> {
+        self.branch_change
     }
 
-    fn end(&self) -> &[T] {
-        self.memory.end.as_ref()
+    fn end_state(&self) -> &[T] {
+        self.memory.end_state.as_ref()
     }
 
-    fn advance(&mut self) {
-        let Memory { record, end, end_slope, branches, .. } = &mut *self.memory;
+    fn move_to_end(&mut self) {
+        let StepMemory {
+            stage_record: record,
+            end_state: end,
+            end_derivative: end_slope,
+            end_branches: branches,
+            ..
+        } = &mut *self.memory;
         record.x = *end;
         record.k[0] = *end_slope;
         branches[0] = branches[1];
     }
 
     fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {
-        let Memory { point, record, end, end_slope, more, difference: x, .. } = &mut *self.memory;
+        let StepMemory {
+            point,
+            stage_record: record,
+            end_state: end,
+            end_derivative: end_slope,
+            dense_stages: more,
+            difference: x,
+            ..
+        } = &mut *self.memory;
         let last = core::slice::from_ref(&*end_slope);
         for index in 0..B::DENSE_STAGES.len().min(more.len()) {
             let Some(stage) = B::DENSE_STAGES.get(index) else { break };
             x.as_mut().fill(T::ZERO);
-            combine(&stage.stages, &record.k, x.as_mut());
-            combine(&[stage.end], last, x.as_mut());
-            combine(&stage.more, &more[..index], x.as_mut());
+            weighted_stage_sum(&stage.stages, &record.k, x.as_mut());
+            weighted_stage_sum(&[stage.end_coefficient], last, x.as_mut());
+            weighted_stage_sum(&stage.dense_coefficients, &more[..index], x.as_mut());
             for (x, start) in x.as_mut().iter_mut().zip(record.x.as_ref()) {
                 *x = *start + h * *x;
             }
             let time = t + h * T::from_f64(stage.node);
-            Self::evaluate(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
+            Self::evaluate_derivative(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
         }
         // Nested: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
         let rest = T::ONE - theta;
         let to = dense.x.as_mut_slice();
         to.fill(T::ZERO);
-        for (power, (stages, end, others)) in B::POLYNOMIAL.iter().enumerate().rev() {
+        for (power, (stages, end, others)) in B::DENSE_POLYNOMIAL.iter().enumerate().rev() {
             x.as_mut().fill(T::ZERO);
-            combine(stages, &record.k, x.as_mut());
-            combine(&[*end], last, x.as_mut());
-            combine(others, more, x.as_mut());
+            weighted_stage_sum(stages, &record.k, x.as_mut());
+            weighted_stage_sum(&[*end], last, x.as_mut());
+            weighted_stage_sum(others, more, x.as_mut());
             let factor = if power % 2 == 0 { rest } else { theta };
             for (to, x) in to.iter_mut().zip(x.as_ref()) {
                 *to = factor * (h * *x + *to);
@@ -320,14 +347,14 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     }
 
     fn is_stiff(&self) -> bool {
-        self.at_bound > 0
+        self.stability_limited_minus_unlimited > 0
     }
 
-    fn is_below_rounding(&self) -> bool {
-        self.rounding.limit_steps()
+    fn is_limited_by_rounding(&self) -> bool {
+        self.rounding.limited_most_attempts()
     }
 
-    fn count(&mut self) -> usize {
+    fn take_evaluation_count(&mut self) -> usize {
         core::mem::take(&mut self.memory.point.counts.residuals)
     }
 }

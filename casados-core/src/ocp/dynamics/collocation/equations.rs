@@ -9,7 +9,7 @@ use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
 /// Where stages lead to.
-pub(super) struct End<M: Dae, T: Real> {
+pub(super) struct IntervalEnd<M: Dae, T: Real> {
     /// The state at the end of the interval.
     pub x: VectorX<M, T>,
     /// The algebraic states at its start.
@@ -17,7 +17,7 @@ pub(super) struct End<M: Dae, T: Real> {
 }
 
 /// An interval, from step to step.
-pub(super) struct Point<'a, M: Dae, T: Real, const S: usize> {
+pub(super) struct StageEquations<'a, M: Dae, T: Real, const S: usize> {
     coefficients: &'a Coefficients<T, S>,
     /// The state at the start of the step.
     x: ArrayX<M, T>,
@@ -28,9 +28,9 @@ pub(super) struct Point<'a, M: Dae, T: Real, const S: usize> {
     t: T,
 }
 
-impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
+impl<'a, M: Dae, T: Real, const S: usize> StageEquations<'a, M, T, S> {
     /// The start of an interval of so many steps.
-    pub fn at(interval: &Interval<'_, T>, coefficients: &'a Coefficients<T, S>, steps: usize) -> Self {
+    pub fn at_start(interval: &Interval<'_, T>, coefficients: &'a Coefficients<T, S>, steps: usize) -> Self {
         let (mut x, mut v) = (ArrayX::<M, T>::zeroed(), ArrayV::<M, T>::zeroed());
         copy_common(x.as_mut(), interval.x);
         let inputs = v.as_mut().get_mut(2 * M::Shape::NX + M::Shape::NZ..).unwrap_or_default();
@@ -42,17 +42,17 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
     }
 
     /// Where stages `y + α Δy` lead to, and the sum of all `|h f|` at them and the largest one.
-    pub fn follow(
+    pub fn end_and_residuals(
         mut self,
         stages: &[ArrayK<M, [T; S]>],
-        change: &[ArrayK<M, [T; S]>],
+        stage_steps: &[ArrayK<M, [T; S]>],
         alpha: T,
-    ) -> (End<M, T>, [T; 2]) {
-        let mut end = End::<M, T> { x: VectorX::<M, T>::zeroed(), z0: VectorZ::<M, T>::zeroed() };
+    ) -> (IntervalEnd<M, T>, [T; 2]) {
+        let mut end = IntervalEnd::<M, T> { x: VectorX::<M, T>::zeroed(), z0: VectorZ::<M, T>::zeroed() };
         let (mut sum, mut largest) = (T::ZERO, T::ZERO);
         for (n, y) in stages.iter().enumerate() {
             let mut y = *y;
-            if let Some(change) = change.get(n).filter(|_| alpha != T::ZERO) {
+            if let Some(change) = stage_steps.get(n).filter(|_| alpha != T::ZERO) {
                 for (y, &change) in
                     y.as_mut().as_flattened_mut().iter_mut().zip(change.as_ref().as_flattened())
                 {
@@ -70,7 +70,7 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
             if n == 0 {
                 let algebraic = y.as_ref().get(M::Shape::NX..).unwrap_or_default();
                 for (z, y) in end.z0.as_mut_slice().iter_mut().zip(algebraic) {
-                    *z = dot(&self.coefficients.start, y);
+                    *z = dot(&self.coefficients.lagrange_start, y);
                 }
             }
             for (x, k) in self.x.as_mut().iter_mut().zip(y.as_ref()) {
@@ -85,13 +85,13 @@ impl<'a, M: Dae, T: Real, const S: usize> Point<'a, M, T, S> {
     fn residual(&mut self, y: &ArrayK<M, [T; S]>, n: usize, i: usize) -> ArrayK<M, T> {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
         let Self { coefficients: Coefficients { a, c, .. }, x, v, h, t } = self;
-        let (h, weights) = (*h, a.get(i).copied().unwrap_or([T::ZERO; S]));
+        let (h, stage_weights) = (*h, a.get(i).copied().unwrap_or([T::ZERO; S]));
         let (slopes, algebraic) = y.as_ref().split_at(nx.min(y.as_ref().len()));
         let v = v.as_mut();
         let (xdot, rest) = v.split_at_mut(nx);
         let (states, rest) = rest.split_at_mut(nx);
-        for (((xdot, state), k), &x) in xdot.iter_mut().zip(states).zip(slopes).zip(x.as_ref()) {
-            (*xdot, *state) = (k[i], x + h * dot(&weights, k));
+        for (((xdot, state), slope), &x) in xdot.iter_mut().zip(states).zip(slopes).zip(x.as_ref()) {
+            (*xdot, *state) = (slope[i], x + h * dot(&stage_weights, slope));
         }
         for (z, y) in rest.iter_mut().take(nz).zip(algebraic) {
             *z = y[i];

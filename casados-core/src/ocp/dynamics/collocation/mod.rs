@@ -24,9 +24,9 @@ use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
-use crate::ocp::dynamics::begin::{Begin, at};
-use crate::ocp::dynamics::inside::Inside;
-use crate::ocp::dynamics::single::names;
+use crate::ocp::dynamics::dense_output::DenseOutput;
+use crate::ocp::dynamics::interval_setup::{IntervalSetup, in_interval};
+use crate::ocp::dynamics::single_interval::names;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntegralTerms, Interval, IntervalResult, Nodes, SecondOrder, Sink, StageAction, vector,
@@ -38,7 +38,7 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use equations::Point;
+use equations::StageEquations;
 
 type Irk<M, B, const S: usize, T> = Integrator<M, B, S, T, Heap>;
 
@@ -66,25 +66,25 @@ type Irk<M, B, const S: usize, T> = Integrator<M, B, S, T, Heap>;
 /// ```
 pub struct Collocation<M: Dae, B, const S: usize, T: Real> {
     /// Differentiates at the stages that there are.
-    at: Irk<M, B, S, T>,
+    stage_differentiator: Irk<M, B, S, T>,
     /// Goes one iteration of Newton's method from there, and differentiates again.
-    newton: Irk<M, B, S, T>,
+    newton_integrator: Irk<M, B, S, T>,
     coefficients: Coefficients<T, S>,
     /// `y` of every step of every interval.
     stages: Vec<ArrayK<M, [T; S]>>,
     /// `a`
-    increments: Vec<ArrayK<M, [T; S]>>,
+    newton_increments: Vec<ArrayK<M, [T; S]>>,
     /// `Δy`
-    change: Vec<ArrayK<M, [T; S]>>,
+    stage_steps: Vec<ArrayK<M, [T; S]>>,
     /// Those of the best iterate.
-    best: Vec<ArrayK<M, [T; S]>>,
+    best_stages: Vec<ArrayK<M, [T; S]>>,
     /// `w̄`, where increments are from.
-    from: Vec<T>,
+    linearisation_point: Vec<T>,
 }
 
 impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Collocation<M, B, S, T> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("Collocation").field("integrator", &self.at).finish_non_exhaustive()
+        f.debug_struct("Collocation").field("integrator", &self.stage_differentiator).finish_non_exhaustive()
     }
 }
 
@@ -92,14 +92,14 @@ impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Collocation<M, B, 
 impl<M: Dae, B, const S: usize, T: Real> Clone for Collocation<M, B, S, T> {
     fn clone(&self) -> Self {
         Self {
-            at: self.at.clone(),
-            newton: self.newton.clone(),
+            stage_differentiator: self.stage_differentiator.clone(),
+            newton_integrator: self.newton_integrator.clone(),
             coefficients: self.coefficients.clone(),
             stages: self.stages.clone(),
-            increments: self.increments.clone(),
-            change: self.change.clone(),
-            best: self.best.clone(),
-            from: self.from.clone(),
+            newton_increments: self.newton_increments.clone(),
+            stage_steps: self.stage_steps.clone(),
+            best_stages: self.best_stages.clone(),
+            linearisation_point: self.linearisation_point.clone(),
         }
     }
 }
@@ -112,14 +112,14 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     pub fn new(integrator: Irk<M, B, S, T>) -> Result<Self, Error> {
         let tableau = *integrator.tableau();
         Ok(Self {
-            newton: Integrator::build(integrator.options().lifted(), tableau)?,
+            newton_integrator: Integrator::build(integrator.options().lifted(), tableau)?,
             coefficients: Coefficients::new(tableau, false),
-            at: integrator,
+            stage_differentiator: integrator,
             stages: Vec::new(),
-            increments: Vec::new(),
-            change: Vec::new(),
-            best: Vec::new(),
-            from: Vec::new(),
+            newton_increments: Vec::new(),
+            stage_steps: Vec::new(),
+            best_stages: Vec::new(),
+            linearisation_point: Vec::new(),
         })
     }
 
@@ -127,23 +127,25 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     /// step, which finds `a`. Points that are tried take none.
     #[must_use]
     pub fn iterations(&self) -> usize {
-        self.at.statistics().iterations + self.newton.statistics().iterations
+        self.stage_differentiator.statistics().iterations + self.newton_integrator.statistics().iterations
     }
 
-    fn steps(&self) -> usize {
-        self.at.options().steps
+    fn step_count(&self) -> usize {
+        self.stage_differentiator.options().steps
     }
 
     /// Stages between the states of a guess, with the nominal values of algebraic states.
-    fn place_between(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
-        let (steps, nx) = (self.steps(), M::Shape::NX);
+    fn interpolate_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+        let (steps, nx) = (self.step_count(), M::Shape::NX);
         let count = nodes.len().saturating_mul(steps);
-        for list in [&mut self.stages, &mut self.increments, &mut self.change, &mut self.best] {
+        for list in
+            [&mut self.stages, &mut self.newton_increments, &mut self.stage_steps, &mut self.best_stages]
+        {
             list.clear();
             try_reserve(list, count)?;
             list.resize(count, Zeroable::zeroed());
         }
-        self.from.clear();
+        self.linearisation_point.clear();
         for (k, interval) in nodes.iter().enumerate() {
             let next = part(nodes.v, (k + 1) * nodes.ld[0], nx);
             for y in self.stages.iter_mut().skip(k * steps).take(steps) {
@@ -160,51 +162,55 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     }
 
     /// Stages for all intervals; those of a solver that does not know them follow its iterate.
-    fn follow(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
-        if self.stages.len() != nodes.len() * self.steps() {
-            return self.place_between(nodes);
+    fn update_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+        if self.stages.len() != nodes.len() * self.step_count() {
+            return self.interpolate_stages(nodes);
         }
-        if nodes.step_length.is_none() && self.change_to(nodes)? {
-            self.go(T::ONE);
+        if nodes.step_length.is_none() && self.compute_stage_steps(nodes)? {
+            self.take_step(T::ONE);
         }
         Ok(())
     }
 
     /// `Δy = a + D (w − w̄)`, if there is a `w̄`.
-    fn change_to(&mut self, nodes: &Nodes<'_, T>) -> Result<bool, OcpError> {
-        if self.from.len() != nodes.v.len() {
+    fn compute_stage_steps(&mut self, nodes: &Nodes<'_, T>) -> Result<bool, OcpError> {
+        if self.linearisation_point.len() != nodes.v.len() {
             return Ok(false);
         }
-        let from = core::mem::take(&mut self.from);
-        let difference = from.iter().zip(nodes.v).map(|(&from, &to)| to - from).collect::<Vec<T>>();
-        let result = self.expand_from(&Nodes { v: &from, ..*nodes }, &Nodes { v: &difference, ..*nodes });
-        self.from = from;
+        let last_point = core::mem::take(&mut self.linearisation_point);
+        let difference = last_point.iter().zip(nodes.v).map(|(&from, &to)| to - from).collect::<Vec<T>>();
+        let result =
+            self.expand_steps_at(&Nodes { v: &last_point, ..*nodes }, &Nodes { v: &difference, ..*nodes });
+        self.linearisation_point = last_point;
         result.map(|()| true)
     }
 
     /// `Δy = a + D Δw`
-    fn expand_from(&mut self, nodes: &Nodes<'_, T>, steps: &Nodes<'_, T>) -> Result<(), OcpError> {
-        let count = self.steps();
+    fn expand_steps_at(&mut self, nodes: &Nodes<'_, T>, steps: &Nodes<'_, T>) -> Result<(), OcpError> {
+        let count = self.step_count();
         for (k, (interval, step)) in nodes.iter().zip(steps.iter()).enumerate() {
-            let places = k * count..(k + 1) * count;
-            let change = self.change.get_mut(places.clone()).unwrap_or_default();
-            change.copy_from_slice(self.increments.get(places.clone()).unwrap_or_default());
+            let step_range = k * count..(k + 1) * count;
+            let change = self.stage_steps.get_mut(step_range.clone()).unwrap_or_default();
+            change.copy_from_slice(self.newton_increments.get(step_range.clone()).unwrap_or_default());
             let mut seeds = Seeds::<M, T, 1>::zeroed();
             copy_common(seeds.x0.as_mut_slice(), step.x);
             copy_common(seeds.u.as_mut_slice(), step.u);
-            step.free.spread(seeds.p.as_mut_slice(), step.w);
+            step.free.scatter_step(seeds.p.as_mut_slice(), step.w);
             let (x, u) = (vector(interval.x), vector(interval.u));
-            at(k, self.at.begin(&interval))?;
-            at(k, self.at.set_solution(self.stages.get(places).unwrap_or_default()))?;
+            in_interval(k, self.stage_differentiator.begin(&interval))?;
+            in_interval(
+                k,
+                self.stage_differentiator.set_solution(self.stages.get(step_range).unwrap_or_default()),
+            )?;
             let arguments = Arguments { x0: &x, u: &u, h: interval.h };
-            at(k, self.at.add_stage_derivatives(&arguments, &seeds, change))?;
+            in_interval(k, self.stage_differentiator.add_stage_derivatives(&arguments, &seeds, change))?;
         }
         Ok(())
     }
 
     /// Stages go a part of their way.
-    fn go(&mut self, alpha: T) {
-        go::<M, S, T>(&mut self.stages, &self.change, alpha);
+    fn take_step(&mut self, alpha: T) {
+        add_scaled_steps::<M, S, T>(&mut self.stages, &self.stage_steps, alpha);
     }
 
     /// All intervals at their stages: derivatives of `order` 1 or 2, and ends and algebraic states
@@ -212,59 +218,64 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     fn differentiate(
         &mut self,
         nodes: &Nodes<'_, T>,
-        run: impl for<'r> Fn(&'r mut Irk<M, B, S, T>, &Interval<'_, T>) -> Result<IntervalResult<'r, T>, Error>,
-        second: bool,
+        differentiate_interval: impl for<'r> Fn(
+            &'r mut Irk<M, B, S, T>,
+            &Interval<'_, T>,
+        ) -> Result<IntervalResult<'r, T>, Error>,
+        is_second_order: bool,
         sink: Sink<'_, T>,
     ) -> Result<(), OcpError> {
-        self.follow(nodes)?;
-        let count = self.steps();
-        self.from.clear();
-        self.from.extend_from_slice(nodes.v);
+        self.update_stages(nodes)?;
+        let count = self.step_count();
+        self.linearisation_point.clear();
+        self.linearisation_point.extend_from_slice(nodes.v);
         for (k, interval) in nodes.iter().enumerate() {
-            let places = k * count..(k + 1) * count;
-            let stages = self.stages.get(places.clone()).unwrap_or_default();
-            let increments = self.increments.get_mut(places).unwrap_or_default();
-            let residual =
-                Point::<M, T, S>::at(&interval, &self.coefficients, count).follow(stages, &[], T::ZERO).1;
-            at(k, self.newton.begin(&interval))?;
-            at(k, self.newton.run.set_stages_of_steps(stages))?;
+            let step_range = k * count..(k + 1) * count;
+            let stages = self.stages.get(step_range.clone()).unwrap_or_default();
+            let increments = self.newton_increments.get_mut(step_range).unwrap_or_default();
+            let residual = StageEquations::<M, T, S>::at_start(&interval, &self.coefficients, count)
+                .end_and_residuals(stages, &[], T::ZERO)
+                .1;
+            in_interval(k, self.newton_integrator.begin(&interval))?;
+            in_interval(k, self.newton_integrator.run.set_stages_of_steps(stages))?;
             let (x, u) = (vector(interval.x), vector(interval.u));
-            let after = *at(k, self.newton.forward(&x, &u, interval.h))?;
-            at(k, self.newton.copy_stages(increments))?;
+            let after_newton = *in_interval(k, self.newton_integrator.forward(&x, &u, interval.h))?;
+            in_interval(k, self.newton_integrator.copy_stages(increments))?;
             for (increment, y) in increments.iter_mut().zip(stages) {
                 let increment = increment.as_mut().as_flattened_mut().iter_mut();
                 for (increment, &y) in increment.zip(y.as_ref().as_flattened()) {
                     *increment = *increment - y;
                 }
             }
-            at(k, self.at.begin(&interval))?;
-            at(k, self.at.set_solution(stages))?;
-            let step = at(k, run(&mut self.at, &interval))?;
-            let (mut of_x, mut of_u, mut of_p) =
+            in_interval(k, self.stage_differentiator.begin(&interval))?;
+            in_interval(k, self.stage_differentiator.set_solution(stages))?;
+            let step = in_interval(k, differentiate_interval(&mut self.stage_differentiator, &interval))?;
+            let (mut gradient_x, mut gradient_u, mut gradient_p) =
                 (VectorX::<M, T>::zeroed(), VectorU::<M, T>::zeroed(), VectorP::<M, T>::zeroed());
             let mut cost = IntegralTerms::default();
-            if second {
-                let after = IntervalResult::from(&after);
-                let changes = |of: [&[T]; 2], after: [&[T]; 2], to: &mut [T]| {
-                    add_change(interval.multipliers, of[0], after[0], to);
-                    add_change(interval.nu, of[1], after[1], to);
+            if is_second_order {
+                let after = IntervalResult::from(&after_newton);
+                let add_changes = |of: [&[T]; 2], after: [&[T]; 2], to: &mut [T]| {
+                    add_jacobian_change(interval.multipliers, of[0], after[0], to);
+                    add_jacobian_change(interval.nu, of[1], after[1], to);
                 };
-                changes([step.dx, step.dz[0]], [after.dx, after.dz[0]], of_x.as_mut_slice());
-                changes([step.du, step.dz[1]], [after.du, after.dz[1]], of_u.as_mut_slice());
+                add_changes([step.dx, step.dz[0]], [after.dx, after.dz[0]], gradient_x.as_mut_slice());
+                add_changes([step.du, step.dz[1]], [after.du, after.dz[1]], gradient_u.as_mut_slice());
                 if interval.free.count() > 0 {
-                    changes([step.dp, step.dz[2]], [after.dp, after.dz[2]], of_p.as_mut_slice());
+                    add_changes([step.dp, step.dz[2]], [after.dp, after.dz[2]], gradient_p.as_mut_slice());
                 }
-                (cost.x, cost.u, cost.p) = (of_x.as_slice(), of_u.as_slice(), of_p.as_slice());
+                (cost.x, cost.u, cost.p) =
+                    (gradient_x.as_slice(), gradient_u.as_slice(), gradient_p.as_slice());
             }
-            let (x, z) = (after.nominal.x.as_slice(), after.nominal.z0.as_slice());
-            sink(k, &IntervalResult { x, z, cost, stages: residual, ..step });
+            let (x, z) = (after_newton.nominal.x.as_slice(), after_newton.nominal.z0.as_slice());
+            sink(k, &IntervalResult { x, z, cost, stage_residuals: residual, ..step });
         }
         Ok(())
     }
 }
 
 /// Stages go a part of their way.
-fn go<M: Dae, const S: usize, T: Real>(
+fn add_scaled_steps<M: Dae, const S: usize, T: Real>(
     stages: &mut [ArrayK<M, [T; S]>],
     change: &[ArrayK<M, [T; S]>],
     alpha: T,
@@ -278,7 +289,7 @@ fn go<M: Dae, const S: usize, T: Real>(
 }
 
 /// Adds `λᵀ (A' − A)`, with matrices column after column.
-fn add_change<T: Real>(weights: &[T], before: &[T], after: &[T], to: &mut [T]) {
+fn add_jacobian_change<T: Real>(weights: &[T], before: &[T], after: &[T], to: &mut [T]) {
     let rows = weights.len().max(1);
     let columns = before.chunks_exact(rows).zip(after.chunks_exact(rows));
     for (to, (before, after)) in to.iter_mut().zip(columns) {
@@ -295,27 +306,27 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
     const LIFTED: bool = true;
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        let count = self.steps();
+        let count = self.step_count();
         if self.stages.len() != nodes.len() * count {
-            self.place_between(nodes)?;
+            self.interpolate_stages(nodes)?;
         }
         let alpha = match nodes.step_length {
             Some(alpha) => alpha,
-            None if self.change_to(nodes)? => T::ONE,
+            None if self.compute_stage_steps(nodes)? => T::ONE,
             None => T::ZERO,
         };
         for (k, interval) in nodes.iter().enumerate() {
-            let places = k * count..(k + 1) * count;
-            let [stages, change] =
-                [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
-            let point = Point::<M, T, S>::at(&interval, &self.coefficients, count);
-            let (end, residual) = point.follow(stages, change, alpha);
+            let step_range = k * count..(k + 1) * count;
+            let [stages, change] = [&self.stages, &self.stage_steps]
+                .map(|list| list.get(step_range.clone()).unwrap_or_default());
+            let point = StageEquations::<M, T, S>::at_start(&interval, &self.coefficients, count);
+            let (end, residual) = point.end_and_residuals(stages, change, alpha);
             sink(
                 k,
                 &IntervalResult {
                     x: end.x.as_slice(),
                     z: end.z0.as_slice(),
-                    stages: residual,
+                    stage_residuals: residual,
                     ..IntervalResult::default()
                 },
             );
@@ -329,40 +340,40 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
 
     /// By the polynomials through the stages as they are.
     fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
-        let count = self.steps();
+        let count = self.step_count();
         if self.stages.len() != nodes.len() * count {
-            self.place_between(nodes)?;
+            self.interpolate_stages(nodes)?;
         }
-        let alpha = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
+        let alpha = if self.compute_stage_steps(nodes)? { T::ONE } else { T::ZERO };
         for (k, interval) in nodes.iter().enumerate() {
-            let places = k * count..(k + 1) * count;
-            let [stages, change] =
-                [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
+            let step_range = k * count..(k + 1) * count;
+            let [stages, change] = [&self.stages, &self.stage_steps]
+                .map(|list| list.get(step_range.clone()).unwrap_or_default());
             let mut stages = stages.to_vec();
-            go::<M, S, T>(&mut stages, change, alpha);
-            at(k, self.at.begin(&interval))?;
-            at(k, self.at.set_solution(&stages))?;
+            add_scaled_steps::<M, S, T>(&mut stages, change, alpha);
+            in_interval(k, self.stage_differentiator.begin(&interval))?;
+            in_interval(k, self.stage_differentiator.set_solution(&stages))?;
             let visit = &mut |j, x: &[T], z: &[T]| {
                 sink(k * parts.len() + j, &IntervalResult { x, z, ..IntervalResult::default() })
             };
-            at(k, self.at.at_parts(&interval, parts, visit))?;
+            in_interval(k, self.stage_differentiator.states_at_fractions(&interval, parts, visit))?;
         }
         Ok(true)
     }
 
-    fn begin_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
-        self.place_between(nodes)
+    fn initialise_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+        self.interpolate_stages(nodes)
     }
 
-    fn expand_stages(&mut self, nodes: &Nodes<'_, T>, steps: &Nodes<'_, T>) -> Result<(), OcpError> {
-        self.expand_from(nodes, steps)
+    fn expand_stage_steps(&mut self, nodes: &Nodes<'_, T>, steps: &Nodes<'_, T>) -> Result<(), OcpError> {
+        self.expand_steps_at(nodes, steps)
     }
 
-    fn move_stages(&mut self, action: StageAction<T>) {
+    fn apply_stage_action(&mut self, action: StageAction<T>) {
         match action {
-            StageAction::Go(alpha) => self.go(alpha),
-            StageAction::Remember => self.best.copy_from_slice(&self.stages),
-            StageAction::Recall => self.stages.copy_from_slice(&self.best),
+            StageAction::Step(alpha) => self.take_step(alpha),
+            StageAction::StoreBest => self.best_stages.copy_from_slice(&self.stages),
+            StageAction::RestoreBest => self.stages.copy_from_slice(&self.best_stages),
         }
     }
 }
@@ -375,16 +386,23 @@ impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Collocation<M, B, S,
 
 fn forward<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
-    of: &Interval<'_, T>,
+    interval: &Interval<'_, T>,
 ) -> Result<IntervalResult<'r, T>, Error> {
-    irk.forward(&vector(of.x), &vector(of.u), of.h).map(IntervalResult::from)
+    irk.forward(&vector(interval.x), &vector(interval.u), interval.h).map(IntervalResult::from)
 }
 
 fn hessian<'r, M: Dae, B, const S: usize, T: Real>(
     irk: &'r mut Irk<M, B, S, T>,
-    of: &Interval<'_, T>,
+    interval: &Interval<'_, T>,
 ) -> Result<IntervalResult<'r, T>, Error> {
-    let lambda = vector(of.multipliers);
-    irk.hessian_with_quadrature(&vector(of.x), &vector(of.u), of.h, &lambda, of.nu, None)
-        .map(IntervalResult::from)
+    let lambda = vector(interval.multipliers);
+    irk.hessian_with_quadrature(
+        &vector(interval.x),
+        &vector(interval.u),
+        interval.h,
+        &lambda,
+        interval.nu,
+        None,
+    )
+    .map(IntervalResult::from)
 }

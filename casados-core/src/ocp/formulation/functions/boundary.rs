@@ -3,11 +3,12 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::functions::constraint::{Constraints, Spot};
-use crate::ocp::formulation::functions::pattern::Entries;
-use crate::ocp::formulation::functions::point::{
-    Cross, Terms, There, each_entry, finite_outputs, parameter, read,
+use crate::ocp::formulation::functions::constraint::{ConstraintContext, Constraints};
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_outputs, for_each_hessian_entry,
+    parameter_index, write_variables,
 };
+use crate::ocp::formulation::functions::sparsity::EntryVisitor;
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
@@ -81,36 +82,37 @@ impl<F: Function, T: Real> Boundary<F, T> {
     }
 
     /// Writes the variables of the function: `x₀` in the place of algebraic states.
-    fn read<S: Shape>(&mut self, v: &S::ArrayV<T>, at: Spot<'_, T>) {
+    fn load_variables<S: Shape>(&mut self, v: &S::ArrayV<T>, context: ConstraintContext<'_, T>) {
         let (nx, rest) = (S::NX, 2 * S::NX + S::NZ + S::NU);
         let variables = v.as_ref();
         let x = crate::qp::part(variables, nx, nx);
         let p = crate::qp::part(variables, rest, S::NP);
         let t = variables.get(rest + S::NP).copied().unwrap_or(T::ZERO);
-        read::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
+        write_variables::<F::Shape, T>(&mut self.v, [x, &[], &[], p], t);
         let first = self.v.as_mut().get_mut(2 * nx..).unwrap_or_default();
-        for (copy, &value) in at.starts.iter().enumerate().take(starts::<F>()) {
-            crate::qp::element::set(first, start::<F>(copy), value);
+        for (copy, &value) in context.initial_state_copies.iter().enumerate().take(copied_state_count::<F>())
+        {
+            crate::qp::element::set(first, copied_state::<F>(copy), value);
         }
     }
 
     /// The index among `(x, w)` of a variable.
-    fn position<S: Shape>(variable: usize, at: Spot<'_, T>) -> Option<usize> {
+    fn position<S: Shape>(variable: usize, context: ConstraintContext<'_, T>) -> Option<usize> {
         let nx = S::NX;
-        if let Some(p) = parameter::<F::Shape>(variable) {
-            return at.free.of(p).map(|w| nx + w);
+        if let Some(p) = parameter_index::<F::Shape>(variable) {
+            return context.free.index_of(p).map(|w| nx + w);
         }
         match variable.checked_sub(2 * nx) {
             None => variable.checked_sub(nx),
-            Some(state) => {
-                (0..starts::<F>()).find(|&copy| start::<F>(copy) == state).map(|copy| nx + at.first + copy)
-            }
+            Some(state) => (0..copied_state_count::<F>())
+                .find(|&copy| copied_state::<F>(copy) == state)
+                .map(|copy| nx + context.first_copy + copy),
         }
     }
 }
 
 /// How many elements of the first state a function depends on.
-const fn starts<F: Function>() -> usize {
+const fn copied_state_count<F: Function>() -> usize {
     let (variables, nx) = (F::STRUCTURE.variables, F::Shape::NX);
     let (mut index, mut count) = (0, 0);
     while index < variables.len() {
@@ -124,31 +126,31 @@ const fn starts<F: Function>() -> usize {
 }
 
 /// Which state one of these is.
-fn start<F: Function>(copy: usize) -> usize {
+fn copied_state<F: Function>(copy: usize) -> usize {
     let nx = F::Shape::NX;
-    let of_start =
+    let initial_states =
         F::STRUCTURE.variables.iter().filter_map(|&variable| (variable as usize).checked_sub(2 * nx));
-    of_start.filter(|state| *state < nx).nth(copy).unwrap_or(0)
+    initial_states.filter(|state| *state < nx).nth(copy).unwrap_or(0)
 }
 
 #[diagnostic::do_not_recommend]
 impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
     const ROWS: usize = F::Outputs::NY;
     const ALGEBRAIC: bool = false;
-    const STARTS: usize = {
+    const INITIAL_STATE_COPIES: usize = {
         let (nx, nz, nu, np) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU, F::Shape::NP);
         assert!(
             nx == S::NX && nz == S::NX && nu == 0 && np == S::NP,
             "a boundary condition is a function of two states of the model, `x0` and `x`, and of its parameters `p`, \
              if it has some"
         );
-        starts::<F>()
+        copied_state_count::<F>()
     };
 
-    fn start(copy: usize) -> usize {
-        start::<F>(copy)
+    fn copied_state(copy: usize) -> usize {
+        copied_state::<F>(copy)
     }
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         if there.u {
             let what = "a boundary condition as a path constraint";
             return Err(OcpError::Unsupported { what, remedy: "Give it to `terminal_constraints`" });
@@ -164,7 +166,7 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
         }
         Ok(())
     }
-    fn pattern(&self, _: Entries<'_>) -> bool {
+    fn visit_sparsity(&self, _: EntryVisitor<'_>) -> bool {
         false
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
@@ -173,10 +175,15 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
             crate::qp::copy_common(to, from.as_ref());
         }
     }
-    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
-        self.read::<S>(v, at);
+    fn value(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        context: ConstraintContext<'_, T>,
+    ) -> Result<(), OcpError> {
+        self.load_variables::<S>(v, context);
         F::value::<T>(&self.v, &mut self.g);
-        finite_outputs::<F, T>(&self.g, at.stage)?;
+        check_finite_outputs::<F, T>(&self.g, context.stage)?;
         crate::qp::copy_common(values, self.g.as_ref());
         Ok(())
     }
@@ -186,31 +193,44 @@ impl<S: Shape, F: Function, T: Real> Constraints<S, T> for Boundary<F, T> {
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        at: Spot<'_, T>,
+        context: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError> {
-        self.read::<S>(v, at);
+        self.load_variables::<S>(v, context);
         F::value_jacobian::<T>(&self.v, &mut self.g, &mut self.jacobian);
-        finite_outputs::<F, T>(&self.g, at.stage)?;
+        check_finite_outputs::<F, T>(&self.g, context.stage)?;
         crate::qp::copy_common(values, self.g.as_ref());
         for ((row, variable), &value) in F::STRUCTURE.jacobian.iter().zip(self.jacobian.as_ref()) {
-            if let Some(position) = Self::position::<S>(variable, at) {
+            if let Some(position) = Self::position::<S>(variable, context) {
                 crate::qp::element::set(columns, row * ld + position, value);
             }
         }
         Ok(())
     }
-    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>) {
-        self.read::<S>(v, at);
+    fn add_hessian(
+        &mut self,
+        v: &S::ArrayV<T>,
+        mu: &[T],
+        context: ConstraintContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
+    ) {
+        self.load_variables::<S>(v, context);
         let mu: ArrayY<F, T> = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
-        each_entry::<F, T>(&self.v, &mu, &mut self.hessian, |row, column, value| {
-            let places = [row, column].map(|variable| Self::position::<S>(variable, at));
+        for_each_hessian_entry::<F, T>(&self.v, &mu, &mut self.hessian, |row, column, value| {
+            let places = [row, column].map(|variable| Self::position::<S>(variable, context));
             if let [Some(row), Some(column)] = places {
-                terms.curve(row.max(column), row.min(column), value);
+                terms.add_hessian(row.max(column), row.min(column), value);
             }
         });
     }
     /// There are shared variables, and with these no derivatives by parameters.
-    fn cross(&mut self, _: &S::ArrayV<T>, _: Option<&[T]>, _: &mut [T], _: &mut Cross<'_, T>) {}
+    fn add_parameter_derivatives(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: Option<&[T]>,
+        _: &mut [T],
+        _: &mut ParameterDerivatives<'_, T>,
+    ) {
+    }
     fn name(row: usize) -> (&'static str, usize) {
         (F::STRUCTURE.name, row)
     }

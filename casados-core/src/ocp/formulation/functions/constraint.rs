@@ -3,36 +3,41 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::free::Free;
-use crate::ocp::formulation::functions::pattern::{self, Entries};
-use crate::ocp::formulation::functions::point::{
-    Cross, Terms, There, finite_outputs, is_algebraic, parameter,
+use crate::ocp::formulation::free_parameters::FreeParametersView;
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_outputs, depends_on_algebraic,
+    parameter_index,
 };
+use crate::ocp::formulation::functions::sparsity::{self, EntryVisitor};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// Where constraints are evaluated.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot<'a, T> {
+pub struct ConstraintContext<'a, T> {
     pub(in crate::ocp) stage: usize,
     /// Where variables are.
-    pub(in crate::ocp) free: Free<'a>,
+    pub(in crate::ocp) free: FreeParametersView<'a>,
     /// Copies of elements of the first state, and which of the shared variables the first one is.
-    pub(in crate::ocp) starts: &'a [T],
-    pub(in crate::ocp) first: usize,
+    pub(in crate::ocp) initial_state_copies: &'a [T],
+    pub(in crate::ocp) first_copy: usize,
 }
 
-impl<'a, T> Spot<'a, T> {
+impl<'a, T> ConstraintContext<'a, T> {
     /// Of a stage with these shared variables, the first ones of which are the copies.
     #[inline(always)]
-    pub(in crate::ocp) fn new(stage: usize, free: Free<'a>, w: &'a [T]) -> Self {
-        Self { stage, free, starts: w, first: 0 }
+    pub(in crate::ocp) fn new(stage: usize, free: FreeParametersView<'a>, w: &'a [T]) -> Self {
+        Self { stage, free, initial_state_copies: w, first_copy: 0 }
     }
 
     /// Without so many copies.
-    fn behind(self, count: usize) -> Self {
-        Self { starts: self.starts.get(count..).unwrap_or_default(), first: self.first + count, ..self }
+    fn skip_copies(self, count: usize) -> Self {
+        Self {
+            initial_state_copies: self.initial_state_copies.get(count..).unwrap_or_default(),
+            first_copy: self.first_copy + count,
+            ..self
+        }
     }
 }
 
@@ -65,11 +70,11 @@ pub trait Constraints<S: Shape, T: Real> {
     /// Whether they depend on algebraic states.
     const ALGEBRAIC: bool;
     /// How many elements of the first state they depend on, of which the last stage has copies.
-    const STARTS: usize = 0;
+    const INITIAL_STATE_COPIES: usize = 0;
 
     /// Which state a copy is of.
     #[doc(hidden)]
-    fn start(copy: usize) -> usize {
+    fn copied_state(copy: usize) -> usize {
         copy
     }
     /// Whether they depend on what is there only.
@@ -77,11 +82,11 @@ pub trait Constraints<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NotThere`]
     #[doc(hidden)]
-    fn check(&self, there: There) -> Result<(), OcpError>;
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError>;
     /// Shows where the Jacobian and the Hessian over `(x, u, z)` may have entries; false if that is
     /// not known.
     #[doc(hidden)]
-    fn pattern(&self, visit: Entries<'_>) -> bool {
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
         let _ = visit;
         Self::ROWS == 0
     }
@@ -94,7 +99,12 @@ pub trait Constraints<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
-    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError>;
+    fn value(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        context: ConstraintContext<'_, T>,
+    ) -> Result<(), OcpError>;
     /// The values, and their derivatives: a column for each, `ld` apart.
     ///
     /// # Errors
@@ -106,15 +116,27 @@ pub trait Constraints<S: Shape, T: Real> {
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        at: Spot<'_, T>,
+        context: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError>;
     /// Adds the Hessian of `μᵀg`.
     #[doc(hidden)]
-    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>);
+    fn add_hessian(
+        &mut self,
+        v: &S::ArrayV<T>,
+        mu: &[T],
+        context: ConstraintContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
+    );
     /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of
     /// `μᵀg`, if `μ` is given.
     #[doc(hidden)]
-    fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>);
+    fn add_parameter_derivatives(
+        &mut self,
+        v: &S::ArrayV<T>,
+        mu: Option<&[T]>,
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
+    );
     /// The function of a row, and which of its outputs it is.
     #[doc(hidden)]
     fn name(row: usize) -> (&'static str, usize);
@@ -128,11 +150,11 @@ pub trait Constraints<S: Shape, T: Real> {
 impl<S: Shape, T: Real> Constraints<S, T> for () {
     const ROWS: usize = 0;
     const ALGEBRAIC: bool = false;
-    fn check(&self, _: There) -> Result<(), OcpError> {
+    fn check(&self, _: AvailableVariables) -> Result<(), OcpError> {
         Ok(())
     }
     fn bounds(&self, _: [&mut [T]; 4]) {}
-    fn value(&mut self, _: &S::ArrayV<T>, _: &mut [T], _: Spot<'_, T>) -> Result<(), OcpError> {
+    fn value(&mut self, _: &S::ArrayV<T>, _: &mut [T], _: ConstraintContext<'_, T>) -> Result<(), OcpError> {
         Ok(())
     }
     fn linearise(
@@ -141,12 +163,26 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         _: &mut [T],
         _: &mut [T],
         _: usize,
-        _: Spot<'_, T>,
+        _: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError> {
         Ok(())
     }
-    fn curve(&mut self, _: &S::ArrayV<T>, _: &[T], _: Spot<'_, T>, _: &mut Terms<'_, T>) {}
-    fn cross(&mut self, _: &S::ArrayV<T>, _: Option<&[T]>, _: &mut [T], _: &mut Cross<'_, T>) {}
+    fn add_hessian(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: &[T],
+        _: ConstraintContext<'_, T>,
+        _: &mut QuadraticTerms<'_, T>,
+    ) {
+    }
+    fn add_parameter_derivatives(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: Option<&[T]>,
+        _: &mut [T],
+        _: &mut ParameterDerivatives<'_, T>,
+    ) {
+    }
     fn name(row: usize) -> (&'static str, usize) {
         ("", row)
     }
@@ -155,24 +191,26 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
 impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<S, T> for (A, B) {
     const ROWS: usize = A::ROWS + B::ROWS;
     const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
-    const STARTS: usize = A::STARTS + B::STARTS;
-    fn start(copy: usize) -> usize {
-        match copy.checked_sub(A::STARTS) {
-            None => A::start(copy),
-            Some(copy) => B::start(copy),
+    const INITIAL_STATE_COPIES: usize = A::INITIAL_STATE_COPIES + B::INITIAL_STATE_COPIES;
+    fn copied_state(copy: usize) -> usize {
+        match copy.checked_sub(A::INITIAL_STATE_COPIES) {
+            None => A::copied_state(copy),
+            Some(copy) => B::copied_state(copy),
         }
     }
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
     }
-    fn pattern(&self, visit: Entries<'_>) -> bool {
-        use crate::ocp::formulation::functions::pattern::Entry;
-        let behind = &mut |entry| match entry {
-            Entry::Slope(row, variable) => visit(Entry::Slope(A::ROWS + row, variable)),
-            Entry::Curvature(..) => visit(entry),
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
+        use crate::ocp::formulation::functions::sparsity::DerivativeEntry;
+        let visit_shifted = &mut |entry| match entry {
+            DerivativeEntry::Jacobian(row, variable) => {
+                visit(DerivativeEntry::Jacobian(A::ROWS + row, variable))
+            }
+            DerivativeEntry::Hessian(..) => visit(entry),
         };
-        self.1.pattern(behind) && self.0.pattern(visit)
+        self.1.visit_sparsity(visit_shifted) && self.0.visit_sparsity(visit)
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let [(l, lower), (u, upper), (i, linear), (q, quadratic)] =
@@ -180,10 +218,15 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         self.0.bounds([l, u, i, q]);
         self.1.bounds([lower, upper, linear, quadratic]);
     }
-    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
+    fn value(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        context: ConstraintContext<'_, T>,
+    ) -> Result<(), OcpError> {
         let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
-        self.0.value(v, first, at)?;
-        self.1.value(v, second, at.behind(A::STARTS))
+        self.0.value(v, first, context)?;
+        self.1.value(v, second, context.skip_copies(A::INITIAL_STATE_COPIES))
     }
     fn linearise(
         &mut self,
@@ -191,23 +234,35 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        at: Spot<'_, T>,
+        context: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError> {
         let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
-        let (mine, others) = columns.split_at_mut_checked(A::ROWS * ld).unwrap_or_default();
-        self.0.linearise(v, first, mine, ld, at)?;
-        self.1.linearise(v, second, others, ld, at.behind(A::STARTS))
+        let (first_columns, second_columns) = columns.split_at_mut_checked(A::ROWS * ld).unwrap_or_default();
+        self.0.linearise(v, first, first_columns, ld, context)?;
+        self.1.linearise(v, second, second_columns, ld, context.skip_copies(A::INITIAL_STATE_COPIES))
     }
-    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], at: Spot<'_, T>, terms: &mut Terms<'_, T>) {
+    fn add_hessian(
+        &mut self,
+        v: &S::ArrayV<T>,
+        mu: &[T],
+        context: ConstraintContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
+    ) {
         let (first, second) = mu.split_at_checked(A::ROWS).unwrap_or_default();
-        self.0.curve(v, first, at, terms);
-        self.1.curve(v, second, at.behind(A::STARTS), terms);
+        self.0.add_hessian(v, first, context, terms);
+        self.1.add_hessian(v, second, context.skip_copies(A::INITIAL_STATE_COPIES), terms);
     }
-    fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
-        let (mine, others) = slopes.split_at_mut_checked(A::ROWS * S::NP).unwrap_or_default();
+    fn add_parameter_derivatives(
+        &mut self,
+        v: &S::ArrayV<T>,
+        mu: Option<&[T]>,
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
+    ) {
+        let (first_slopes, second_slopes) = slopes.split_at_mut_checked(A::ROWS * S::NP).unwrap_or_default();
         let (first, second) = mu.and_then(|mu| mu.split_at_checked(A::ROWS)).unzip();
-        self.0.cross(v, first, mine, cross);
-        self.1.cross(v, second, others, cross);
+        self.0.add_parameter_derivatives(v, first, first_slopes, cross);
+        self.1.add_parameter_derivatives(v, second, second_slopes, cross);
     }
     fn name(row: usize) -> (&'static str, usize) {
         match row.checked_sub(A::ROWS) {
@@ -284,9 +339,9 @@ impl<F: Function, T: Real> Constraint<F, T> {
 #[diagnostic::do_not_recommend]
 impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint<F, T> {
     const ROWS: usize = F::Outputs::NY;
-    const ALGEBRAIC: bool = is_algebraic::<F>();
+    const ALGEBRAIC: bool = depends_on_algebraic::<F>();
 
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         let part = if there.u { Part::PathBounds } else { Part::TerminalBounds };
         let labels = Labels { part, stage: there.stage, name: <Self as Constraints<F::Shape, T>>::name };
         let Self { lower, upper, linear, quadratic, .. } = self;
@@ -298,9 +353,9 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         }
         there.check::<F>()
     }
-    fn pattern(&self, visit: Entries<'_>) -> bool {
-        pattern::slopes::<F>(visit);
-        pattern::curvature::<F>(visit);
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
+        sparsity::visit_jacobian::<F>(visit);
+        sparsity::visit_hessian::<F>(visit);
         true
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
@@ -311,9 +366,14 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
             }
         }
     }
-    fn value(&mut self, v: &ArrayV<F, T>, values: &mut [T], at: Spot<'_, T>) -> Result<(), OcpError> {
+    fn value(
+        &mut self,
+        v: &ArrayV<F, T>,
+        values: &mut [T],
+        context: ConstraintContext<'_, T>,
+    ) -> Result<(), OcpError> {
         F::value::<T>(v, &mut self.g);
-        finite_outputs::<F, T>(&self.g, at.stage)?;
+        check_finite_outputs::<F, T>(&self.g, context.stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }
@@ -325,35 +385,47 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
         values: &mut [T],
         columns: &mut [T],
         ld: usize,
-        at: Spot<'_, T>,
+        context: ConstraintContext<'_, T>,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
-        finite_outputs::<F, T>(&self.g, at.stage)?;
+        check_finite_outputs::<F, T>(&self.g, context.stage)?;
         for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
             *value = g;
         }
         for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
             let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
-            let Some(position) = at.free.position::<F::Shape>(variable) else { continue };
+            let Some(position) = context.free.position::<F::Shape>(variable) else { continue };
             if let Some(element) = columns.get_mut(row * ld + position) {
                 *element = value;
             }
         }
         Ok(())
     }
-    fn curve(&mut self, v: &ArrayV<F, T>, mu: &[T], _: Spot<'_, T>, terms: &mut Terms<'_, T>) {
-        terms.curvature::<F>(v, &multipliers::<F, T>(mu), T::ONE, &mut self.hessian);
+    fn add_hessian(
+        &mut self,
+        v: &ArrayV<F, T>,
+        mu: &[T],
+        _: ConstraintContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
+    ) {
+        terms.add_weighted_hessian::<F>(v, &multiplier_array::<F, T>(mu), T::ONE, &mut self.hessian);
     }
-    fn cross(&mut self, v: &ArrayV<F, T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
+    fn add_parameter_derivatives(
+        &mut self,
+        v: &ArrayV<F, T>,
+        mu: Option<&[T]>,
+        slopes: &mut [T],
+        cross: &mut ParameterDerivatives<'_, T>,
+    ) {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
         for (&value, (row, variable)) in self.jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter()) {
-            let Some(p) = parameter::<F::Shape>(variable) else { continue };
+            let Some(p) = parameter_index::<F::Shape>(variable) else { continue };
             if let Some(slope) = slopes.get_mut(row * F::Shape::NP + p) {
                 *slope = value;
             }
         }
         if let Some(mu) = mu {
-            cross.curvature::<F>(v, &multipliers::<F, T>(mu), T::ONE, &mut self.hessian);
+            cross.add_weighted_hessian::<F>(v, &multiplier_array::<F, T>(mu), T::ONE, &mut self.hessian);
         }
     }
     fn name(row: usize) -> (&'static str, usize) {
@@ -365,6 +437,6 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint
 }
 
 /// Those of the outputs of a function.
-fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
+fn multiplier_array<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
     Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO))
 }

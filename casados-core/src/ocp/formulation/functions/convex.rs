@@ -2,9 +2,11 @@
 
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::{At, Cost, Show};
-use crate::ocp::formulation::functions::least_squares::{Square, refer};
-use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext, Show};
+use crate::ocp::formulation::functions::least_squares::{GaussNewtonTerms, subtract_reference_derivatives};
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_value, depends_on_algebraic,
+};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
@@ -122,15 +124,17 @@ pub struct PseudoHuber<T, const NY: usize> {
 }
 
 /// `Σ w_i f(r_i, δ_i)` of a function with its first and second derivative.
-fn separate<T: Real, const NY: usize>(
+fn evaluate_separable<T: Real, const NY: usize>(
     [weights, delta]: [&[T; NY]; 2],
     r: &[T],
     [gradient, hessian]: [&mut [T]; 2],
     f: impl Fn(T, T) -> [T; 3],
 ) -> T {
     let mut sum = T::ZERO;
-    let places = gradient.iter_mut().zip(hessian.iter_mut().step_by(NY + 1));
-    for ((&r, (&weight, &delta)), (slope, curvature)) in r.iter().zip(weights.iter().zip(delta)).zip(places) {
+    let diagonal_elements = gradient.iter_mut().zip(hessian.iter_mut().step_by(NY + 1));
+    for ((&r, (&weight, &delta)), (slope, curvature)) in
+        r.iter().zip(weights.iter().zip(delta)).zip(diagonal_elements)
+    {
         let [value, first, second] = f(r, delta);
         sum = sum + weight * value;
         (*slope, *curvature) = (weight * first, weight * second);
@@ -139,7 +143,7 @@ fn separate<T: Real, const NY: usize>(
 }
 
 /// Whether weights and `δ` make sense.
-fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
+fn check_constants<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
     let invalid = |output, value, allowed| Err(InvalidConstant { output, value, allowed });
     for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
         let (weight, delta) = (weight.to_f64(), delta.to_f64());
@@ -156,7 +160,7 @@ fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), InvalidConstant> {
 impl<T: Real, const NY: usize> Convex<T> for Huber<T, NY> {
     fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T {
         let half = T::from_f64(0.5);
-        separate([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
+        evaluate_separable([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
             if r.abs() <= delta {
                 [half * r * r, r, T::ONE]
             } else {
@@ -166,21 +170,21 @@ impl<T: Real, const NY: usize> Convex<T> for Huber<T, NY> {
         })
     }
     fn check(&self) -> Result<(), InvalidConstant> {
-        check(&self.weights, &self.delta)
+        check_constants(&self.weights, &self.delta)
     }
 }
 
 impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
     fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T {
-        separate([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
-            let part = r / delta;
-            let root = (T::ONE + part * part).sqrt();
+        evaluate_separable([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
+            let ratio = r / delta;
+            let root = (T::ONE + ratio * ratio).sqrt();
             // `√(1 + a²) − 1` without cancellation.
             [r * r / (T::ONE + root), r / root, T::ONE / (root * root * root)]
         })
     }
     fn check(&self) -> Result<(), InvalidConstant> {
-        check(&self.weights, &self.delta)
+        check_constants(&self.weights, &self.delta)
     }
 }
 
@@ -281,7 +285,7 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
         let value = outer.evaluate(y.as_ref(), mu.as_mut(), phi.as_mut_slice());
         let derivatives = mu.as_ref().iter().chain(phi.as_slice());
         let value = derivatives.fold(value, |value, &d| if d.is_finite() { value } else { d });
-        let value = finite::<F, T>(y, value, stage)?;
+        let value = check_finite_value::<F, T>(y, value, stage)?;
         for k in 0..F::Outputs::NY {
             let curvature = phi[(k, k)];
             if curvature < T::ZERO {
@@ -299,9 +303,9 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
     const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
-    const ALGEBRAIC: bool = is_algebraic::<F>();
+    const ALGEBRAIC: bool = depends_on_algebraic::<F>();
 
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         Cost::<F::Shape, T>::check_weights(self)?;
         there.check::<F>()
     }
@@ -326,52 +330,58 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
         self.evaluate(reference, stage)
     }
 
-    fn add(
+    fn add_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<'_, T>,
-        terms: &mut Terms<'_, T>,
+        at: CostContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         let value = self.evaluate(reference, at.stage)?;
         let Self { mu, phi, jacobian, hessian, .. } = self;
         // From a point `v` on the gradient is `Jᵀ (φ′ − φ″ J v)`.
         let y = &Zeroable::zeroed();
-        Square::<F, T> { weights: phi, y, jacobian, at, terms: &mut *terms }.coupled(mu);
+        GaussNewtonTerms::<F, T> { weights: phi, y, jacobian, context: at, terms: &mut *terms }
+            .add_coupled(mu);
         if at.exact {
-            terms.curvature::<F>(v, mu, at.factor, hessian);
+            terms.add_weighted_hessian::<F>(v, mu, at.factor, hessian);
         }
         Ok(at.factor * value)
     }
 
-    fn cross(
+    fn add_parameter_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<'_, T>,
-        cross: &mut Cross<'_, T>,
+        context: CostContext<'_, T>,
+        cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
-        self.evaluate(reference, at.stage)?;
+        self.evaluate(reference, context.stage)?;
         let Self { mu, phi, jacobian, hessian, .. } = self;
-        cross.gauss_newton::<F>(jacobian, mu, phi, at.factor);
-        if at.exact {
-            cross.curvature::<F>(v, mu, at.factor, hessian);
+        cross.gauss_newton::<F>(jacobian, mu, phi, context.factor);
+        if context.exact {
+            cross.add_weighted_hessian::<F>(v, mu, context.factor, hessian);
         }
         Ok(())
     }
 
-    fn refer(
+    fn add_reference_derivatives(
         &mut self,
         (v, direction): (&ArrayV<F, T>, Option<&ArrayV<F, T>>),
         reference: &[T],
-        at: At<'_, T>,
+        context: CostContext<'_, T>,
         to: &mut [T],
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
-        self.evaluate(reference, at.stage)?;
-        refer::<F, T>((&self.phi, &self.mu), (&self.jacobian, direction), at.factor, to);
+        self.evaluate(reference, context.stage)?;
+        subtract_reference_derivatives::<F, T>(
+            (&self.phi, &self.mu),
+            (&self.jacobian, direction),
+            context.factor,
+            to,
+        );
         Ok(())
     }
 }

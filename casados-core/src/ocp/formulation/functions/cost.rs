@@ -2,8 +2,11 @@
 
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::pattern::{self, Entries};
-use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic, parameter};
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_value, depends_on_algebraic,
+    parameter_index,
+};
+use crate::ocp::formulation::functions::sparsity::{self, EntryVisitor};
 use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape, plain};
 use bytemuck::Zeroable;
@@ -58,7 +61,7 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NotThere`], [`OcpError::InvalidWeight`]
     #[doc(hidden)]
-    fn check(&self, there: There) -> Result<(), OcpError>;
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError>;
 
     /// Whether its weights, which may be changed after it was checked, make sense.
     ///
@@ -84,7 +87,7 @@ pub trait Cost<S: Shape, T: Real> {
 
     /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
     #[doc(hidden)]
-    fn pattern(&self, visit: Entries<'_>) -> bool {
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
         let _ = visit;
         false
     }
@@ -101,12 +104,12 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
-    fn add(
+    fn add_derivatives(
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<'_, T>,
-        terms: &mut Terms<'_, T>,
+        context: CostContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError>;
 
     /// Adds what parameters change of the gradient, and gradient and Hessian with respect to the
@@ -115,12 +118,12 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
-    fn cross(
+    fn add_parameter_derivatives(
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<'_, T>,
-        cross: &mut Cross<'_, T>,
+        context: CostContext<'_, T>,
+        cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError>;
 
     /// Adds what the reference changes, times the factor: of the value at a point, or, of a
@@ -129,14 +132,14 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
     #[doc(hidden)]
-    fn refer(
+    fn add_reference_derivatives(
         &mut self,
         point: (&S::ArrayV<T>, Option<&S::ArrayV<T>>),
         reference: &[T],
-        at: At<'_, T>,
+        context: CostContext<'_, T>,
         to: &mut [T],
     ) -> Result<(), OcpError> {
-        let _ = (point, reference, at, to);
+        let _ = (point, reference, context, to);
         Ok(())
     }
 }
@@ -146,13 +149,13 @@ pub type Show<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
 
 /// Where, how much, and whether the Hessian is to be exact.
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a, T> {
+pub struct CostContext<'a, T> {
     pub(in crate::ocp) stage: usize,
     pub(in crate::ocp) factor: T,
     pub(in crate::ocp) exact: bool,
     /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with
     /// the Hessian `H` that is added, which is [convex](Cost::CONVEX). Else it is empty.
-    pub(in crate::ocp) from: &'a [T],
+    pub(in crate::ocp) model_origin: &'a [T],
 }
 
 impl<S: Shape, T: Real> Cost<S, T> for () {
@@ -160,27 +163,33 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     const CONVEX: bool = true;
     const CONVEX_IN_VARIABLES: bool = true;
     const ALGEBRAIC: bool = false;
-    fn check(&self, _: There) -> Result<(), OcpError> {
+    fn check(&self, _: AvailableVariables) -> Result<(), OcpError> {
         Ok(())
     }
     fn terms(&self, _: Show<'_>) -> fmt::Result {
         Ok(())
     }
-    fn pattern(&self, _: Entries<'_>) -> bool {
+    fn visit_sparsity(&self, _: EntryVisitor<'_>) -> bool {
         true
     }
     fn value(&mut self, _: &S::ArrayV<T>, _: &[T], _: usize) -> Result<T, OcpError> {
         Ok(T::ZERO)
     }
-    fn add(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<'_, T>, _: &mut Terms<'_, T>) -> Result<T, OcpError> {
-        Ok(T::ZERO)
-    }
-    fn cross(
+    fn add_derivatives(
         &mut self,
         _: &S::ArrayV<T>,
         _: &[T],
-        _: At<'_, T>,
-        _: &mut Cross<'_, T>,
+        _: CostContext<'_, T>,
+        _: &mut QuadraticTerms<'_, T>,
+    ) -> Result<T, OcpError> {
+        Ok(T::ZERO)
+    }
+    fn add_parameter_derivatives(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: &[T],
+        _: CostContext<'_, T>,
+        _: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError> {
         Ok(())
     }
@@ -192,7 +201,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     const CONVEX: bool = A::CONVEX && B::CONVEX;
     const CONVEX_IN_VARIABLES: bool = A::CONVEX_IN_VARIABLES && B::CONVEX_IN_VARIABLES;
     const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
     }
@@ -204,8 +213,8 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         self.0.terms(show)?;
         self.1.terms(show)
     }
-    fn pattern(&self, visit: Entries<'_>) -> bool {
-        self.0.pattern(visit) && self.1.pattern(visit)
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
+        self.0.visit_sparsity(visit) && self.1.visit_sparsity(visit)
     }
     fn name(reference: usize) -> (&'static str, usize) {
         match reference.checked_sub(A::REFERENCES) {
@@ -217,38 +226,39 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
         Ok(self.0.value(v, first, stage)? + self.1.value(v, second, stage)?)
     }
-    fn add(
+    fn add_derivatives(
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<'_, T>,
-        terms: &mut Terms<'_, T>,
+        context: CostContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
-        Ok(self.0.add(v, first, at, terms)? + self.1.add(v, second, at, terms)?)
+        Ok(self.0.add_derivatives(v, first, context, terms)?
+            + self.1.add_derivatives(v, second, context, terms)?)
     }
-    fn cross(
+    fn add_parameter_derivatives(
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<'_, T>,
-        cross: &mut Cross<'_, T>,
+        context: CostContext<'_, T>,
+        cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
-        self.0.cross(v, first, at, cross)?;
-        self.1.cross(v, second, at, cross)
+        self.0.add_parameter_derivatives(v, first, context, cross)?;
+        self.1.add_parameter_derivatives(v, second, context, cross)
     }
-    fn refer(
+    fn add_reference_derivatives(
         &mut self,
         point: (&S::ArrayV<T>, Option<&S::ArrayV<T>>),
         reference: &[T],
-        at: At<'_, T>,
+        context: CostContext<'_, T>,
         to: &mut [T],
     ) -> Result<(), OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
         let (to_first, to_second) = to.split_at_mut_checked(A::REFERENCES).unwrap_or_default();
-        self.0.refer(point, first, at, to_first)?;
-        self.1.refer(point, second, at, to_second)
+        self.0.add_reference_derivatives(point, first, context, to_first)?;
+        self.1.add_reference_derivatives(point, second, context, to_second)
     }
 }
 
@@ -303,9 +313,9 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T>
     const REFERENCES: usize = 0;
     const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
     const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
-    const ALGEBRAIC: bool = is_algebraic::<F>();
+    const ALGEBRAIC: bool = depends_on_algebraic::<F>();
 
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         there.check::<F>()
     }
 
@@ -313,51 +323,51 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T>
         show(format_args!("{}", F::STRUCTURE.name))
     }
 
-    fn pattern(&self, visit: Entries<'_>) -> bool {
-        pattern::curvature::<F>(visit);
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
+        sparsity::visit_hessian::<F>(visit);
         true
     }
 
     fn value(&mut self, v: &ArrayV<F, T>, _: &[T], stage: usize) -> Result<T, OcpError> {
         F::value::<T>(v, &mut self.y);
         let sum = self.y.as_ref().iter().fold(T::ZERO, |sum, &y| sum + y);
-        finite::<F, T>(&self.y, sum, stage)
+        check_finite_value::<F, T>(&self.y, sum, stage)
     }
 
-    fn add(
+    fn add_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<'_, T>,
-        terms: &mut Terms<'_, T>,
+        context: CostContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError> {
-        let value = self.value(v, reference, at.stage)?;
+        let value = self.value(v, reference, context.stage)?;
         self.mu = Array::from_fn(|_| T::ONE);
         F::adjoint::<T>(v, &self.mu, &mut self.gradient);
         for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
             if let Some(i) = terms.free.position::<F::Shape>(variable) {
-                terms.slope(i, at.factor * slope);
+                terms.add_gradient(i, context.factor * slope);
             }
         }
-        terms.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
-        Ok(at.factor * value)
+        terms.add_weighted_hessian::<F>(v, &self.mu, context.factor, &mut self.hessian);
+        Ok(context.factor * value)
     }
 
-    fn cross(
+    fn add_parameter_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         _: &[T],
-        at: At<'_, T>,
-        cross: &mut Cross<'_, T>,
+        context: CostContext<'_, T>,
+        cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError> {
         self.mu = Array::from_fn(|_| T::ONE);
         F::adjoint::<T>(v, &self.mu, &mut self.gradient);
         for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
-            if let Some(p) = parameter::<F::Shape>(variable) {
-                cross.slope(p, at.factor * slope);
+            if let Some(p) = parameter_index::<F::Shape>(variable) {
+                cross.add_gradient(p, context.factor * slope);
             }
         }
-        cross.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
+        cross.add_weighted_hessian::<F>(v, &self.mu, context.factor, &mut self.hessian);
         Ok(())
     }
 }

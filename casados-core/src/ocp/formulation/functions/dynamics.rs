@@ -1,10 +1,10 @@
 //! What happens between two nodes of a horizon.
 
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::ocp::formulation::functions::cost::Show;
-use crate::ocp::formulation::functions::pattern::Origin;
 pub use crate::ocp::formulation::functions::result::{IntegralTerms, IntervalResult};
+use crate::ocp::formulation::functions::sparsity::Origin;
 use crate::ocp::formulation::names::Names;
 use crate::qp::nan_max;
 use crate::scalar::Real;
@@ -23,7 +23,7 @@ pub struct Interval<'a, T> {
     pub(in crate::ocp) p: &'a [T],
     /// The free ones, and where they are.
     pub(in crate::ocp) w: &'a [T],
-    pub(in crate::ocp) free: Free<'a>,
+    pub(in crate::ocp) free: FreeParametersView<'a>,
     /// The multipliers `π` of its end.
     pub multipliers: &'a [T],
     /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if
@@ -40,7 +40,7 @@ impl<T: Real> Interval<'_, T> {
     #[inline(always)]
     pub(in crate::ocp) fn parameters<V: Matrix<T>>(&self) -> V {
         let mut p: V = vector(self.p);
-        self.free.write(p.as_mut_slice(), self.w);
+        self.free.write_parameters(p.as_mut_slice(), self.w);
         p
     }
 }
@@ -53,7 +53,7 @@ pub struct Nodes<'a, T> {
     pub(in crate::ocp) multipliers: &'a [T],
     pub(in crate::ocp) weights: &'a [T],
     pub(in crate::ocp) p: &'a [T],
-    pub(in crate::ocp) free: Free<'a>,
+    pub(in crate::ocp) free: FreeParametersView<'a>,
     pub(in crate::ocp) times: &'a [T],
     /// `NX`, `NU`, `NP`, `NZ`
     pub(in crate::ocp) dims: [usize; 4],
@@ -121,11 +121,11 @@ impl<'a, T: Real> Nodes<'a, T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageAction<T> {
     /// They go a part of their step.
-    Go(T),
+    Step(T),
     /// They are those of the best iterate.
-    Remember,
+    StoreBest,
     /// They are what they were at the best iterate.
-    Recall,
+    RestoreBest,
 }
 
 /// What takes the results of the intervals, in order.
@@ -177,7 +177,7 @@ pub trait Dynamics<T: Real> {
     #[doc(hidden)]
     const ORIGIN: Origin = Origin::Unknown;
     /// Whether stages of intervals are variables, which a solver moves with its iterate: by
-    /// `begin_stages`, `expand_stages` and `move_stages`.
+    /// `initialise_stages`, `expand_stage_steps` and `apply_stage_action`.
     const LIFTED: bool = false;
 
     /// Whether weights of integral costs make sense.
@@ -240,7 +240,7 @@ pub trait Dynamics<T: Real> {
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
-    fn begin_stages(&mut self, _nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+    fn initialise_stages(&mut self, _nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
         Ok(())
     }
 
@@ -249,12 +249,12 @@ pub trait Dynamics<T: Real> {
     ///
     /// # Errors
     /// [`OcpError::Integration`]
-    fn expand_stages(&mut self, _nodes: &Nodes<'_, T>, _steps: &Nodes<'_, T>) -> Result<(), OcpError> {
+    fn expand_stage_steps(&mut self, _nodes: &Nodes<'_, T>, _steps: &Nodes<'_, T>) -> Result<(), OcpError> {
         Ok(())
     }
 
     /// What happens to stages.
-    fn move_stages(&mut self, _action: StageAction<T>) {}
+    fn apply_stage_action(&mut self, _action: StageAction<T>) {}
 }
 
 /// Dynamics with second derivatives.
@@ -294,8 +294,11 @@ pub trait SecondOrder<T: Real>: Dynamics<T> {
 }
 
 /// Sum and largest of what is left of the equations of stages.
-pub(in crate::ocp) fn add_stages<T: Real>([sum, largest]: [T; 2], [more, other]: [T; 2]) -> [T; 2] {
-    [sum + more, nan_max(largest, other)]
+pub(in crate::ocp) fn add_stage_residuals<T: Real>(
+    [sum, largest]: [T; 2],
+    [other_sum, other_largest]: [T; 2],
+) -> [T; 2] {
+    [sum + other_sum, nan_max(largest, other_largest)]
 }
 
 /// A vector of these elements.
@@ -312,10 +315,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_a_number_stays() {
-        let first = add_stages([1.0, f64::NAN], [1.0, 2.0]);
-        let second = add_stages([1.0, 2.0], [1.0, f64::NAN]);
+    fn stage_residuals_keep_nan() {
+        let first = add_stage_residuals([1.0, f64::NAN], [1.0, 2.0]);
+        let second = add_stage_residuals([1.0, 2.0], [1.0, f64::NAN]);
         assert!(first[1].is_nan() && second[1].is_nan());
-        assert_eq!(add_stages([1.0, 2.0], [1.0, 3.0]), [2.0, 3.0]);
+        assert_eq!(add_stage_residuals([1.0, 2.0], [1.0, 3.0]), [2.0, 3.0]);
     }
 }

@@ -1,11 +1,13 @@
 //! Least-squares costs at the nodes.
 
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
-use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
+use crate::linalg::{Arithmetic, Kernel, RowVisitor, dispatch, for_each_row};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::{At, Cost, Show};
-use crate::ocp::formulation::functions::pattern::{self, Entries};
-use crate::ocp::formulation::functions::point::{Cross, Terms, There, finite, is_algebraic};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext, Show};
+use crate::ocp::formulation::functions::node_evaluation::{
+    AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_value, depends_on_algebraic,
+};
+use crate::ocp::formulation::functions::sparsity::{self, EntryVisitor};
 use crate::ocp::formulation::functions::weights;
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape, plain};
@@ -44,16 +46,16 @@ use core::ops::Range;
 pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
     weights: MatrixYY<F, T>,
     /// Zero if they are weights.
-    invalid: usize,
+    has_invalid_weights: usize,
     /// Zero if `W` is diagonal.
-    coupled: usize,
+    has_full_weights: usize,
     y: ArrayY<F, T>,
     mu: ArrayY<F, T>,
     jacobian: F::Jacobian<T>,
     hessian: F::Hessian<T>,
 }
 
-plain!([F: Function, T: Plain] LeastSquaresCost<F, T> { weights, invalid, coupled, y, mu, jacobian, hessian });
+plain!([F: Function, T: Plain] LeastSquaresCost<F, T> { weights, has_invalid_weights, has_full_weights, y, mu, jacobian, hessian });
 
 impl<F: Function, T: Real> LeastSquaresCost<F, T> {
     /// With the weights `W`, a symmetric, positive semidefinite matrix.
@@ -80,29 +82,30 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
     /// Other weights, as those of [`LeastSquaresCost::new`].
     pub fn set_weights(&mut self, weights: &MatrixYY<F, T>) {
         let elements = || (0..F::Outputs::NY).flat_map(|i| (0..i).map(move |j| (i, j)));
-        self.coupled =
+        self.has_full_weights =
             usize::from(elements().any(|(i, j)| weights[(i, j)] != T::ZERO || weights[(j, i)] != T::ZERO));
         self.weights = *weights;
-        self.invalid = usize::from(weights::check::<F, T>(weights, self.coupled != 0).is_err());
+        self.has_invalid_weights =
+            usize::from(weights::check::<F, T>(weights, self.has_full_weights != 0).is_err());
     }
 
     /// `μ = W (y − r)`, and `½ (y − r)ᵀ μ`.
     #[inline(always)]
-    fn square(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
-        let Self { weights, coupled, y, mu, .. } = self;
+    fn weighted_square(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        let Self { weights, has_full_weights: coupled, y, mu, .. } = self;
         for (y, &r) in y.as_mut().iter_mut().zip(reference) {
             *y = *y - r;
         }
-        weigh::<F, T>(weights, *coupled, y, mu);
+        apply_weights::<F, T>(weights, *coupled, y, mu);
         let products = y.as_ref().iter().zip(mu.as_ref()).map(|(y, mu)| *y * *mu);
         let square = products.fold(T::ZERO, |sum, product| sum + product);
-        finite::<F, T>(y, T::from_f64(0.5) * square, stage)
+        check_finite_value::<F, T>(y, T::from_f64(0.5) * square, stage)
     }
 }
 
 /// `μ = W y`
 #[inline(always)]
-fn weigh<F: Function, T: Real>(
+fn apply_weights<F: Function, T: Real>(
     weights: &MatrixYY<F, T>,
     coupled: usize,
     y: &ArrayY<F, T>,
@@ -120,7 +123,7 @@ fn weigh<F: Function, T: Real>(
 
 /// Subtracts `φ′`, or of a direction `d` `φ″ J d`, times a factor: what the reference changes of
 /// `φ(y − r)`.
-pub(in crate::ocp) fn refer<F: Function, T: Real>(
+pub(in crate::ocp) fn subtract_reference_derivatives<F: Function, T: Real>(
     (second, first): (&MatrixYY<F, T>, &ArrayY<F, T>),
     (jacobian, direction): (&F::Jacobian<T>, Option<&ArrayV<F, T>>),
     factor: T,
@@ -131,9 +134,10 @@ pub(in crate::ocp) fn refer<F: Function, T: Real>(
         return;
     };
     for ((output, variable), &slope) in F::STRUCTURE.jacobian.iter().zip(jacobian.as_ref()) {
-        let along = factor * slope * direction.as_ref().get(variable).copied().unwrap_or(T::ZERO);
+        let directional_derivative =
+            factor * slope * direction.as_ref().get(variable).copied().unwrap_or(T::ZERO);
         for (k, to) in to.iter_mut().enumerate() {
-            *to = *to - second[(k, output)] * along;
+            *to = *to - second[(k, output)] * directional_derivative;
         }
     }
 }
@@ -143,17 +147,17 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
     const CONVEX_IN_VARIABLES: bool = F::STRUCTURE.hessian.is_empty();
-    const ALGEBRAIC: bool = is_algebraic::<F>();
+    const ALGEBRAIC: bool = depends_on_algebraic::<F>();
 
-    fn check(&self, there: There) -> Result<(), OcpError> {
+    fn check(&self, there: AvailableVariables) -> Result<(), OcpError> {
         self.check_weights()?;
         there.check::<F>()
     }
 
     fn check_weights(&self) -> Result<(), OcpError> {
-        match self.invalid {
+        match self.has_invalid_weights {
             0 => Ok(()),
-            _ => weights::check::<F, T>(&self.weights, self.coupled != 0),
+            _ => weights::check::<F, T>(&self.weights, self.has_full_weights != 0),
         }
     }
 
@@ -161,9 +165,9 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
         show(format_args!("½‖{} − r‖²_W", F::STRUCTURE.name))
     }
 
-    fn pattern(&self, visit: Entries<'_>) -> bool {
-        pattern::squares::<F>(self.coupled != 0, visit);
-        pattern::curvature::<F>(visit);
+    fn visit_sparsity(&self, visit: EntryVisitor<'_>) -> bool {
+        sparsity::visit_gauss_newton::<F>(self.has_full_weights != 0, visit);
+        sparsity::visit_hessian::<F>(visit);
         true
     }
 
@@ -173,77 +177,83 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
 
     fn value(&mut self, v: &ArrayV<F, T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
         F::value::<T>(v, &mut self.y);
-        self.square(reference, stage)
+        self.weighted_square(reference, stage)
     }
 
-    fn add(
+    fn add_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<'_, T>,
-        terms: &mut Terms<'_, T>,
+        at: CostContext<'_, T>,
+        terms: &mut QuadraticTerms<'_, T>,
     ) -> Result<T, OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
-        let value = self.square(reference, at.stage)?;
-        let Self { weights, coupled, y, mu, jacobian, hessian, .. } = self;
-        let mut square = Square::<F, T> { weights, y, jacobian, at, terms: &mut *terms };
-        if *coupled == 0 && !square.has_free() {
-            dispatch(square);
+        let value = self.weighted_square(reference, at.stage)?;
+        let Self { weights, has_full_weights: coupled, y, mu, jacobian, hessian, .. } = self;
+        let mut gauss_newton =
+            GaussNewtonTerms::<F, T> { weights, y, jacobian, context: at, terms: &mut *terms };
+        if *coupled == 0 && !gauss_newton.depends_on_free_parameters() {
+            dispatch(gauss_newton);
         } else {
-            square.coupled(&Zeroable::zeroed());
+            gauss_newton.add_coupled(&Zeroable::zeroed());
         }
         if at.exact {
-            terms.curvature::<F>(v, mu, at.factor, hessian);
+            terms.add_weighted_hessian::<F>(v, mu, at.factor, hessian);
         }
         Ok(at.factor * value)
     }
 
-    fn cross(
+    fn add_parameter_derivatives(
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<'_, T>,
-        cross: &mut Cross<'_, T>,
+        context: CostContext<'_, T>,
+        cross: &mut ParameterDerivatives<'_, T>,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
-        self.square(reference, at.stage)?;
+        self.weighted_square(reference, context.stage)?;
         let Self { weights, mu, jacobian, hessian, .. } = self;
-        cross.gauss_newton::<F>(jacobian, mu, weights, at.factor);
-        if at.exact {
-            cross.curvature::<F>(v, mu, at.factor, hessian);
+        cross.gauss_newton::<F>(jacobian, mu, weights, context.factor);
+        if context.exact {
+            cross.add_weighted_hessian::<F>(v, mu, context.factor, hessian);
         }
         Ok(())
     }
 
-    fn refer(
+    fn add_reference_derivatives(
         &mut self,
         (v, direction): (&ArrayV<F, T>, Option<&ArrayV<F, T>>),
         reference: &[T],
-        at: At<'_, T>,
+        context: CostContext<'_, T>,
         to: &mut [T],
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
-        self.square(reference, at.stage)?;
-        refer::<F, T>((&self.weights, &self.mu), (&self.jacobian, direction), at.factor, to);
+        self.weighted_square(reference, context.stage)?;
+        subtract_reference_derivatives::<F, T>(
+            (&self.weights, &self.mu),
+            (&self.jacobian, direction),
+            context.factor,
+            to,
+        );
         Ok(())
     }
 }
 
 /// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or
 /// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
-pub(in crate::ocp) struct Square<'a, 'b, F: Function, T: Plain> {
+pub(in crate::ocp) struct GaussNewtonTerms<'a, 'b, F: Function, T: Plain> {
     pub weights: &'a MatrixYY<F, T>,
     /// `y − r`
     pub y: &'a ArrayY<F, T>,
     pub jacobian: &'a F::Jacobian<T>,
-    pub at: At<'a, T>,
-    pub terms: &'a mut Terms<'b, T>,
+    pub context: CostContext<'a, T>,
+    pub terms: &'a mut QuadraticTerms<'b, T>,
 }
 
-impl<F: Function, T: Real> Square<'_, '_, F, T> {
+impl<F: Function, T: Real> GaussNewtonTerms<'_, '_, F, T> {
     /// Where the entries of an output begin and end.
     #[inline(always)]
-    fn range(output: usize) -> Range<usize> {
+    fn entry_range(output: usize) -> Range<usize> {
         let begin = |output: usize| F::STRUCTURE.begins.get(output).map_or(0, |&begin| begin as usize);
         begin(output)..begin(output + 1)
     }
@@ -260,16 +270,16 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
     #[inline(always)]
     fn weight(&self, k: usize, l: usize) -> T {
         let weight = self.weights.as_slice().get(l * F::Outputs::NY + k);
-        self.at.factor * weight.copied().unwrap_or(T::ZERO)
+        self.context.factor * weight.copied().unwrap_or(T::ZERO)
     }
 
     /// `y − r`, or `y − r − J v`, of an output.
     #[inline(always)]
-    fn moved(&self, output: usize) -> T {
+    fn shifted_residual(&self, output: usize) -> T {
         let mut y = self.y.as_ref().get(output).copied().unwrap_or(T::ZERO);
-        for place in Self::range(output) {
+        for place in Self::entry_range(output) {
             if let Some((i, value)) = self.entry(place)
-                && let Some(&v) = self.at.from.get(i)
+                && let Some(&v) = self.context.model_origin.get(i)
             {
                 y = y - value * v;
             }
@@ -279,13 +289,13 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
 
     /// Adds what two outputs do to the Hessian.
     #[inline(always)]
-    fn curve(&mut self, weight: T, [k, l]: [usize; 2]) {
-        for a in Self::range(k) {
-            for b in Self::range(l) {
+    fn add_output_hessian(&mut self, weight: T, [k, l]: [usize; 2]) {
+        for a in Self::entry_range(k) {
+            for b in Self::entry_range(l) {
                 if let (Some((i, a)), Some((j, b))) = (self.entry(a), self.entry(b))
                     && i >= j
                 {
-                    self.terms.curve(i, j, weight * a * b);
+                    self.terms.add_hessian(i, j, weight * a * b);
                 }
             }
         }
@@ -293,76 +303,80 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
 
     /// Adds what an output does to the gradient.
     #[inline(always)]
-    fn slope(&mut self, slope: T, output: usize) {
-        for place in Self::range(output) {
+    fn add_output_gradient(&mut self, slope: T, output: usize) {
+        for place in Self::entry_range(output) {
             if let Some((i, value)) = self.entry(place) {
-                self.terms.slope(i, slope * value);
+                self.terms.add_gradient(i, slope * value);
             }
         }
     }
 
     /// Whether the outputs depend on free parameters.
     #[inline(always)]
-    fn has_free(&self) -> bool {
+    fn depends_on_free_parameters(&self) -> bool {
         F::STRUCTURE.blocks[4] < F::STRUCTURE.blocks[5] && self.terms.free.count() > 0
     }
 
     /// As [`Square::coupled`], over free parameters too.
-    fn coupled_with_free(&mut self, mu: &ArrayY<F, T>) {
-        let (free, jacobian, from) = (self.terms.free, self.jacobian.as_ref(), self.at.from);
+    fn add_with_free_parameters(&mut self, mu: &ArrayY<F, T>) {
+        let (free, jacobian, from) = (self.terms.free, self.jacobian.as_ref(), self.context.model_origin);
         let entries = || {
             let entries = F::STRUCTURE.jacobian.iter().zip(jacobian);
             entries.filter_map(move |((k, variable), &a)| Some((k, free.position::<F::Shape>(variable)?, a)))
         };
-        let mut moved = *self.y;
+        let mut shifted_residuals = *self.y;
         for (k, i, a) in entries() {
-            if let (Some(y), Some(&v)) = (moved.as_mut().get_mut(k), from.get(i)) {
+            if let (Some(y), Some(&v)) = (shifted_residuals.as_mut().get_mut(k), from.get(i)) {
                 *y = *y - a * v;
             }
         }
         let slopes: ArrayY<F, T> = Array::from_fn(|k| {
-            let own = self.at.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
-            moved.as_ref().iter().enumerate().fold(own, |sum, (l, &y)| sum + self.weight(k, l) * y)
+            let explicit_gradient = self.context.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
+            shifted_residuals
+                .as_ref()
+                .iter()
+                .enumerate()
+                .fold(explicit_gradient, |sum, (l, &y)| sum + self.weight(k, l) * y)
         });
         for (k, i, a) in entries() {
-            self.terms.slope(i, slopes[k] * a);
+            self.terms.add_gradient(i, slopes[k] * a);
             for (l, j, b) in entries().filter(|&(_, j, _)| j <= i) {
-                self.terms.curve(i, j, self.weight(k, l) * a * b);
+                self.terms.add_hessian(i, j, self.weight(k, l) * a * b);
             }
         }
     }
 
     /// With weights between outputs, and `Jᵀ μ` too.
-    pub fn coupled(&mut self, mu: &ArrayY<F, T>) {
-        if self.has_free() {
-            return self.coupled_with_free(mu);
+    pub fn add_coupled(&mut self, mu: &ArrayY<F, T>) {
+        if self.depends_on_free_parameters() {
+            return self.add_with_free_parameters(mu);
         }
-        let moved: ArrayY<F, T> = Array::from_fn(|output| self.moved(output));
+        let shifted_residuals: ArrayY<F, T> = Array::from_fn(|output| self.shifted_residual(output));
         for k in 0..F::Outputs::NY {
-            let mut slope = self.at.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
-            for (l, &moved) in moved.as_ref().iter().enumerate() {
+            let mut slope = self.context.factor * mu.as_ref().get(k).copied().unwrap_or(T::ZERO);
+            for (l, &moved) in shifted_residuals.as_ref().iter().enumerate() {
                 let weight = self.weight(k, l);
                 if weight != T::ZERO {
                     slope = slope + weight * moved;
-                    self.curve(weight, [k, l]);
+                    self.add_output_hessian(weight, [k, l]);
                 }
             }
-            self.slope(slope, k);
+            self.add_output_gradient(slope, k);
         }
     }
 }
 
 /// With a weight for each output.
-impl<F: Function, T: Real> Kernel for Square<'_, '_, F, T> {
+impl<F: Function, T: Real> Kernel for GaussNewtonTerms<'_, '_, F, T> {
     type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        each_row::<A, _>(&mut self);
+        for_each_row::<A, _>(&mut self);
     }
 }
 
-impl<F: Function, T: Real> AtRow for Square<'_, '_, F, T> {
+impl<F: Function, T: Real> RowVisitor for GaussNewtonTerms<'_, '_, F, T> {
     const ROWS: Option<usize> = Some(F::Outputs::NY);
     const INSTRUCTIONS: usize = {
         let outputs = if F::Outputs::NY > 0 { F::Outputs::NY } else { 1 };
@@ -373,8 +387,8 @@ impl<F: Function, T: Real> AtRow for Square<'_, '_, F, T> {
     fn at<A: Arithmetic>(&mut self, output: usize) {
         let weight = self.weight(output, output);
         if weight != T::ZERO {
-            self.slope(weight * self.moved(output), output);
-            self.curve(weight, [output, output]);
+            self.add_output_gradient(weight * self.shifted_residual(output), output);
+            self.add_output_hessian(weight, [output, output]);
         }
     }
 }

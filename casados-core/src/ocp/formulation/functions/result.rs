@@ -30,7 +30,7 @@ pub struct IntervalResult<'a, T> {
     pub cost: IntegralTerms<'a, T>,
     /// The sum of what is left of the equations of stages, and the largest; zero where these are
     /// solved.
-    pub stages: [T; 2],
+    pub stage_residuals: [T; 2],
 }
 
 impl<T: Real> Default for IntervalResult<'_, T> {
@@ -45,7 +45,7 @@ impl<T: Real> Default for IntervalResult<'_, T> {
             hessian: [&[]; 3],
             hessian_p: [&[]; 3],
             cost: IntegralTerms::default(),
-            stages: [T::ZERO; 2],
+            stage_residuals: [T::ZERO; 2],
         }
     }
 }

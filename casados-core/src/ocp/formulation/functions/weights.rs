@@ -13,15 +13,20 @@ pub(in crate::ocp) fn check<F: Function, T: Real>(
     weights: &MatrixYY<F, T>,
     coupled: bool,
 ) -> Result<(), OcpError> {
-    check_matrix::<T, _>(weights, coupled).map_err(|Fault { place: outputs, value, allowed }| {
-        OcpError::InvalidWeight { function: F::STRUCTURE.name, outputs, value, allowed }
-    })
+    check_semidefinite::<T, _>(weights, coupled).map_err(
+        |WeightError { indices: outputs, value, allowed }| OcpError::InvalidWeight {
+            function: F::STRUCTURE.name,
+            outputs,
+            value,
+            allowed,
+        },
+    )
 }
 
 /// A weight that is none, and what it has to be.
-pub(in crate::ocp) struct Fault {
+pub(in crate::ocp) struct WeightError {
     /// Its row and its column.
-    pub place: [usize; 2],
+    pub indices: [usize; 2],
     pub value: f64,
     pub allowed: &'static str,
 }
@@ -29,47 +34,52 @@ pub(in crate::ocp) struct Fault {
 /// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
 /// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for rows without weights.
 /// If none are `coupled`, there is the diagonal alone.
-pub(in crate::ocp) fn check_matrix<T: Real, V: Matrix<T>>(weights: &V, coupled: bool) -> Result<(), Fault> {
+pub(in crate::ocp) fn check_semidefinite<T: Real, V: Matrix<T>>(
+    weights: &V,
+    coupled: bool,
+) -> Result<(), WeightError> {
     let ny = V::ROWS;
     let weight = |i: usize, j: usize| entry(weights.as_slice(), j * ny + i);
-    let fault =
-        |i: usize, j: usize, allowed| Err(Fault { place: [i, j], value: weight(i, j).to_f64(), allowed });
+    let weight_error = |i: usize, j: usize, allowed| {
+        Err(WeightError { indices: [i, j], value: weight(i, j).to_f64(), allowed })
+    };
     for i in 0..ny {
         if !(weight(i, i) >= T::ZERO && weight(i, i).is_finite()) {
-            return fault(i, i, "finite and at least 0");
+            return weight_error(i, i, "finite and at least 0");
         }
     }
     if !coupled {
         return Ok(());
     }
-    let small = T::from_f64(T::EPSILON).sqrt();
+    let tolerance = T::from_f64(T::EPSILON).sqrt();
     for i in 0..ny {
         for j in 0..i {
             let difference = weight(i, j) - weight(j, i);
             // The square of what the matrix may be off by there.
-            let allowed = small * small * weight(i, i) * weight(j, j);
+            let allowed = tolerance * tolerance * weight(i, i) * weight(j, j);
             let is_symmetric = difference * difference <= allowed;
             if !is_symmetric {
                 let (i, j) =
                     if weight(i, j).is_finite() && !weight(j, i).is_finite() { (j, i) } else { (i, j) };
-                return fault(i, j, "finite and the same as its mirror image");
+                return weight_error(i, j, "finite and the same as its mirror image");
             }
         }
     }
     let mut rest = *weights;
     let rest = rest.as_mut_slice();
     for k in 0..ny {
-        let pivot = entry(rest, k * ny + k) + small * weight(k, k);
+        let pivot = entry(rest, k * ny + k) + tolerance * weight(k, k);
         if pivot < T::ZERO {
-            return fault(k, k, "larger: the weights are not positive semidefinite");
+            return weight_error(k, k, "larger: the weights are not positive semidefinite");
         }
         for i in k + 1..ny {
-            let below = entry(rest, k * ny + i);
-            if pivot == T::ZERO && below != T::ZERO {
-                return fault(i, k, "zero where one of the two has no weight of its own");
+            let column_element = entry(rest, k * ny + i);
+            if pivot == T::ZERO && column_element != T::ZERO {
+                return weight_error(i, k, "zero where one of the two has no weight of its own");
             }
             for j in k + 1..i + 1 {
-                let product = if pivot > T::ZERO { below * entry(rest, k * ny + j) / pivot } else { T::ZERO };
+                let product =
+                    if pivot > T::ZERO { column_element * entry(rest, k * ny + j) / pivot } else { T::ZERO };
                 if let Some(element) = rest.get_mut(j * ny + i) {
                     *element = *element - product;
                 }

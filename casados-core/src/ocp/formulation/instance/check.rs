@@ -7,8 +7,8 @@ use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 #[cfg(feature = "alloc")]
-use crate::ocp::formulation::functions::point::There;
-use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::functions::node_evaluation::AvailableVariables;
+use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{StageDims, part};
 use crate::scalar::Real;
@@ -25,7 +25,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         dynamics.check()?;
         stage_cost.check_weights()?;
         terminal_cost.check_weights()?;
-        if self.initial == Initial::Unknown {
+        if self.initial_state == InitialState::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         let np = P::Shape::NP;
@@ -42,7 +42,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(in crate::ocp) fn check_iterate(&self) -> Result<(), OcpError> {
         // All numbers at once; names are looked for where one of these is not finite.
         if crate::finite::find_non_finite(self.iterate.all_numbers()).is_some() {
-            self.name_not_finite()
+            self.find_non_finite()
         } else {
             Ok(())
         }
@@ -53,7 +53,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::DependsOnTime`], [`OcpError::Unsupported`]
     #[cfg(feature = "alloc")]
-    pub(in crate::ocp) fn check_functions(&mut self) -> Result<(), OcpError> {
+    pub(in crate::ocp) fn check_functions_for_free_end(&mut self) -> Result<(), OcpError> {
         let intervals = self.intervals();
         if P::Dynamics::INTEGRAL {
             let what = "a free end time with `WithIntegral`";
@@ -61,40 +61,40 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::Unsupported { what, remedy });
         }
         let Problem { stage_cost, terminal_cost, path, terminal, .. } = self.problem.parts();
-        let inside = There { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
-        let at_end = There { z: false, u: false, stage: intervals, t: false };
-        stage_cost.check(inside)?;
+        let before_end = AvailableVariables { z: P::Dynamics::ALGEBRAIC, u: true, stage: 0, t: false };
+        let at_end = AvailableVariables { z: false, u: false, stage: intervals, t: false };
+        stage_cost.check(before_end)?;
         terminal_cost.check(at_end)?;
-        path.check(inside)?;
+        path.check(before_end)?;
         terminal.check(at_end)
     }
 
     /// The first number of the iterate that is not finite.
-    fn name_not_finite(&self) -> Result<(), OcpError> {
+    fn find_non_finite(&self) -> Result<(), OcpError> {
         let (last, part) = (self.intervals(), Part::Multipliers);
         for (stage, point) in self.iterate.stages().enumerate() {
             Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
             for (part, values) in [(Part::Controls, point.u), (part, point.u_lower), (part, point.u_upper)] {
                 let (w, u) = values.split_at_checked(self.free.count()).unwrap_or_default();
                 Labels::controls::<P, T>(part, stage).check_finite(u)?;
-                self.check_free(part, w)?;
+                self.check_free_parameters(part, w)?;
             }
             for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
                 Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
             }
             let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
-            let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
+            let constraint_labels = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
             for multipliers in [point.g_lower, point.g_upper] {
-                of_constraints.check_finite(multipliers)?;
+                constraint_labels.check_finite(multipliers)?;
             }
         }
         Ok(())
     }
 
     /// Free parameters, or their multipliers, by name.
-    fn check_free(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
+    fn check_free_parameters(&self, part: Part, w: &[T]) -> Result<(), OcpError> {
         let Some((index, value)) = crate::finite::find_non_finite(w) else { return Ok(()) };
         let part = if part == Part::Controls { Part::Parameters } else { part };
-        Err(OcpError::InvalidValue { part, stage: 0, name: self.name_of_free(index), index, value })
+        Err(OcpError::InvalidValue { part, stage: 0, name: self.free_parameter_name(index), index, value })
     }
 }

@@ -1,9 +1,9 @@
 //! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
 
-use crate::ocp::formulation::free::Free;
+use crate::ocp::formulation::free_parameters::FreeParametersView;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
-use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::functions::node_evaluation::write_variables;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::get;
 use crate::qp::{SolutionStage, StageDims, padded_len, part, part_mut};
@@ -41,72 +41,72 @@ pub(in crate::ocp) struct Data<'a, T> {
 pub(crate) struct Layout {
     pub intervals: usize,
     /// How many [free parameters](super::super::free) there are.
-    pub free: usize,
+    pub free_count: usize,
     /// Rows of every stage but the last for [points inside](super::inside) of intervals.
-    pub inner: usize,
+    pub inner_rows: usize,
     /// Whether algebraic states have bounds at nodes.
-    pub bounds_algebraic: bool,
+    pub has_algebraic_bounds: bool,
 }
 
 impl Layout {
     /// Of a problem without points inside of intervals.
     pub const fn new(intervals: usize, free: usize) -> Self {
-        Self { intervals, free, inner: 0, bounds_algebraic: false }
+        Self { intervals, free_count: free, inner_rows: 0, has_algebraic_bounds: false }
     }
 }
 
 /// `NX + NU`, and the free parameters between these.
-pub(in crate::ocp) const fn inputs<S: Shape>(free: usize) -> usize {
+pub(in crate::ocp) const fn stage_variable_count<S: Shape>(free: usize) -> usize {
     S::NX + free + S::NU
 }
 
 /// Whether a cost or a constraint depends on algebraic states.
-pub(in crate::ocp) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
+pub(in crate::ocp) const fn depends_on_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
 /// Rows of the path constraints at nodes, and of what links copies of elements of the first state
 /// to it.
-pub(in crate::ocp) const fn node_rows<P: Formulation<T>, T: Real>() -> usize {
-    P::Path::ROWS + P::Terminal::STARTS
+pub(in crate::ocp) const fn node_row_count<P: Formulation<T>, T: Real>() -> usize {
+    P::Path::ROWS + P::Terminal::INITIAL_STATE_COPIES
 }
 
 /// All rows of a stage but the last.
-pub(in crate::ocp) const fn path_rows<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
-    node_rows::<P, T>() + layout.inner
+pub(in crate::ocp) const fn path_row_count<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
+    node_row_count::<P, T>() + layout.inner_rows
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
-    let Layout { intervals, free, bounds_algebraic, .. } = layout;
+const fn data_lens<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
+    let Layout { intervals, free_count: free, has_algebraic_bounds: bounds_algebraic, .. } = layout;
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
-    let path = path_rows::<P, T>(layout);
+    let path = path_row_count::<P, T>(layout);
     let rows = intervals * path + P::Terminal::ROWS;
-    let n = inputs::<P::Shape>(free);
-    let at_node = node_rows::<P, T>();
-    let constraints = if at_node > P::Terminal::ROWS { at_node } else { P::Terminal::ROWS };
+    let n = stage_variable_count::<P::Shape>(free);
+    let node_row_total = node_row_count::<P, T>();
+    let constraints = if node_row_total > P::Terminal::ROWS { node_row_total } else { P::Terminal::ROWS };
     [
         intervals + 1,
         (intervals + 1) * P::Shape::NP,
         references,
         rows,
         rows,
-        intervals * kept::<P::Shape>(free),
-        if is_algebraic::<P, T>() || bounds_algebraic { intervals * P::Shape::NZ } else { 0 },
-        extended::<P::Shape>(free, constraints),
-        scratch::<T>(n, P::Shape::NZ),
+        intervals * algebraic_len::<P::Shape>(free),
+        if depends_on_algebraic::<P, T>() || bounds_algebraic { intervals * P::Shape::NZ } else { 0 },
+        extended_len::<P::Shape>(free, constraints),
+        scratch_len::<T>(n, P::Shape::NZ),
         P::Shape::NX * (P::Shape::NX + 1),
     ]
 }
 
 /// Two matrices and a vector over `(x, w, u)`, or a gradient over `(x, w, u, z)`.
-const fn scratch<T>(n: usize, nz: usize) -> usize {
+const fn scratch_len<T>(n: usize, nz: usize) -> usize {
     let (matrices, gradient) = ((2 * n + 1) * padded_len::<T>(n), n + nz);
     if matrices < gradient { gradient } else { matrices }
 }
 
 /// How many numbers it takes.
-pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
-    let mut rest: &[usize] = &lengths::<P, T>(layout);
+pub(in crate::ocp) const fn data_len<P: Formulation<T>, T: Real>(layout: Layout) -> usize {
+    let mut rest: &[usize] = &data_lens::<P, T>(layout);
     let mut sum = 0_usize;
     while let Some((&first, others)) = rest.split_first() {
         sum = sum.saturating_add(first);
@@ -116,10 +116,13 @@ pub(in crate::ocp) const fn length<P: Formulation<T>, T: Real>(layout: Layout) -
 }
 
 /// The parts.
-pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], layout: Layout) -> Data<'_, T> {
+pub(in crate::ocp) fn split_data<P: Formulation<T>, T: Real>(
+    memory: &mut [T],
+    layout: Layout,
+) -> Data<'_, T> {
     let mut rest = memory;
     let [times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival] =
-        lengths::<P, T>(layout).map(|length| {
+        data_lens::<P, T>(layout).map(|length| {
             let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
             rest = behind;
             part
@@ -128,8 +131,11 @@ pub(in crate::ocp) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], layout
 }
 
 /// The lower and the upper bounds of all constraints.
-pub(in crate::ocp) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], layout: Layout) -> [&[T]; 2] {
-    let [times, p, references, lower, upper, ..] = lengths::<P, T>(layout);
+pub(in crate::ocp) fn constraint_bounds<P: Formulation<T>, T: Real>(
+    memory: &[T],
+    layout: Layout,
+) -> [&[T]; 2] {
+    let [times, p, references, lower, upper, ..] = data_lens::<P, T>(layout);
     let begin = times + p + references;
     [part(memory, begin, lower), part(memory, begin + lower, upper)]
 }
@@ -137,7 +143,7 @@ pub(in crate::ocp) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], layout: L
 /// The weights of the arrival cost.
 pub(in crate::ocp) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], layout: Layout) -> &[T] {
     let nx = P::Shape::NX;
-    part(memory, length::<P, T>(layout) - nx * nx, nx * nx)
+    part(memory, data_len::<P, T>(layout) - nx * nx, nx * nx)
 }
 
 /// What is given at a node.
@@ -160,50 +166,56 @@ impl<'a, T: Real> Node<'a, T> {
         running: bool,
         [times, p, references]: [&'a [T]; 3],
     ) -> Self {
-        let (np, time, of_stage) = (P::Shape::NP, get(times, k), P::StageCost::REFERENCES);
+        let (np, time, stage_references) = (P::Shape::NP, get(times, k), P::StageCost::REFERENCES);
         let is_stage = k < intervals;
-        let length = if is_stage { of_stage } else { P::TerminalCost::REFERENCES };
+        let length = if is_stage { stage_references } else { P::TerminalCost::REFERENCES };
         Self {
             time,
             p: part(p, k * np, np),
-            reference: part(references, k * of_stage, length),
+            reference: part(references, k * stage_references, length),
             factor: if running && is_stage { get(times, k + 1) - time } else { T::ONE },
         }
     }
 
     /// Writes the variables there, with the algebraic states `z`.
     #[inline(always)]
-    pub fn read<S: Shape>(&self, to: &mut S::ArrayV<T>, at: &SolutionStage<'_, T>, z: &[T], free: Free<'_>) {
+    pub fn write_variables<S: Shape>(
+        &self,
+        to: &mut S::ArrayV<T>,
+        at: &SolutionStage<'_, T>,
+        z: &[T],
+        free: FreeParametersView<'_>,
+    ) {
         let (w, u) = at.u.split_at_checked(free.count()).unwrap_or_default();
-        read::<S, T>(to, [at.x, z, u, self.p], self.time);
+        write_variables::<S, T>(to, [at.x, z, u, self.p], self.time);
         if free.count() > 0 {
-            free.write(part_mut(to.as_mut(), 2 * S::NX + S::NZ + S::NU, S::NP), w);
+            free.write_parameters(part_mut(to.as_mut(), 2 * S::NX + S::NZ + S::NU, S::NP), w);
         }
     }
 }
 
 /// The dimensions of a stage.
-pub(in crate::ocp) const fn stage<P: Formulation<T>, T: Real>(layout: Layout, last: bool) -> StageDims {
+pub(in crate::ocp) const fn stage_dims<P: Formulation<T>, T: Real>(layout: Layout, last: bool) -> StageDims {
     if last {
-        StageDims::new(P::Shape::NX, layout.free, P::Terminal::ROWS)
+        StageDims::new(P::Shape::NX, layout.free_count, P::Terminal::ROWS)
     } else {
-        StageDims::new(P::Shape::NX, layout.free + P::Shape::NU, path_rows::<P, T>(layout))
+        StageDims::new(P::Shape::NX, layout.free_count + P::Shape::NU, path_row_count::<P, T>(layout))
     }
 }
 
 /// As [`inputs`], and `NZ`.
-pub(in crate::ocp) const fn sizes<S: Shape>(free: usize) -> [usize; 2] {
-    [inputs::<S>(free), S::NZ]
+pub(in crate::ocp) const fn variable_and_algebraic_counts<S: Shape>(free: usize) -> [usize; 2] {
+    [stage_variable_count::<S>(free), S::NZ]
 }
 
 /// How many numbers a stage keeps: `z`, and `∂z/∂(x, w, u)` row after row.
-pub(in crate::ocp) const fn kept<S: Shape>(free: usize) -> usize {
-    let [n, nz] = sizes::<S>(free);
+pub(in crate::ocp) const fn algebraic_len<S: Shape>(free: usize) -> usize {
+    let [n, nz] = variable_and_algebraic_counts::<S>(free);
     nz * (1 + n)
 }
 
-/// How many numbers `algebraic::Extended` takes, for stages with so many constraints.
-pub(in crate::ocp) const fn extended<S: Shape>(free: usize, rows: usize) -> usize {
-    let [n, nz] = sizes::<S>(free);
+/// How many numbers `algebraic::ExtendedDerivatives` takes, for stages with so many constraints.
+pub(in crate::ocp) const fn extended_len<S: Shape>(free: usize, rows: usize) -> usize {
+    let [n, nz] = variable_and_algebraic_counts::<S>(free);
     if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
 }

@@ -1,24 +1,26 @@
 //! A problem on a horizon, with its data, its iterate and its QP.
 
-mod access;
+mod accessors;
 mod check;
+pub(in crate::ocp) mod construction;
 pub(in crate::ocp) mod data;
-pub(in crate::ocp) mod inside;
-pub(in crate::ocp) mod memory;
+pub(in crate::ocp) mod inner_points;
 #[cfg(feature = "alloc")]
 pub(in crate::ocp) mod rebuild;
 
 use crate::ocp::formulation::check::Labels;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::free::{Free, FreeParameters};
+use crate::ocp::formulation::free_parameters::{FreeParameters, FreeParametersView};
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::functions::dynamics::Nodes;
-use crate::ocp::formulation::functions::point::There;
+use crate::ocp::formulation::functions::node_evaluation::AvailableVariables;
 use crate::ocp::formulation::horizon::Horizon;
-use crate::ocp::formulation::instance::data::{Data, Layout, inputs, path_rows, split};
-use crate::ocp::formulation::instance::inside::InnerPoints;
+use crate::ocp::formulation::instance::data::{
+    Data, Layout, path_row_count, split_data, stage_variable_count,
+};
+use crate::ocp::formulation::instance::inner_points::InnerPoints;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::element::set;
 use crate::qp::{Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, part_mut};
@@ -29,12 +31,12 @@ use alloc::vec::Vec;
 
 /// What is known of the state at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::ocp) enum Initial {
+pub(in crate::ocp) enum InitialState {
     /// Nothing was said.
     Unknown,
     Fixed,
     /// Given, but for controls that are linear.
-    Partly,
+    PartlyFixed,
     Free,
 }
 
@@ -84,7 +86,7 @@ pub(in crate::ocp) enum Initial {
 #[derive(Clone)]
 pub struct Ocp<P, T, D, M> {
     pub(in crate::ocp) problem: P,
-    pub(in crate::ocp) initial: Initial,
+    pub(in crate::ocp) initial_state: InitialState,
     pub(in crate::ocp) qp: Qp<T, D, M>,
     pub(in crate::ocp) iterate: Solution<T, D, M>,
     pub(in crate::ocp) data: M,
@@ -92,13 +94,13 @@ pub struct Ocp<P, T, D, M> {
     pub(in crate::ocp) objective: T,
     /// What was left of the equations of stages where intervals were evaluated last: the sum, and
     /// the largest.
-    pub(in crate::ocp) stages: [T; 2],
+    pub(in crate::ocp) stage_residuals: [T; 2],
     pub(in crate::ocp) free: FreeParameters,
-    pub(in crate::ocp) inner: InnerPoints<T>,
+    pub(in crate::ocp) inner_points: InnerPoints<T>,
     /// See [`Nodes`].
     pub(in crate::ocp) step_length: Option<T>,
     /// Whether algebraic states of the last evaluation are those of the iterate.
-    pub(in crate::ocp) has_algebraic: bool,
+    pub(in crate::ocp) algebraic_is_current: bool,
 }
 
 /// A problem with its memory on the heap.
@@ -149,29 +151,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
         let z = P::Dynamics::ALGEBRAIC;
         let (inside, at_end) = (
-            There { z, u: true, stage: 0, t: true },
-            There { z: false, u: false, stage: intervals, t: true },
+            AvailableVariables { z, u: true, stage: 0, t: true },
+            AvailableVariables { z: false, u: false, stage: intervals, t: true },
         );
         dynamics.check()?;
         stage_cost.check(inside)?;
         terminal_cost.check(at_end)?;
         path.check(inside)?;
         terminal.check(at_end)?;
-        let layout = Layout::new(intervals, P::Terminal::STARTS);
-        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), layout);
-        horizon.write(times)?;
+        let layout = Layout::new(intervals, P::Terminal::INITIAL_STATE_COPIES);
+        let Data { times, p, lower, upper, references, .. } = split_data::<P, T>(data.as_mut(), layout);
+        horizon.write_times(times)?;
         // Parameters that nobody sets are found in this way.
         p.fill(T::from_f64(f64::NAN));
         references.fill(T::ZERO);
         for (k, mut stage) in qp.stages_mut().enumerate() {
-            let (begin, starts) = (k * path_rows::<P, T>(layout), P::Path::ROWS);
+            let (begin, first_copy_row) = (k * path_row_count::<P, T>(layout), P::Path::ROWS);
             let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
-            if k < intervals && starts < path_rows::<P, T>(layout) {
+            if k < intervals && first_copy_row < path_row_count::<P, T>(layout) {
                 // Copies of the first state are equal to it, at its stage.
                 let bound = if k == 0 { T::ZERO } else { T::from_f64(f64::INFINITY) };
                 let links = [&mut *lower, &mut *upper].into_iter().zip([T::ZERO - bound, bound]);
                 links.for_each(|(to, bound)| {
-                    part_mut(to, begin + starts, path_rows::<P, T>(layout) - starts).fill(bound);
+                    part_mut(to, begin + first_copy_row, path_row_count::<P, T>(layout) - first_copy_row)
+                        .fill(bound);
                 });
             }
             let bounds = stage.g_bounds_mut();
@@ -189,7 +192,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             copy_common(bounds.upper_linear, bounds.lower_linear);
             copy_common(bounds.upper_quadratic, bounds.lower_quadratic);
         }
-        for copy in 0..P::Terminal::STARTS {
+        for copy in 0..P::Terminal::INITIAL_STATE_COPIES {
             qp.share(copy);
         }
         // Integrals begin at zero.
@@ -199,16 +202,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         Ok(Self {
             problem,
-            initial: Initial::Unknown,
+            initial_state: InitialState::Unknown,
             qp,
             iterate,
             data,
             objective: T::ZERO,
-            stages: [T::ZERO; 2],
-            free: FreeParameters::with_starts(P::Terminal::STARTS),
-            inner: InnerPoints::default(),
+            stage_residuals: [T::ZERO; 2],
+            free: FreeParameters::with_initial_state_copies(P::Terminal::INITIAL_STATE_COPIES),
+            inner_points: InnerPoints::default(),
             step_length: None,
-            has_algebraic: false,
+            algebraic_is_current: false,
         })
     }
 
@@ -216,8 +219,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[inline(always)]
     pub(crate) fn layout(&self) -> Layout {
         Layout {
-            inner: self.inner.rows::<P>(),
-            bounds_algebraic: self.inner.bounds_algebraic::<P>(),
+            inner_rows: self.inner_points.row_count::<P>(),
+            has_algebraic_bounds: self.inner_points.has_algebraic_bounds::<P>(),
             ..Layout::new(self.intervals(), self.free.count())
         }
     }
@@ -229,7 +232,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub fn stage(&self, stage: usize) -> Result<SolutionStage<'_, T>, OcpError> {
         let stages = self.intervals() + 1;
         match self.iterate.stage(stage) {
-            Some(point) => Ok(without_free(point, self.free.count())),
+            Some(point) => Ok(without_free_parameters(point, self.free.count())),
             None => Err(OcpError::NoSuchStage { part: Part::States, stage, stages }),
         }
     }
@@ -240,7 +243,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
-        Labels::states::<P, T>(Part::States, 0).check_vector(x, self.names().own_states())?;
+        Labels::states::<P, T>(Part::States, 0).check_vector(x, self.names().model_state_count())?;
         Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, P::Shape::NU)?;
         let has_linear = !self.names().linear.is_empty();
         for k in 0..=self.intervals() {
@@ -256,64 +259,67 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess_stage(&mut self, stage: usize, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
         let (last, free) = (self.intervals(), self.free.count());
-        let Some(place) = self.iterate.stage_mut(stage) else {
+        let Some(stage_iterate) = self.iterate.stage_mut(stage) else {
             return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
         };
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
-        let own = place.u.get_mut(free..).unwrap_or_default();
-        let controls =
-            if stage == last && !u.is_empty() && !known.linear.is_empty() { P::Shape::NU } else { own.len() };
-        Labels::states::<P, T>(Part::States, stage).check_vector(x, known.own_states())?;
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
+        let model_controls = stage_iterate.u.get_mut(free..).unwrap_or_default();
+        let controls = if stage == last && !u.is_empty() && !model_names.linear.is_empty() {
+            P::Shape::NU
+        } else {
+            model_controls.len()
+        };
+        Labels::states::<P, T>(Part::States, stage).check_vector(x, model_names.model_state_count())?;
         Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, controls)?;
-        copy_common(place.x, x);
-        copy_common(own, u);
-        for (state, &control) in (known.own_states()..).zip(known.linear) {
+        copy_common(stage_iterate.x, x);
+        copy_common(model_controls, u);
+        for (state, &control) in (model_names.model_state_count()..).zip(model_names.linear) {
             if let Some(&value) = u.get(control as usize) {
-                set(place.x, state, value);
-                set(own, control as usize, T::ZERO);
+                set(stage_iterate.x, state, value);
+                set(model_controls, control as usize, T::ZERO);
             }
         }
         for multipliers in [
-            place.dynamics,
-            place.x_lower,
-            place.x_upper,
-            place.u_lower,
-            place.u_upper,
-            place.g_lower,
-            place.g_upper,
+            stage_iterate.dynamics,
+            stage_iterate.x_lower,
+            stage_iterate.x_upper,
+            stage_iterate.u_lower,
+            stage_iterate.u_upper,
+            stage_iterate.g_lower,
+            stage_iterate.g_upper,
         ] {
             multipliers.fill(T::ZERO);
         }
         if stage == 0 {
-            self.copy_start();
+            self.update_initial_state_copies();
         }
         Ok(self)
     }
 
     /// Makes copies of the first state what it is.
-    pub(in crate::ocp) fn copy_start(&mut self) {
-        for copy in 0..P::Terminal::STARTS {
+    pub(in crate::ocp) fn update_initial_state_copies(&mut self) {
+        for copy_index in 0..P::Terminal::INITIAL_STATE_COPIES {
             let first = self.iterate.stages().next();
-            let value = first.and_then(|first| first.x.get(P::Terminal::start(copy)).copied());
-            self.write_free(copy, value.unwrap_or(T::ZERO));
+            let value = first.and_then(|first| first.x.get(P::Terminal::copied_state(copy_index)).copied());
+            self.write_free_parameter(copy_index, value.unwrap_or(T::ZERO));
         }
     }
 
     /// Writes a shared variable of the iterate.
-    pub(in crate::ocp) fn write_free(&mut self, w: usize, value: T) {
+    pub(in crate::ocp) fn write_free_parameter(&mut self, w: usize, value: T) {
         for k in 0..=self.intervals() {
-            if let Some(place) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(w)) {
-                *place = value;
+            if let Some(element) = self.iterate.stage_mut(k).and_then(|stage| stage.u.get_mut(w)) {
+                *element = value;
             }
         }
     }
 
     /// What a free parameter is called; of a copy of an element of the first state, this element.
-    pub(in crate::ocp) fn name_of_free(&self, index: usize) -> &'static str {
-        if index < P::Terminal::STARTS {
-            return self.names().x.get(P::Terminal::start(index)).copied().unwrap_or("");
+    pub(in crate::ocp) fn free_parameter_name(&self, index: usize) -> &'static str {
+        if index < P::Terminal::INITIAL_STATE_COPIES {
+            return self.names().x.get(P::Terminal::copied_state(index)).copied().unwrap_or("");
         }
-        let parameter = self.free.parameter(index);
+        let parameter = self.free.model_parameter(index);
         parameter.and_then(|parameter| self.names().p.get(parameter).copied()).unwrap_or("")
     }
 
@@ -325,21 +331,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// A stage with the controls of the model alone.
-pub(in crate::ocp) fn without_free<T>(stage: SolutionStage<'_, T>, free: usize) -> SolutionStage<'_, T> {
+pub(in crate::ocp) fn without_free_parameters<T>(
+    stage: SolutionStage<'_, T>,
+    free: usize,
+) -> SolutionStage<'_, T> {
     let [u, u_lower, u_upper] =
         [stage.u, stage.u_lower, stage.u_upper].map(|list| list.get(free..).unwrap_or_default());
     SolutionStage { u, u_lower, u_upper, ..stage }
 }
 
 /// The intervals at a point; weights of algebraic states may be empty.
-pub(in crate::ocp) fn nodes<'a, S: Shape, T: Real>(
+pub(in crate::ocp) fn interval_nodes<'a, S: Shape, T: Real>(
     v: &'a [T],
     multipliers: &'a [T],
     weights: &'a [T],
-    (p, free): (&'a [T], Free<'a>),
+    (p, free): (&'a [T], FreeParametersView<'a>),
     times: &'a [T],
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
-    let ld = [padded_len::<T>(inputs::<S>(free.count())), padded_len::<T>(S::NX)];
+    let ld = [padded_len::<T>(stage_variable_count::<S>(free.count())), padded_len::<T>(S::NX)];
     Nodes { v, multipliers, weights, p, free, times, dims, ld, step_length: None, piece: None }
 }

@@ -112,9 +112,9 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
 /// First derivatives, where the Hessian does not matter yet: it is that of [`GaussNewton`], convex
 /// or not.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp) struct Slopes;
+pub(in crate::ocp) struct FirstOrder;
 
-impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Slopes {
+impl<D: Dynamics<T>, T: Real> Curvature<D, T> for FirstOrder {
     const EXACT: bool = false;
     fn convexification(&self) -> Convexification {
         Convexification::None

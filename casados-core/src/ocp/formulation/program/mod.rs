@@ -59,7 +59,7 @@ pub trait Program<T: Real>: Sized {
     #[doc(hidden)]
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-        at: &Solution<T, D, M>,
+        trial_point: &Solution<T, D, M>,
         ends: &mut [T],
     ) -> Result<T, OcpError>;
 
@@ -93,12 +93,12 @@ pub trait Program<T: Real>: Sized {
     #[doc(hidden)]
     fn complete<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-        asks: bool,
+        needs_violation: bool,
     ) -> (bool, Option<(ConstraintName, f64)>);
 
     /// Stages that are variables begin anew, at the iterate.
     #[doc(hidden)]
-    fn begin_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn initialise_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
     ) -> Result<(), OcpError> {
         let _ = ocp;
@@ -107,7 +107,7 @@ pub trait Program<T: Real>: Sized {
 
     /// Their step, of one of states and controls.
     #[doc(hidden)]
-    fn expand_stages<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn expand_stage_steps<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
         step: &Solution<T, D, M>,
     ) -> Result<(), OcpError> {
@@ -117,7 +117,7 @@ pub trait Program<T: Real>: Sized {
 
     /// What happens to them.
     #[doc(hidden)]
-    fn move_stages(&mut self, action: StageAction<T>) {
+    fn apply_stage_action(&mut self, action: StageAction<T>) {
         let _ = action;
     }
 }
@@ -175,7 +175,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 
     /// The derivative that makes a QP one without values.
-    pub(in crate::ocp) fn derivative(&self, error: &QpError) -> Option<OcpError> {
+    pub(in crate::ocp) fn non_finite_derivative(&self, error: &QpError) -> Option<OcpError> {
         P::derivative(self, error)
     }
 }

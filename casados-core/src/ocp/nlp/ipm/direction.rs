@@ -2,10 +2,10 @@
 
 use super::Ipm;
 use super::barrier;
-use super::kkt::newton::{evaluate, kkt_view, refine, resolve};
-use super::kkt::work::Work;
+use super::kkt::newton::{evaluate_residuals, kkt_view, refine_step, resolve};
+use super::kkt::workspace::Workspace;
 use super::predictor;
-use super::state::State;
+use super::run_state::RunState;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -17,9 +17,9 @@ use crate::scalar::Real;
 /// Curvature that needs a larger `δ_w` than this, in units, is that of multipliers on the way to a
 /// feasible point: it leaves steps of the size of rounding errors, and the multipliers that these
 /// have grow with it.
-const MOST_REGULARISATION: f64 = 10.0;
+const MULTIPLIER_RESET_DELTA_W: f64 = 10.0;
 /// Where violations and gaps are no more than this, in units, multipliers are those of a solution.
-const CLOSE: f64 = 1.0;
+const MULTIPLIER_RESET_VIOLATION: f64 = 1.0;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// The search direction; without the curvature of dynamics and constraints where that needs too
@@ -27,41 +27,43 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn search_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &mut Iteration,
+        state: &mut RunState<'_>,
+        log_row: &mut Iteration,
     ) -> Result<Result<bool, QpError>, OcpError>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
-        let before = (state.regularisation, state.progress, state.mu);
-        let direction = self.regularised_direction(ocp, state, row);
-        let is_regularised =
-            direction.is_err() || state.delta > MOST_REGULARISATION * state.lengths.sizes.force;
-        if !is_regularised || state.violation <= CLOSE {
+        let saved = (state.regularisation, state.adaptive_mu, state.mu);
+        let direction = self.regularised_direction(ocp, state, log_row);
+        let is_regularised = direction.is_err()
+            || state.delta_w > MULTIPLIER_RESET_DELTA_W * state.dimensions.scaling.objective_unit;
+        if !is_regularised || state.violation <= MULTIPLIER_RESET_VIOLATION {
             return Ok(direction);
         }
-        (state.regularisation, state.progress, state.mu) = before;
-        self.forget_curvature(ocp, state)?;
-        Ok(self.regularised_direction(ocp, state, row))
+        (state.regularisation, state.adaptive_mu, state.mu) = saved;
+        self.reset_multipliers(ocp, state)?;
+        Ok(self.regularised_direction(ocp, state, log_row))
     }
 
     /// The QP at the iterate without multipliers of dynamics and constraints, on which no step
     /// depends but by the curvature that they give to the Hessian.
-    fn forget_curvature<P: Program<T>>(
+    fn reset_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
+        state: &mut RunState<'_>,
     ) -> Result<(), OcpError>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
         ocp.iterate.view_mut().dynamics.fill(T::ZERO);
-        Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).hessian_multipliers.fill(T::ZERO);
+        Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut())
+            .hessian_multipliers
+            .fill(T::ZERO);
         self.linearise(ocp, state)?;
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let mut view = solution.view_mut();
-        evaluate(&mut iterate, &mut view);
+        evaluate_residuals(&mut iterate, &mut view);
         iterate.store(&mut view);
         Ok(())
     }
@@ -74,33 +76,43 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     fn regularised_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &mut Iteration,
+        state: &mut RunState<'_>,
+        log_row: &mut Iteration,
     ) -> Result<bool, QpError> {
-        let force = state.lengths.sizes.force;
-        let least = force * barrier::least(self.options.least_error(force));
-        let units = Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units;
-        let mut iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let objective_unit = state.dimensions.scaling.objective_unit;
+        let min_mu = objective_unit * barrier::min_mu(self.options.barrier_tolerance(objective_unit));
+        let units = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units;
+        let mut iterate =
+            kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         iterate.units = units;
-        let probes = state.progress.is_free();
-        let aim = if probes { 0.0 } else { state.mu };
-        state.delta = state.regularisation.direction(&mut iterate, T::from_f64(aim), force)?;
-        row.regularisation = state.delta;
-        let mean = barrier::mean(&iterate.sides) / force;
-        let monotone = state.progress.count(state.delta > 0.0, state.mu / force, mean);
+        let in_free_mode = state.adaptive_mu.is_in_free_mode();
+        let target_mu = if in_free_mode { 0.0 } else { state.mu };
+        state.delta_w = state.regularisation.compute_regularised_step(
+            &mut iterate,
+            T::from_f64(target_mu),
+            objective_unit,
+        )?;
+        log_row.regularisation = state.delta_w;
+        let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let monotone_mu = state.adaptive_mu.count_step(
+            state.delta_w > 0.0,
+            state.mu / objective_unit,
+            mean_complementarity,
+        );
         let mut is_corrected = false;
-        if let Some(mu) = monotone {
-            state.mu = mu * force;
+        if let Some(mu) = monotone_mu {
+            state.mu = mu * objective_unit;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
-        } else if probes {
-            state.mu = predictor::probe(&iterate.sides, least);
-            is_corrected = predictor::correct(&mut iterate, state.mu, force, state.violation)?;
+        } else if in_free_mode {
+            state.mu = predictor::probing_mu(&iterate.sides, min_mu);
+            is_corrected =
+                predictor::corrected_step(&mut iterate, state.mu, objective_unit, state.violation)?;
         }
-        if probes {
+        if in_free_mode {
             state.filter.clear();
         }
-        row.barrier = state.mu;
-        refine(&mut iterate, units)?;
+        log_row.barrier = state.mu;
+        refine_step(&mut iterate, units)?;
         Ok(is_corrected)
     }
 }

@@ -45,12 +45,12 @@ impl<T: Real> HeapIpm<T> {
         let dims = ocp.qp().dims();
         Ok(Self {
             options: IpmOptions::new::<T>(),
-            trial: Solution::new(dims)?,
-            best: Solution::new(dims)?,
+            trial_point: Solution::new(dims)?,
+            best_iterate: Solution::new(dims)?,
             guess: Solution::new(dims)?,
-            numbers: Vec::new(),
-            indices: Vec::new(),
-            work: Vec::new(),
+            kkt_numbers: Vec::new(),
+            kkt_indices: Vec::new(),
+            workspace: Vec::new(),
             log: Vec::new(),
         })
     }

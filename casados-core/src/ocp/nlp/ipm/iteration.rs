@@ -1,26 +1,28 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
 use super::barrier;
-use super::kkt::measure;
-use super::kkt::newton::{dynamics_after, evaluate, kkt_view, kkt_view_of_new_qp, refine, resolve};
-use super::kkt::scaling::{Relative, relative};
-use super::line_search::{Accepted, FilterModel, LineSearch, SearchOutcome, longest};
-use super::predictor::{self, needs_equal_steps};
-use super::state::State;
+use super::kkt::barrier_function;
+use super::kkt::newton::{
+    costates_after_step, evaluate_residuals, kkt_view, kkt_view_of_new_qp, refine_step, resolve,
+};
+use super::kkt::scaling::{ScaledResiduals, scaled_residuals};
+use super::line_search::{AcceptedStep, FilterModel, LineSearch, LineSearchOutcome, max_step_to_boundary};
+use super::predictor::{self, needs_equal_step_lengths};
+use super::run_state::RunState;
 
 use super::Ipm;
-use super::kkt::work::Work;
-use super::restoration::elastic;
-use crate::ocp::assembly::units::of_tolerance;
+use super::kkt::workspace::Workspace;
+use super::restoration::elastic_mode;
+use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact};
-use crate::ocp::nlp::filter::{Filter, Measure};
-use crate::ocp::nlp::solver::{Method, Next};
-use crate::ocp::nlp::watch::Watch;
+use crate::ocp::nlp::filter::{Filter, FilterPair};
+use crate::ocp::nlp::solver_loop::{IterativeMethod, NextAction};
+use crate::ocp::nlp::stopwatch::Stopwatch;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{QpError, StageDims, Store, nan_max};
@@ -30,18 +32,18 @@ use alloc::vec::Vec;
 
 /// A step lets the violation grow to this multiple of it, but to no more than this multiple of what
 /// it was at the start, or of one: an objective that becomes less leads no farther away.
-const GROWTH: f64 = 10.0;
+const MAX_VIOLATION_GROWTH: f64 = 10.0;
 /// The Hessian of the Lagrangian as it is.
-const EXACT: Exact = Exact { convexification: Convexification::None };
+const EXACT_HESSIAN: Exact = Exact { convexification: Convexification::None };
 
 /// A search direction, and how far it may be gone.
-struct Direction {
-    expected: FilterModel,
+struct SearchDirection {
+    filter_model: FilterModel,
     tau: f64,
-    primal: f64,
-    dual: f64,
+    max_alpha_primal: f64,
+    max_alpha_dual: f64,
     /// It moves nothing but rounding errors.
-    tiny: bool,
+    is_tiny: bool,
     /// Whether it has the changes of products.
     is_corrected: bool,
 }
@@ -51,79 +53,90 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn linearise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
+        state: &mut RunState<'_>,
     ) -> Result<(), OcpError>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
-        if !state.has_slacks {
+        if !state.slacks_are_current {
             if !core::mem::take(&mut state.is_linearised) {
                 P::slopes(ocp)?;
             }
-            if state.lengths.alone {
-                ocp.forget_gradients();
+            if state.dimensions.in_restoration {
+                ocp.centre_objective_at_iterate();
             }
-            self.begin(ocp, state)?;
+            self.initialise_slacks_and_multipliers(ocp, state)?;
         }
-        self.curve(ocp, state)?;
-        ocp.linearise(EXACT)?;
-        if state.lengths.alone {
-            ocp.forget_gradients();
+        self.load_hessian_multipliers(ocp, state)?;
+        ocp.linearise(EXACT_HESSIAN)?;
+        if state.dimensions.in_restoration {
+            ocp.centre_objective_at_iterate();
         }
-        let units = Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units;
-        kkt_view_of_new_qp(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices, units)?;
+        let units = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units;
+        kkt_view_of_new_qp(
+            ocp.qp.view(),
+            &state.dimensions,
+            &mut self.kkt_numbers,
+            &mut self.kkt_indices,
+            units,
+        )?;
         Ok(())
     }
 
     /// Residuals and barrier parameter at the iterate, and the best iterate.
-    fn assess<P: Program<T>>(
+    fn update_residuals<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &mut Iteration,
+        state: &mut RunState<'_>,
+        log_row: &mut Iteration,
     ) -> Result<(), OcpError> {
-        let (plain, [_, of_stages]) = (ocp.objective.to_f64(), ocp.stages.map(|left| left.to_f64()));
+        let (plain_objective, [_, of_stages]) =
+            (ocp.objective.to_f64(), ocp.stage_residuals.map(|left| left.to_f64()));
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let (mut residuals, penalties) = evaluate(&mut iterate, &mut solution.view_mut());
+        let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
+        let (mut residuals, penalties) = evaluate_residuals(&mut iterate, &mut solution.view_mut());
         let mut view = solution.view_mut();
         iterate.store(&mut view);
-        let objective = if state.lengths.alone { plain } else { plain + penalties };
+        let objective =
+            if state.dimensions.in_restoration { plain_objective } else { plain_objective + penalties };
         if P::LIFTED {
             residuals.dynamics = nan_max(residuals.dynamics, of_stages);
         }
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
-                barrier::residuals(&iterate.sides, self.options.final_mu);
+                barrier::barrier_residuals(&iterate.sides, self.options.final_mu);
         }
-        let work = Work::new(ends, &state.capacity, self.work.as_mut());
-        let of_stages = if P::LIFTED { of_stages } else { 0.0 };
-        let units = state.lengths.units(work.units);
-        let Relative { barrier, error, others } =
-            relative(&residuals, &iterate, view.dynamics, units, of_stages);
-        state.update_barrier(&iterate, (&barrier.0, barrier.1), &self.options);
-        state.judge(error, others, &self.options);
-        state.gaps = barrier.0.dynamics;
-        state.violation = nan_max(state.gaps, barrier.0.inequalities);
-        let is_alone = state.lengths.alone;
-        if is_alone {
-            state.phase.take(&iterate, view.dynamics, state.gaps, units);
+        let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
+        let stage_residual = if P::LIFTED { of_stages } else { 0.0 };
+        let units = state.dimensions.units(work.units);
+        let ScaledResiduals {
+            barrier_residuals: barrier,
+            nlp_error: error,
+            error_without_complementarity: others,
+        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, stage_residual);
+        state.update_mu(&iterate, (&barrier.0, barrier.1), &self.options);
+        state.update_nlp_error(error, others, &self.options);
+        state.largest_gap = barrier.0.dynamics;
+        state.violation = nan_max(state.largest_gap, barrier.0.inequalities);
+        let in_restoration = state.dimensions.in_restoration;
+        if in_restoration {
+            state.restoration.update_violations(&iterate, view.dynamics, state.largest_gap, units);
         }
-        (row.residuals, row.objective) = (residuals, objective);
-        (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
-        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
-        let worst = elastic::worst(ocp, state, (work.penalties, work.units));
-        let size = nan_max(state.error, worst.map_or(0.0, |worst| worst.violation));
-        let is_best = size < state.best_residual || state.best_residual.is_nan();
-        if !is_alone && is_best || row.iteration == 0 {
-            (state.best_residual, state.best_iteration) = (size, *row);
+        (log_row.residuals, log_row.objective) = (residuals, objective);
+        (log_row.elastic, log_row.barrier) = (state.elastic_penalty.is_some(), state.mu);
+        let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
+        let worst = elastic_mode::largest_elastic_violation(ocp, state, (work.saved_penalties, work.units));
+        let overall_error = nan_max(state.nlp_error, worst.map_or(0.0, |worst| worst.violation));
+        let is_best = overall_error < state.best_residual || state.best_residual.is_nan();
+        if !in_restoration && is_best || log_row.iteration == 0 {
+            (state.best_residual, state.best_iteration) = (overall_error, *log_row);
             state.best_violation = state.violation;
-            self.best.copy_from(&ocp.iterate);
-            ocp.problem.move_stages(StageAction::Remember);
+            self.best_iterate.copy_from(&ocp.iterate);
+            ocp.problem.apply_stage_action(StageAction::StoreBest);
         }
-        let acceptable = !is_alone && size <= self.options.acceptable_tolerance;
-        state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
+        let is_acceptable = !in_restoration && overall_error <= self.options.acceptable_tolerance;
+        state.acceptable_iterations = if is_acceptable { state.acceptable_iterations + 1 } else { 0 };
         Ok(())
     }
 
@@ -131,140 +144,177 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
-    fn here<P: Program<T>>(
+    fn barrier_and_violation<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-    ) -> Result<Measure, QpError> {
-        let lengths = state.lengths;
-        let Self { trial, numbers, indices, work, .. } = self;
-        let plain = if lengths.alone { 0.0 } else { ocp.objective.to_f64() };
-        let iterate = kkt_view(ocp.qp.view(), &lengths, numbers, indices)?;
-        let mut work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
-        let mut here = measure::here(&iterate, plain, state.mu, lengths.units(work.units));
+        state: &mut RunState<'_>,
+    ) -> Result<FilterPair, QpError> {
+        let dimensions = state.dimensions;
+        let Self { trial_point, kkt_numbers, kkt_indices, workspace, .. } = self;
+        let plain_objective = if dimensions.in_restoration { 0.0 } else { ocp.objective.to_f64() };
+        let iterate = kkt_view(ocp.qp.view(), &dimensions, kkt_numbers, kkt_indices)?;
+        let mut workspace = Workspace::new(ocp.ends(), &state.max_dimensions, workspace.as_mut());
+        let mut current_pair = barrier_function::barrier_and_violation(
+            &iterate,
+            plain_objective,
+            state.mu,
+            dimensions.units(workspace.units),
+        );
         if P::LIFTED {
             // The QP has the ends of intervals where the next step would lead to.
-            let mut room = LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut work };
-            here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
+            let mut line_search = LineSearch {
+                dimensions: &dimensions,
+                kkt_numbers,
+                kkt_indices,
+                trial_point,
+                workspace: &mut workspace,
+            };
+            current_pair = line_search.evaluate_trial(ocp, state.mu, 0.0).unwrap_or(current_pair);
         }
-        if !state.has_filter {
-            state.first_violation = here.violation;
-            state.small_violation = 1e-4 * here.violation.max(1.0);
-            state.filter = Filter::new(1e4 * here.violation.max(1.0));
-            state.has_filter = true;
+        if !state.filter_is_initialised {
+            state.initial_violation = current_pair.violation;
+            state.theta_min = 1e-4 * current_pair.violation.max(1.0);
+            state.filter = Filter::new(1e4 * current_pair.violation.max(1.0));
+            state.filter_is_initialised = true;
         }
-        Ok(here)
+        Ok(current_pair)
     }
 
     /// What is to be expected along the search direction, and how far it may be gone.
     ///
     /// # Errors
     /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
-    fn along<P: Program<T>>(
+    fn prepare_line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_>,
-        here: Measure,
+        state: &RunState<'_>,
+        here: FilterPair,
         is_corrected: bool,
-    ) -> Result<Direction, QpError> {
-        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
-        let iterate = kkt_view(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let first = state.first_violation.max(1.0);
+    ) -> Result<SearchDirection, QpError> {
+        let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
+        let iterate =
+            kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
+        let reference_violation = state.initial_violation.max(1.0);
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
         let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
         let expected = FilterModel {
-            here,
-            slope: measure::slope(&iterate, state.mu, work.scratch) / state.lengths.sizes.force,
-            small_violation: state.small_violation,
-            most: (GROWTH * here.violation.min(first)).max(first),
+            current: here,
+            slope: barrier_function::barrier_slope(&iterate, state.mu, work.scratch)
+                / state.dimensions.scaling.objective_unit,
+            theta_min: state.theta_min,
+            max_violation: (MAX_VIOLATION_GROWTH * here.violation.min(reference_violation))
+                .max(reference_violation),
             mu: state.mu,
-            delta: state.delta,
-            rounding,
+            delta_w: state.delta_w,
+            rounding_violation: rounding,
         };
-        let tau = barrier::fraction_to_boundary(state.mu / state.lengths.sizes.force);
-        let (primal, dual) = predictor::lengths(&iterate.sides, tau);
+        let tau = barrier::fraction_to_boundary(state.mu / state.dimensions.scaling.objective_unit);
+        let (primal, dual) = predictor::step_lengths(&iterate.sides, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
-        Ok(Direction { expected, tau, primal, dual, tiny, is_corrected })
+        Ok(SearchDirection {
+            filter_model: expected,
+            tau,
+            max_alpha_primal: primal,
+            max_alpha_dual: dual,
+            is_tiny: tiny,
+            is_corrected,
+        })
     }
 
     /// How far the search direction is gone. A corrected one is gone as far as it may be, or
     /// not at all: then the direction is that without the correction.
-    fn search<P: Program<T>>(
+    fn line_search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        direction: &mut Direction,
-    ) -> Result<SearchOutcome, OcpError> {
-        if direction.tiny {
-            return Ok(SearchOutcome::Step(Accepted { alpha: direction.primal, corrected: false }));
+        state: &mut RunState<'_>,
+        direction: &mut SearchDirection,
+    ) -> Result<LineSearchOutcome, OcpError> {
+        if direction.is_tiny {
+            return Ok(LineSearchOutcome::Step(AcceptedStep {
+                alpha: direction.max_alpha_primal,
+                corrected: false,
+            }));
         }
-        let lengths = state.lengths;
-        macro_rules! room {
-            ($work:ident) => {{
-                let Self { trial, numbers, indices, work, .. } = &mut *self;
-                $work = Work::new(ocp.ends(), &state.capacity, work.as_mut());
-                LineSearch { lengths: &lengths, numbers, indices, trial, work: &mut $work }
+        let dimensions = state.dimensions;
+        macro_rules! line_search {
+            ($workspace:ident) => {{
+                let Self { trial_point, kkt_numbers, kkt_indices, workspace, .. } = &mut *self;
+                $workspace = Workspace::new(ocp.ends(), &state.max_dimensions, workspace.as_mut());
+                LineSearch {
+                    dimensions: &dimensions,
+                    kkt_numbers,
+                    kkt_indices,
+                    trial_point,
+                    workspace: &mut $workspace,
+                }
             }};
         }
-        let mut work;
+        let mut workspace;
         if direction.is_corrected {
-            let Direction { expected, primal, .. } = direction;
-            if room!(work).accepts(ocp, &mut state.filter, expected, *primal) {
-                return Ok(SearchOutcome::Step(Accepted { alpha: *primal, corrected: false }));
+            let SearchDirection { filter_model: expected, max_alpha_primal: primal, .. } = direction;
+            if line_search!(workspace).accepts(ocp, &mut state.filter, expected, *primal) {
+                return Ok(LineSearchOutcome::Step(AcceptedStep { alpha: *primal, corrected: false }));
             }
-            let here = direction.expected.here;
-            let mut iterate = kkt_view(ocp.qp.view(), &lengths, &mut self.numbers, &mut self.indices)?;
+            let current_pair = direction.filter_model.current;
+            let mut iterate =
+                kkt_view(ocp.qp.view(), &dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
-            refine(&mut iterate, Work::new(ocp.ends(), &state.capacity, self.work.as_mut()).units)?;
-            *direction = self.along(ocp, state, here, false)?;
-            self.expand(ocp, state)?;
+            refine_step(
+                &mut iterate,
+                Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut()).units,
+            )?;
+            *direction = self.prepare_line_search(ocp, state, current_pair, false)?;
+            self.expand_stage_steps(ocp, state)?;
         }
-        let Direction { expected, primal, tau, .. } = direction;
-        room!(work).search(ocp, state, expected, *primal, *tau)
+        let SearchDirection { filter_model: expected, max_alpha_primal: primal, tau, .. } = direction;
+        line_search!(workspace).search(ocp, state, expected, *primal, *tau)
     }
 
     /// Goes the step that was accepted.
-    fn accept<P: Program<T>>(
+    fn apply_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_>,
-        direction: &Direction,
-        accepted: Accepted,
+        state: &RunState<'_>,
+        direction: &SearchDirection,
+        accepted: AcceptedStep,
     ) -> Result<(), OcpError> {
-        let mut work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
+        let mut work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
-        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         iterate.units = &*core::mem::take(&mut work.units);
-        let (Accepted { alpha, corrected }, mut dual) = (accepted, direction.dual);
+        let (AcceptedStep { alpha, corrected }, mut dual) = (accepted, direction.max_alpha_dual);
         if corrected {
-            dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+            dual =
+                max_step_to_boundary(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
         }
-        if needs_equal_steps(&iterate.sides) {
+        if needs_equal_step_lengths(&iterate.sides) {
             dual = dual.min(alpha);
         }
-        dynamics_after(&mut iterate, &mut work, T::from_f64(state.delta));
-        let part = T::from_f64(alpha);
-        for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
-            *pi = *pi + part * (after - *pi);
+        costates_after_step(&mut iterate, &mut work, T::from_f64(state.delta_w));
+        let alpha_number = T::from_f64(alpha);
+        for (pi, &after) in view.dynamics.iter_mut().zip(&*work.next_costates) {
+            *pi = *pi + alpha_number * (after - *pi);
         }
-        let full = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
-        for (of_hessian, (&multiplier, &step)) in work.hessian_multipliers.iter_mut().zip(full) {
-            *of_hessian = *of_hessian + part * (multiplier + step - *of_hessian);
+        let multipliers_and_steps = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        for (of_hessian, (&multiplier, &step)) in
+            work.hessian_multipliers.iter_mut().zip(multipliers_and_steps)
+        {
+            *of_hessian = *of_hessian + alpha_number * (multiplier + step - *of_hessian);
         }
-        iterate.go(part, T::from_f64(dual));
-        barrier::keep_near_centre(&mut iterate.sides, state.mu);
+        iterate.go(alpha_number, T::from_f64(dual));
+        barrier::correct_bound_multipliers(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
-        ocp.problem.move_stages(StageAction::Go(part));
+        ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
         // The line search ends where it accepts a point; a tiny step has none.
-        ocp.has_algebraic = !direction.tiny;
+        ocp.algebraic_is_current = !direction.is_tiny;
         Ok(())
     }
 }
 
-impl<P, T, D, M, I> Method<P, T, D, M> for Ipm<T, D, M, I>
+impl<P, T, D, M, I> IterativeMethod<P, T, D, M> for Ipm<T, D, M, I>
 where
     P: Program<T>,
     Exact: Curvature<P::Dynamics, T>,
@@ -273,87 +323,92 @@ where
     M: Store<T>,
     I: Store<u32>,
 {
-    type State<'c> = State<'c>;
+    type RunState<'c> = RunState<'c>;
 
     fn evaluate(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &mut Iteration,
+        state: &mut RunState<'_>,
+        log_row: &mut Iteration,
     ) -> Result<(), OcpError> {
-        row.perturbed = state.has_perturbed_start && row.iteration == 0;
+        log_row.perturbed = state.has_perturbed_start && log_row.iteration == 0;
         self.linearise(ocp, state)?;
-        self.assess(ocp, state, row)
+        self.update_residuals(ocp, state, log_row)
     }
 
-    fn test(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_>, row: &Iteration) -> Next {
-        if (state.over)() {
-            return Next::End(Status::OutOfTime);
+    fn check_termination(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut RunState<'_>,
+        log_row: &Iteration,
+    ) -> NextAction {
+        if (state.deadline_passed)() {
+            return NextAction::Terminate(Status::OutOfTime);
         }
-        self.next(ocp, state, row)
+        self.check_convergence(ocp, state, log_row)
     }
 
     fn step(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &mut Iteration,
-        watch: &mut Watch,
+        state: &mut RunState<'_>,
+        log_row: &mut Iteration,
+        watch: &mut Stopwatch,
     ) -> Result<Option<Status>, OcpError> {
         if state.is_complementarity_stalled() {
             self.reset_small_slacks(ocp, state)?;
         }
-        let direction = self.search_direction(ocp, state, row)?.and_then(|is_corrected| {
-            let here = self.here(ocp, state)?;
-            self.along(ocp, state, here, is_corrected)
+        let direction = self.search_direction(ocp, state, log_row)?.and_then(|is_corrected| {
+            let current_pair = self.barrier_and_violation(ocp, state)?;
+            self.prepare_line_search(ocp, state, current_pair, is_corrected)
         });
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
                 // A derivative that is not finite is another error.
-                ocp.status_of_error(error)?;
-                return Ok(self.recover(ocp, state));
+                ocp.qp_failure_status(error)?;
+                return Ok(self.recover_from_failed_step(ocp, state));
             }
-            Err(error) => return ocp.status_of_error(error).map(Some),
+            Err(error) => return ocp.qp_failure_status(error).map(Some),
         };
-        self.expand(ocp, state)?;
-        row.times.qp = watch.lap();
-        if (state.over)() {
+        self.expand_stage_steps(ocp, state)?;
+        log_row.times.qp = watch.lap();
+        if (state.deadline_passed)() {
             return Ok(Some(Status::OutOfTime));
         }
         if self.is_unbounded(ocp, state) {
             return Ok(Some(Status::Unbounded));
         }
-        let found = self.search(ocp, state, &mut direction)?;
-        row.times.search = watch.lap();
-        let accepted = match found {
-            SearchOutcome::Step(accepted) => accepted,
-            SearchOutcome::Nothing => return Ok(self.recover(ocp, state)),
-            SearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
+        let outcome = self.line_search(ocp, state, &mut direction)?;
+        log_row.times.search = watch.lap();
+        let accepted = match outcome {
+            LineSearchOutcome::Step(accepted) => accepted,
+            LineSearchOutcome::NoStep => return Ok(self.recover_from_failed_step(ocp, state)),
+            LineSearchOutcome::OutOfTime => return Ok(Some(Status::OutOfTime)),
         };
-        (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
-        state.count_stalled(row.step);
-        state.regularisation.gone(row.step / direction.primal);
-        self.accept(ocp, state, &direction, accepted)?;
-        let force = of_tolerance(state.lengths.sizes.force);
-        let least = (self.options.tolerance * force).max(self.options.final_mu);
-        let ends = direction.tiny && state.mu <= least;
-        Ok(ends.then_some(Status::NoProgress))
+        (log_row.step, log_row.corrected) = (accepted.alpha, accepted.corrected);
+        state.count_stalled_step(log_row.step);
+        state.regularisation.update_damping(log_row.step / direction.max_alpha_primal);
+        self.apply_step(ocp, state, &direction, accepted)?;
+        let tolerance_unit = tolerance_factor(state.dimensions.scaling.objective_unit);
+        let min_mu = (self.options.tolerance * tolerance_unit).max(self.options.final_mu);
+        let is_finished = direction.is_tiny && state.mu <= min_mu;
+        Ok(is_finished.then_some(Status::NoProgress))
     }
 
     fn restart(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        end: Option<Status>,
-        row: &Iteration,
+        state: &mut RunState<'_>,
+        final_status: Option<Status>,
+        log_row: &Iteration,
     ) -> bool {
-        let begins = self.try_restart(ocp, state, end);
-        if !begins && matches!(end, Some(Status::Infeasible { .. })) {
+        let restarts = self.try_restart(ocp, state, final_status);
+        if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
             // That is said of the last iterate.
-            state.best_iteration = *row;
+            state.best_iteration = *log_row;
         }
-        begins
+        restarts
     }
 
     #[cfg(feature = "alloc")]

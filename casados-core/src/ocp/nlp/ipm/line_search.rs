@@ -1,15 +1,15 @@
 //! How far a step goes: the filter line search with second-order corrections.
 
-use super::kkt::lengths::Lengths;
-use super::kkt::measure;
-use super::kkt::newton::{evaluate_values, kkt_view, kkt_view_of_new_qp, refine};
-use super::kkt::work::Work;
-use super::state::State;
+use super::kkt::barrier_function;
+use super::kkt::dimensions::KktDimensions;
+use super::kkt::newton::{evaluate_linear_residuals, kkt_view, kkt_view_of_new_qp, refine_step};
+use super::kkt::workspace::Workspace;
+use super::run_state::RunState;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::filter::{
-    ETA_PHI, Filter, GAMMA_PHI, GAMMA_THETA, Measure, S_PHI, S_THETA, objective_decides,
+    ETA_PHI, Filter, FilterPair, GAMMA_PHI, GAMMA_THETA, S_PHI, S_THETA, switching_condition_holds,
 };
 use crate::qp::interior::Iterate;
 use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
@@ -25,92 +25,95 @@ const KAPPA_SOC: f64 = 0.99;
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FilterModel {
-    pub here: Measure,
+    pub current: FilterPair,
     /// `∇φᵀ d`, in units of forces.
     pub slope: f64,
     /// `θ_min`: below this violation the barrier function may decide.
-    pub small_violation: f64,
+    pub theta_min: f64,
     /// No step leaves more violation.
-    pub most: f64,
+    pub max_violation: f64,
     pub mu: f64,
     /// `δ_w`
-    pub delta: f64,
+    pub delta_w: f64,
     /// Violations up to this one are rounding errors.
-    pub rounding: f64,
+    pub rounding_violation: f64,
 }
 
 impl FilterModel {
     /// Whether the barrier function decides after a step of this length.
-    fn decides(&self, alpha: f64) -> bool {
-        self.here.violation <= self.small_violation
-            && objective_decides(alpha, self.slope, self.here.violation)
+    fn switching_condition_holds(&self, alpha: f64) -> bool {
+        self.current.violation <= self.theta_min
+            && switching_condition_holds(alpha, self.slope, self.current.violation)
     }
 
     /// The shortest step that can be accepted (equation (23)).
-    fn shortest(&self) -> f64 {
-        let Measure { violation, .. } = self.here;
-        let mut least: f64 = GAMMA_THETA;
+    fn min_alpha(&self) -> f64 {
+        let FilterPair { violation, .. } = self.current;
+        let mut smallest_ratio: f64 = GAMMA_THETA;
         if self.slope < 0.0 {
-            least = least.min(GAMMA_PHI * violation / -self.slope);
-            if violation <= self.small_violation {
+            smallest_ratio = smallest_ratio.min(GAMMA_PHI * violation / -self.slope);
+            if violation <= self.theta_min {
                 let powers = (Scalar::powf(violation, S_THETA), Scalar::powf(-self.slope, S_PHI));
-                least = least.min(powers.0 / powers.1);
+                smallest_ratio = smallest_ratio.min(powers.0 / powers.1);
             }
         }
-        (ALPHA_MIN_FRAC * least).max(1e-14)
+        (ALPHA_MIN_FRAC * smallest_ratio).max(1e-14)
     }
 
     /// Whether neither the violation nor the barrier function changes by more than rounding errors:
     /// the step changes multipliers.
-    fn is_rounding(&self, there: &Measure, noise: f64) -> bool {
-        self.here.violation <= self.rounding
-            && there.violation <= self.rounding
-            && (there.objective - self.here.objective).abs() <= noise
+    fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
+        self.current.violation <= self.rounding_violation
+            && trial_pair.violation <= self.rounding_violation
+            && (trial_pair.objective - self.current.objective).abs() <= noise
     }
 
     /// Whether a point after a step of this length is good enough; the filter grows where the
     /// barrier function does not decide.
-    pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
+    pub fn accepts(&self, filter: &mut Filter, alpha: f64, trial_pair: &FilterPair) -> bool {
         // What rounding leaves of a difference of barrier functions.
-        let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
-        if self.is_rounding(there, noise) {
+        let noise = 10.0 * f64::EPSILON * self.current.objective.abs();
+        if self.changes_only_rounding(trial_pair, noise) {
             return true;
         }
-        if !there.is_finite() || there.violation > self.most || !filter.admits(there, noise) {
+        if !trial_pair.is_finite()
+            || trial_pair.violation > self.max_violation
+            || !filter.is_acceptable(trial_pair, noise)
+        {
             return false;
         }
-        if self.decides(alpha) {
-            return there.objective <= self.here.objective + ETA_PHI * alpha * self.slope + noise;
+        if self.switching_condition_holds(alpha) {
+            return trial_pair.objective <= self.current.objective + ETA_PHI * alpha * self.slope + noise;
         }
-        filter.improves(there, &self.here, noise)
+        filter.augment_if_improved(trial_pair, &self.current, noise)
     }
 }
 
 /// A step that was accepted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Accepted {
+pub(super) struct AcceptedStep {
     pub alpha: f64,
     pub corrected: bool,
 }
 
 /// What a line search finds.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum SearchOutcome {
+pub(super) enum LineSearchOutcome {
     /// A step.
-    Step(Accepted),
+    Step(AcceptedStep),
     /// No step is short enough.
-    Nothing,
+    NoStep,
     /// The time was over before.
     OutOfTime,
 }
 
 /// The memory that a line search works on.
 pub(super) struct LineSearch<'r, 'w, T, D, M, N, I> {
-    pub lengths: &'r Lengths,
-    pub numbers: &'r mut N,
-    pub indices: &'r mut I,
-    pub trial: &'r mut Solution<T, D, M>,
-    pub work: &'r mut Work<'w, T>,
+    pub dimensions: &'r KktDimensions,
+    pub kkt_numbers: &'r mut N,
+    pub kkt_indices: &'r mut I,
+    pub trial_point: &'r mut Solution<T, D, M>,
+    pub workspace: &'r mut Workspace<'w, T>,
 }
 
 impl<T, D, M, N, I> LineSearch<'_, '_, T, D, M, N, I>
@@ -126,10 +129,10 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &FilterModel,
+        model: &FilterModel,
         alpha: f64,
     ) -> bool {
-        self.measure(ocp, expected.mu, alpha).is_some_and(|there| expected.accepts(filter, alpha, &there))
+        self.evaluate_trial(ocp, model.mu, alpha).is_some_and(|there| model.accepts(filter, alpha, &there))
     }
 
     /// Halves the step until the filter accepts it.
@@ -139,72 +142,85 @@ where
     pub fn search<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        expected: &FilterModel,
-        longest: f64,
+        state: &mut RunState<'_>,
+        model: &FilterModel,
+        max_alpha: f64,
         tau: f64,
-    ) -> Result<SearchOutcome, OcpError> {
-        let State { filter, over, .. } = state;
-        let mut alpha = longest;
-        let shortest = expected.shortest();
-        while alpha >= shortest {
-            let there = self.measure(ocp, expected.mu, alpha);
-            if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
-                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: false }));
+    ) -> Result<LineSearchOutcome, OcpError> {
+        let RunState { filter, deadline_passed: over, .. } = state;
+        let mut alpha = max_alpha;
+        let min_alpha = model.min_alpha();
+        while alpha >= min_alpha {
+            let trial_pair = self.evaluate_trial(ocp, model.mu, alpha);
+            if trial_pair.is_some_and(|there| model.accepts(filter, alpha, &there)) {
+                return Ok(LineSearchOutcome::Step(AcceptedStep { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
-            let bends = !P::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
-            if alpha == longest
-                && bends
-                && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
+            let violation_grows =
+                !P::LIFTED && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
+            if alpha == max_alpha
+                && violation_grows
+                && let Some(alpha) = self.second_order_correction(ocp, filter, model, tau)?
             {
-                return Ok(SearchOutcome::Step(Accepted { alpha, corrected: true }));
+                return Ok(LineSearchOutcome::Step(AcceptedStep { alpha, corrected: true }));
             }
             if over() {
-                return Ok(SearchOutcome::OutOfTime);
+                return Ok(LineSearchOutcome::OutOfTime);
             }
             alpha *= 0.5;
         }
-        Ok(SearchOutcome::Nothing)
+        Ok(LineSearchOutcome::NoStep)
     }
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
     /// value.
-    pub fn measure<P: Program<T>>(
+    pub fn evaluate_trial<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         mu: f64,
         alpha: f64,
-    ) -> Option<Measure> {
-        self.place_trial(ocp, T::from_f64(alpha))?;
-        let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
-        let objective = if self.lengths.alone { 0.0 } else { objective };
+    ) -> Option<FilterPair> {
+        self.write_trial_point(ocp, T::from_f64(alpha))?;
+        let objective = ocp
+            .row_values_at(self.trial_point, self.workspace.interval_ends, self.workspace.row_values)
+            .ok()?;
+        let objective = if self.dimensions.in_restoration { 0.0 } else { objective };
         ocp.step_length = Some(T::ZERO);
-        let mut gaps = ocp.gaps_at(self.trial, self.work.ends, self.work.units);
+        let mut gaps = ocp.gap_sum_at(self.trial_point, self.workspace.interval_ends, self.workspace.units);
         if P::LIFTED {
-            gaps += ocp.stages[0].to_f64();
+            gaps += ocp.stage_residuals[0].to_f64();
         }
-        let mut iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
-        let slacks = part(self.work.slacks, 0, self.lengths.counts.pair_count());
-        let mut violation =
-            gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks, self.work.units);
+        let mut iterate =
+            kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
+        let slacks = part(self.workspace.trial_slacks, 0, self.dimensions.counts.pair_count());
+        let mut violation = gaps
+            + barrier_function::violation_sum(
+                &mut iterate.sides,
+                self.workspace.row_values,
+                slacks,
+                self.workspace.units,
+            );
         if let Some(coupling) = &mut iterate.coupling {
-            coupling.evaluate(iterate.qp, self.work.rows);
+            coupling.evaluate(iterate.qp, self.workspace.row_values);
             violation += coupling.residual_sum();
         }
-        let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
-        Some(Measure {
-            objective: (objective + penalties + mu * barrier) / self.lengths.sizes.force,
+        let (penalties, barrier) = barrier_function::penalties_and_barrier(&iterate.sides, slacks);
+        Some(FilterPair {
+            objective: (objective + penalties + mu * barrier) / self.dimensions.scaling.objective_unit,
             violation,
         })
     }
 
     /// The point and the slacks after a part of the step.
-    pub fn place_trial<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, part_of_step: T) -> Option<()> {
+    pub fn write_trial_point<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        part_of_step: T,
+    ) -> Option<()> {
         ocp.step_length = Some(part_of_step);
-        let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
-        self.trial.copy_from(&ocp.iterate);
-        let to = self.trial.view_mut();
+        let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
+        self.trial_point.copy_from(&ocp.iterate);
+        let to = self.trial_point.view_mut();
         for place in Places::<T>::new(iterate.qp.dims) {
             let v = part_mut(to.v, place.v, place.n);
             let from = part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
@@ -213,7 +229,7 @@ where
             }
         }
         let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
-        for (slack, (&from, &mut step)) in self.work.slacks.iter_mut().zip(steps) {
+        for (slack, (&from, &mut step)) in self.workspace.trial_slacks.iter_mut().zip(steps) {
             *slack = from + part_of_step * step;
         }
         Some(())
@@ -221,62 +237,68 @@ where
 
     /// Second-order corrections: constraints take their values at the point that was tried.
     /// Afterwards the step is what was accepted, or what it was before.
-    fn correct<P: Program<T>>(
+    fn second_order_correction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
-        expected: &FilterModel,
+        model: &FilterModel,
         tau: f64,
     ) -> Result<Option<f64>, OcpError> {
         {
-            let iterate = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
-            copy_common(self.work.step, iterate.step);
-            copy_common(self.work.slack_step, iterate.sides.slack_step);
-            copy_common(self.work.multiplier_step, iterate.sides.multiplier_step);
-            copy_common(self.work.free_step, iterate.sides.free_step);
+            let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
+            copy_common(self.workspace.saved_step, iterate.step);
+            copy_common(self.workspace.saved_slack_step, iterate.sides.slack_step);
+            copy_common(self.workspace.saved_multiplier_step, iterate.sides.multiplier_step);
+            copy_common(self.workspace.saved_free_step, iterate.sides.free_step);
         }
-        let mut violation = expected.here.violation;
+        let mut violation = model.current.violation;
         let mut accepted = None;
         for _ in 0..MAX_SOC {
-            ocp.correct(self.trial, self.work.ends);
+            ocp.set_second_order_correction(self.trial_point, self.workspace.interval_ends);
             let (solved, alpha) = {
                 let qp = ocp.qp.view();
-                let mut iterate =
-                    kkt_view_of_new_qp(qp, self.lengths, self.numbers, self.indices, self.work.units)?;
-                iterate.units = self.work.units;
+                let mut iterate = kkt_view_of_new_qp(
+                    qp,
+                    self.dimensions,
+                    self.kkt_numbers,
+                    self.kkt_indices,
+                    self.workspace.units,
+                )?;
+                iterate.units = self.workspace.units;
                 // Sides keep their slacks; the gradient stays what it was.
-                evaluate_values(&mut iterate);
-                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
-                let solved = super::kkt::newton::step(&mut iterate, mu, delta)
-                    .and_then(|()| refine(&mut iterate, self.work.units));
-                (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
+                evaluate_linear_residuals(&mut iterate);
+                let (mu, delta) = (T::from_f64(model.mu), T::from_f64(model.delta_w));
+                let solved = super::kkt::newton::newton_step(&mut iterate, mu, delta)
+                    .and_then(|()| refine_step(&mut iterate, self.workspace.units));
+                (solved, max_step_to_boundary(iterate.sides.slack, iterate.sides.slack_step, tau))
             };
             if solved.is_err() {
                 break;
             }
-            let Some(there) = self.measure(ocp, expected.mu, alpha) else { break };
-            if expected.accepts(filter, alpha, &there) {
+            let Some(trial_pair) = self.evaluate_trial(ocp, model.mu, alpha) else { break };
+            if model.accepts(filter, alpha, &trial_pair) {
                 accepted = Some(alpha);
                 break;
             }
-            if there.violation > KAPPA_SOC * violation {
+            if trial_pair.violation > KAPPA_SOC * violation {
                 break;
             }
-            violation = there.violation;
+            violation = trial_pair.violation;
         }
         if accepted.is_none() {
-            let iterate: Iterate<'_, T> = kkt_view(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
-            copy_common(iterate.step, self.work.step);
-            copy_common(iterate.sides.slack_step, self.work.slack_step);
-            copy_common(iterate.sides.multiplier_step, self.work.multiplier_step);
-            copy_common(iterate.sides.free_step, self.work.free_step);
+            let iterate: Iterate<'_, T> =
+                kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
+            copy_common(iterate.step, self.workspace.saved_step);
+            copy_common(iterate.sides.slack_step, self.workspace.saved_slack_step);
+            copy_common(iterate.sides.multiplier_step, self.workspace.saved_multiplier_step);
+            copy_common(iterate.sides.free_step, self.workspace.saved_free_step);
         }
         Ok(accepted)
     }
 }
 
 /// The longest step after which `1 − τ` of every number is left, at most 1.
-pub(super) fn longest<T: Real>(values: &[T], steps: &[T], tau: f64) -> f64 {
+pub(super) fn max_step_to_boundary<T: Real>(values: &[T], steps: &[T], tau: f64) -> f64 {
     let mut ratio = 1.0f64;
     for (&value, &step) in values.iter().zip(steps) {
         let (value, step) = (value.to_f64(), step.to_f64());

@@ -2,8 +2,8 @@
 
 use super::Ipm;
 use super::IpmOptions;
-use super::kkt::lengths::all_soft;
-use super::kkt::work::Work;
+use super::kkt::dimensions::counts_with_all_bounds_soft;
+use super::kkt::workspace::Workspace;
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::program::{Program, ends};
 use crate::qp::interior::{Counts, Iterate};
@@ -31,7 +31,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         if solution == usize::MAX {
             return (usize::MAX, usize::MAX);
         }
-        let [numbers, work, indices] = lengths::<T>(dims, bounds, equations);
+        let [numbers, work, indices] = memory_lengths::<T>(dims, bounds, equations);
         (solution.saturating_mul(3).saturating_add(numbers).saturating_add(work), indices)
     }
 
@@ -54,7 +54,7 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
             }
         }
         let length = Solution::<T, (), ()>::memory(dims);
-        let [_, work, _] = lengths::<T>(dims, bounds, equations);
+        let [_, work, _] = memory_lengths::<T>(dims, bounds, equations);
         let (trial, rest) = numbers.split_at_mut_checked(length).unwrap_or_default();
         let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
         let (guess, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
@@ -62,12 +62,12 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
         let (work, numbers) = rest.split_at_mut_checked(work).unwrap_or_default();
         Ok(Self {
             options: IpmOptions::new::<T>(),
-            trial: Solution::in_memory(dims, trial)?,
-            best: Solution::in_memory(dims, best)?,
+            trial_point: Solution::in_memory(dims, trial)?,
+            best_iterate: Solution::in_memory(dims, best)?,
             guess: Solution::in_memory(dims, guess)?,
-            numbers,
-            indices,
-            work,
+            kkt_numbers: numbers,
+            kkt_indices: indices,
+            workspace: work,
             #[cfg(feature = "alloc")]
             log: Vec::new(),
         })
@@ -75,8 +75,8 @@ impl<'a, T: Real> Ipm<T, &'a [StageDims], &'a mut [T], &'a mut [u32]> {
 }
 
 /// Numbers of Newton's equations, numbers beside them, and indices.
-const fn lengths<T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
-    let counts = all_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
-    let work = Work::<T>::length(dims, ends(dims), &counts);
+const fn memory_lengths<T: Real>(dims: &[StageDims], bounds: usize, equations: usize) -> [usize; 3] {
+    let counts = counts_with_all_bounds_soft(&Counts { lower: bounds, upper: 0, soft: 0, equations });
+    let work = Workspace::<T>::length(dims, ends(dims), &counts);
     [Iterate::<T>::memory(dims, &counts) + equations, work, counts.indices()]
 }

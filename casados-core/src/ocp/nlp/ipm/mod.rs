@@ -26,7 +26,7 @@ mod direction;
 mod heap;
 mod iteration;
 mod kkt;
-mod lifted;
+mod lifted_stages;
 mod line_search;
 mod memory;
 mod multipliers;
@@ -34,7 +34,7 @@ mod options;
 mod predictor;
 mod restoration;
 mod run;
-mod state;
+mod run_state;
 mod violations;
 
 pub use barrier::Barrier;
@@ -97,16 +97,16 @@ pub struct Ipm<T, D, M, I> {
     /// Options, which may be changed between calls.
     pub options: IpmOptions,
     /// A point that is tried.
-    trial: Solution<T, D, M>,
+    trial_point: Solution<T, D, M>,
     /// The best iterate.
-    best: Solution<T, D, M>,
+    best_iterate: Solution<T, D, M>,
     /// The first iterate.
     guess: Solution<T, D, M>,
     /// Of Newton's equations.
-    numbers: M,
-    indices: I,
+    kkt_numbers: M,
+    kkt_indices: I,
     /// See [`Work`](work::Work).
-    work: M,
+    workspace: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,
 }

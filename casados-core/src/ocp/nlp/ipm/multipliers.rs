@@ -2,12 +2,14 @@
 
 use super::Ipm;
 use super::barrier;
-use super::kkt::newton::{evaluate, evaluate_values, kkt_view, kkt_view_of_new_qp, least_squares};
+use super::kkt::initial_point::initialise_inequalities;
+use super::kkt::newton::{
+    evaluate_linear_residuals, evaluate_residuals, kkt_view, kkt_view_of_new_qp, least_squares_multipliers,
+};
 use super::kkt::scaling;
-use super::kkt::start::begin_sides;
-use super::kkt::work::Work;
+use super::kkt::workspace::Workspace;
 use super::restoration::phase;
-use super::state::State;
+use super::run_state::RunState;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -19,66 +21,73 @@ const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// Slacks and multipliers of the first iteration, or of new penalties.
-    pub(super) fn begin<P: Program<T>>(
+    pub(super) fn initialise_slacks_and_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
+        state: &mut RunState<'_>,
     ) -> Result<(), OcpError> {
         // Multipliers of hard bounds say nothing about penalties.
-        let warm = self.options.warm_start && state.elastic.is_none();
+        let warm = self.options.warm_start && state.elastic_penalty.is_none();
         // Other penalties have their numbers at other places.
-        self.numbers.as_mut().fill(T::ZERO);
+        self.kkt_numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut work = Work::new(ends, &state.capacity, self.work.as_mut());
+        let mut work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
         let rows = core::mem::take(&mut work.units);
         let rows = &*rows;
-        let units = state.lengths.units(rows);
-        let mut iterate =
-            kkt_view_of_new_qp(qp, &state.lengths, &mut self.numbers, &mut self.indices, units.rows)?;
+        let units = state.dimensions.units(rows);
+        let mut iterate = kkt_view_of_new_qp(
+            qp,
+            &state.dimensions,
+            &mut self.kkt_numbers,
+            &mut self.kkt_indices,
+            units.rows,
+        )?;
         iterate.units = units.rows;
         iterate.load_point(&view);
         iterate.load_initial_state();
-        evaluate_values(&mut iterate);
-        let force = state.lengths.sizes.force;
-        begin_sides(&mut iterate, &self.options, warm, state.mu, units, &view);
-        if state.lengths.alone {
-            phase::centre(&mut iterate.sides, state.mu);
+        evaluate_linear_residuals(&mut iterate);
+        let objective_unit = state.dimensions.scaling.objective_unit;
+        initialise_inequalities(&mut iterate, &self.options, warm, state.mu, units, &view);
+        if state.dimensions.in_restoration {
+            phase::start_on_central_path(&mut iterate.sides, state.mu);
         }
         iterate.store(&mut view);
         if warm {
             copy_common(work.hessian_multipliers, iterate.sides.multiplier);
-        } else if least_squares(&mut iterate, &mut work, force).is_ok() {
-            let is_small = |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * force);
-            let sides = scaling::of_sides(iterate.sides.rows, work.hessian_multipliers, rows);
-            if scaling::of_gaps(iterate.qp.dims, work.pi, rows).chain(sides).all(is_small) {
-                copy_common(view.dynamics, work.pi);
+        } else if least_squares_multipliers(&mut iterate, &mut work, objective_unit).is_ok() {
+            let is_small =
+                |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * objective_unit);
+            let sides = scaling::row_values_with_units(iterate.sides.rows, work.hessian_multipliers, rows);
+            if scaling::gaps_with_units(iterate.qp.dims, work.next_costates, rows).chain(sides).all(is_small)
+            {
+                copy_common(view.dynamics, work.next_costates);
             } else {
                 view.dynamics.fill(T::ZERO);
                 work.hessian_multipliers.fill(T::ZERO);
             }
         }
-        state.has_slacks = true;
+        state.slacks_are_current = true;
         Ok(())
     }
 
     /// Writes the multipliers that the Hessian has.
-    pub(super) fn curve<P: Program<T>>(
+    pub(super) fn load_hessian_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_>,
+        state: &RunState<'_>,
     ) -> Result<(), OcpError> {
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let work = Work::new(ends, &state.capacity, self.work.as_mut());
-        copy_common(work.slacks, iterate.sides.multiplier);
+        let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
+        let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
+        copy_common(work.trial_slacks, iterate.sides.multiplier);
         copy_common(iterate.sides.multiplier, work.hessian_multipliers);
         iterate.load_point(&view);
         iterate.store(&mut view);
-        copy_common(iterate.sides.multiplier, work.slacks);
+        copy_common(iterate.sides.multiplier, work.trial_slacks);
         Ok(())
     }
 
@@ -86,14 +95,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(super) fn reset_small_slacks<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_>,
+        state: &RunState<'_>,
     ) -> Result<(), OcpError> {
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = kkt_view(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         barrier::reset_small_slacks(&mut iterate.sides, state.mu, self.options.tolerance);
         let mut view = solution.view_mut();
         iterate.store(&mut view);
-        evaluate(&mut iterate, &mut view);
+        evaluate_residuals(&mut iterate, &mut view);
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! What can be chosen.
 
 use super::barrier::Barrier;
-use crate::ocp::assembly::units::of_tolerance;
+use crate::ocp::assembly::units::tolerance_factor;
 use crate::ocp::formulation::error::OcpError;
 use crate::scalar::Real;
 
@@ -104,17 +104,17 @@ impl IpmOptions {
     }
 
     /// The tolerance, or what the last barrier parameter leaves, in units of forces.
-    pub(super) fn least_error(&self, force: f64) -> f64 {
-        (self.tolerance * of_tolerance(force)).max(10.0 * self.final_mu) / force
+    pub(super) fn barrier_tolerance(&self, objective_unit: f64) -> f64 {
+        (self.tolerance * tolerance_factor(objective_unit)).max(10.0 * self.final_mu) / objective_unit
     }
 
     /// The first barrier parameter.
-    pub(super) fn first_mu(&self, force: f64) -> f64 {
-        (self.start_mu * force).clamp(self.final_mu, f64::MAX)
+    pub(super) fn scaled_start_mu(&self, objective_unit: f64) -> f64 {
+        (self.start_mu * objective_unit).clamp(self.final_mu, f64::MAX)
     }
 
     /// Finds values that no run can have.
-    pub(super) fn check(&self) -> Result<(), OcpError> {
+    pub(super) fn validate(&self) -> Result<(), OcpError> {
         let positive = [("tolerance", self.tolerance), ("acceptable_tolerance", self.acceptable_tolerance)];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {

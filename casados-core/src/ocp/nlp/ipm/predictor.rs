@@ -8,7 +8,7 @@
 
 use super::barrier;
 use super::kkt::newton::resolve;
-use super::line_search::longest;
+use super::line_search::max_step_to_boundary;
 use crate::qp::QpError;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::scalar::Real;
@@ -16,39 +16,40 @@ use crate::scalar::Real;
 /// Corrections one after the other, each for the changes of the step before. With the same factors
 /// they cost little beside derivatives, and where a slack and its multiplier both vanish a step
 /// leaves a fifteenth of their product instead of a seventh.
-const CORRECTIONS: usize = 3;
+const MAX_CORRECTIONS: usize = 3;
 /// One is enough where more than this is violated, in units: there the QP is far from the problem.
-const NEAR: f64 = 0.3;
+const MULTIPLE_CORRECTIONS_VIOLATION: f64 = 0.3;
 /// A corrected step that is shorter than this is not taken: products are too different for the
 /// correction to be right.
-const SHORT: f64 = 0.6;
+const MIN_CORRECTED_STEP: f64 = 0.6;
 
 /// The lengths of the primal and of the dual step that keep `1 − τ` of slacks and multipliers.
-pub(super) fn lengths<T: Real>(sides: &Inequalities<'_, T>, tau: f64) -> (f64, f64) {
-    let primal = longest(sides.slack, sides.slack_step, tau);
-    let dual = longest(sides.multiplier, sides.multiplier_step, tau);
-    if needs_equal_steps(sides) { (primal.min(dual), primal.min(dual)) } else { (primal, dual) }
+pub(super) fn step_lengths<T: Real>(inequalities: &Inequalities<'_, T>, tau: f64) -> (f64, f64) {
+    let primal = max_step_to_boundary(inequalities.slack, inequalities.slack_step, tau);
+    let dual = max_step_to_boundary(inequalities.multiplier, inequalities.multiplier_step, tau);
+    if needs_equal_step_lengths(inequalities) { (primal.min(dual), primal.min(dual)) } else { (primal, dual) }
 }
 
 /// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
-pub(super) fn needs_equal_steps<T: Real>(sides: &Inequalities<'_, T>) -> bool {
-    sides.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
+pub(super) fn needs_equal_step_lengths<T: Real>(inequalities: &Inequalities<'_, T>) -> bool {
+    inequalities.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }
 
 /// `μ` after the step without barrier that is there: the mean product, times the third power of
 /// what that step, as far as it may be gone, leaves of it.
-pub(super) fn probe<T: Real>(sides: &Inequalities<'_, T>, least: f64) -> f64 {
-    let (primal, dual) = lengths(sides, 1.0);
-    let mean = barrier::mean(sides);
-    let slacks = sides.slack.iter().zip(&*sides.slack_step);
-    let multipliers = sides.multiplier.iter().zip(&*sides.multiplier_step);
-    let after = |(value, step): (&T, &T), length: f64| value.to_f64() + length * step.to_f64();
-    let products = slacks.zip(multipliers).map(|(s, l)| after(s, primal) * after(l, dual));
+pub(super) fn probing_mu<T: Real>(inequalities: &Inequalities<'_, T>, min_mu: f64) -> f64 {
+    let (primal, dual) = step_lengths(inequalities, 1.0);
+    let mean_complementarity = barrier::mean_complementarity(inequalities);
+    let slacks = inequalities.slack.iter().zip(&*inequalities.slack_step);
+    let multipliers = inequalities.multiplier.iter().zip(&*inequalities.multiplier_step);
+    let value_after_step = |(value, step): (&T, &T), length: f64| value.to_f64() + length * step.to_f64();
+    let products =
+        slacks.zip(multipliers).map(|(s, l)| value_after_step(s, primal) * value_after_step(l, dual));
     let sum = products.fold(0.0, |sum, product| sum + product);
-    let ratio = sum / sides.slack.len().max(1) as f64 / mean;
+    let ratio = sum / inequalities.slack.len().max(1) as f64 / mean_complementarity;
     // Without sides there is no ratio.
     let ratio = if ratio > 0.0 { ratio.min(1.0) } else { 0.0 };
-    (ratio * ratio * ratio * mean).max(least)
+    (ratio * ratio * ratio * mean_complementarity).max(min_mu)
 }
 
 /// The step towards `μ`, corrected for its own changes, beginning with those of the step without
@@ -56,21 +57,21 @@ pub(super) fn probe<T: Real>(sides: &Inequalities<'_, T>, least: f64) -> f64 {
 ///
 /// # Errors
 /// Those of the recursion.
-pub(super) fn correct<T: Real>(
+pub(super) fn corrected_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: f64,
-    force: f64,
+    objective_unit: f64,
     violation: f64,
 ) -> Result<bool, QpError> {
-    let corrections = if violation <= NEAR { CORRECTIONS } else { 1 };
+    let corrections = if violation <= MULTIPLE_CORRECTIONS_VIOLATION { MAX_CORRECTIONS } else { 1 };
     for _ in 0..corrections {
         resolve(iterate, T::from_f64(mu), true)?;
     }
-    let tau = barrier::fraction_to_boundary(mu / force);
-    let (primal, dual) = lengths(&iterate.sides, tau);
-    let is_long = primal.min(dual) >= SHORT && iterate.step.iter().all(|d| d.is_finite());
-    if !is_long {
+    let tau = barrier::fraction_to_boundary(mu / objective_unit);
+    let (primal, dual) = step_lengths(&iterate.sides, tau);
+    let is_accepted = primal.min(dual) >= MIN_CORRECTED_STEP && iterate.step.iter().all(|d| d.is_finite());
+    if !is_accepted {
         resolve(iterate, T::from_f64(mu), false)?;
     }
-    Ok(is_long)
+    Ok(is_accepted)
 }

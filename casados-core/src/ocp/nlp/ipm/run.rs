@@ -1,15 +1,15 @@
 //! The iterations.
 
 use super::Ipm;
-use super::kkt::lengths::Lengths;
-use super::kkt::start::push_inside;
-use super::kkt::work::Work;
-use super::state::State;
+use super::kkt::dimensions::KktDimensions;
+use super::kkt::initial_point::push_inside_bounds;
+use super::kkt::workspace::Workspace;
+use super::run_state::RunState;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact};
-use crate::ocp::nlp::solver;
+use crate::ocp::nlp::solver_loop;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 use crate::qp::{QpField, StageDims, Store};
@@ -90,39 +90,41 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
-        over: &mut dyn FnMut() -> bool,
+        deadline_passed: &mut dyn FnMut() -> bool,
     ) -> Result<Outcome, OcpError>
     where
         Exact: Curvature<P::Dynamics, T>,
     {
-        ocp.fits(self.trial.dims())?;
-        self.options.check()?;
-        ocp.begin_stages(self.options.warm_start)?;
+        ocp.check_dimensions(self.trial_point.dims())?;
+        self.options.validate()?;
+        ocp.initialise_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial, self.options.perturb_start)?;
-        let (lengths, capacity, is_linearised) = self.prepare(ocp)?;
-        let mut state = State::new(over, (lengths, capacity), is_linearised, &self.options);
+        let perturbed = ocp.linearise_guess(P::slopes, &mut self.trial_point, self.options.perturb_start)?;
+        let (lengths, capacity, is_linearised) = self.initialise(ocp)?;
+        let mut state = RunState::new(deadline_passed, (lengths, capacity), is_linearised, &self.options);
         state.has_perturbed_start = perturbed;
-        state.first_objective = ocp.objective.to_f64();
-        state.contradiction = ocp.contradiction(self.options.tolerance);
-        state.diverging_iterates = DIVERGING_ITERATES * ocp.largest_size();
+        state.initial_objective = ocp.objective.to_f64();
+        state.contradictory_bounds = ocp.contradictory_bounds(self.options.tolerance);
+        state.diverging_iterates_tol = DIVERGING_ITERATES * ocp.largest_magnitude();
         #[cfg(feature = "alloc")]
         self.log.clear();
         let mut outcome = Outcome::new();
-        let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);
-        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
-        ocp.set_penalties(work.penalties, None, &[]);
+        let result = solver_loop::iterate(self, ocp, &mut state, observer, &mut outcome);
+        let work = Workspace::new(ocp.ends(), &capacity, self.workspace.as_mut());
+        ocp.set_penalties(work.saved_penalties, None, &[]);
         let is_last = matches!(outcome.status, Status::Converged | Status::Infeasible { .. });
         if !(is_last && result.is_ok()) && state.best_residual.is_finite() {
-            ocp.recall(&self.best);
+            ocp.restore_best_iterate(&self.best_iterate);
         }
-        (ocp.step_length, ocp.has_algebraic) = (None, false);
-        let stuck =
+        (ocp.step_length, ocp.algebraic_is_current) = (None, false);
+        let is_stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && (state.has_tightened || state.best_residual <= self.options.acceptable_tolerance) {
+        if is_stuck
+            && (state.has_rescaled_objective || state.best_residual <= self.options.acceptable_tolerance)
+        {
             outcome.status = Status::Acceptable;
         }
-        ocp.complete(&mut outcome);
+        ocp.complete_outcome(&mut outcome);
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
@@ -130,30 +132,31 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
 
     /// Memory for all that may come, a point inside of the bounds, and what is remembered of the
     /// problem; whether the point is still the one that the problem was linearised at.
-    fn prepare<P: Program<T>>(
+    fn initialise<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-    ) -> Result<(Lengths, Lengths, bool), OcpError> {
-        let mut lengths = Lengths::of(ocp.qp());
-        let mut capacity = lengths.all_soft(ocp.qp());
-        let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
-        self.work.at_least(length, QpField::Numbers)?.fill(T::ZERO);
-        self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
-        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
+    ) -> Result<(KktDimensions, KktDimensions, bool), OcpError> {
+        let mut lengths = KktDimensions::from_qp(ocp.qp());
+        let mut capacity = lengths.with_all_bounds_soft(ocp.qp());
+        let length = Workspace::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
+        self.workspace.at_least(length, QpField::Numbers)?.fill(T::ZERO);
+        self.kkt_numbers.at_least(capacity.number_count, QpField::Numbers)?.fill(T::ZERO);
+        let work = Workspace::new(ocp.ends(), &capacity, self.workspace.as_mut());
         work.units.fill(T::ONE);
         if self.options.scaling {
-            lengths.sizes = ocp.find_units(work.units, work.scratch);
-            capacity.sizes = lengths.sizes;
+            lengths.scaling = ocp.compute_units(work.units, work.scratch);
+            capacity.scaling = lengths.scaling;
         }
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
-        self.trial.copy_from(iterate);
-        push_inside(qp, lengths.fixed, push, work.units, &mut iterate.view_mut());
-        ocp.join_controls();
+        self.trial_point.copy_from(iterate);
+        push_inside_bounds(qp, lengths.has_fixed_initial_state, push, work.units, &mut iterate.view_mut());
+        ocp.equalise_shared_controls();
         self.guess.copy_from(&ocp.iterate);
-        let stays = self.trial.variables_and_costates().0 == ocp.iterate.variables_and_costates().0;
-        let work = Work::new(ocp.ends(), &capacity, self.work.as_mut());
-        ocp.remember_penalties(work.penalties);
-        Ok((lengths, capacity, stays))
+        let is_unchanged =
+            self.trial_point.variables_and_costates().0 == ocp.iterate.variables_and_costates().0;
+        let work = Workspace::new(ocp.ends(), &capacity, self.workspace.as_mut());
+        ocp.save_penalties(work.saved_penalties);
+        Ok((lengths, capacity, is_unchanged))
     }
 }

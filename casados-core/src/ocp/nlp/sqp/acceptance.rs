@@ -1,67 +1,73 @@
 //! Whether a point is good enough: merit function and filter.
 
 use super::options::Globalisation;
-use crate::ocp::nlp::filter::{ETA_PHI, Filter, Measure, objective_decides};
+use crate::ocp::nlp::filter::{ETA_PHI, Filter, FilterPair, switching_condition_holds};
 
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp::nlp) struct Search {
+pub(in crate::ocp::nlp) struct LineSearchState {
     pub filter: Filter,
     /// Whether the last step was a full one: then the next full step is tried by linearising there,
     /// which is not to be done again.
-    pub full: bool,
+    pub last_step_was_full: bool,
     /// Seconds of the linearisation at the iterate, if there is one.
-    pub linearised: Option<f64>,
+    pub linearisation_seconds: Option<f64>,
 }
 
 /// A line search: where it begins, and what it expects.
 #[derive(Clone, Copy)]
-pub(in crate::ocp::nlp) struct Line {
-    pub here: Measure,
+pub(in crate::ocp::nlp) struct MeritModel {
+    pub current: FilterPair,
     /// Of the objective.
     pub slope: f64,
 }
 
-impl Line {
+impl MeritModel {
     /// Whether the merit function, if it is a parabola along the step, has its least before the end
     /// of a step of this length: whether it shrinks by less than half of what its slope promises.
-    pub fn overshoots(&self, length: f64, there: &Measure) -> bool {
-        let promised = length * (self.slope - self.here.violation);
-        there.merit() - self.here.merit() > 0.5 * promised.min(0.0) + self.noise()
+    pub fn overshoots(&self, length: f64, trial_pair: &FilterPair) -> bool {
+        let predicted_decrease = length * (self.slope - self.current.violation);
+        trial_pair.merit() - self.current.merit() > 0.5 * predicted_decrease.min(0.0) + self.rounding_noise()
     }
 
     /// Near the solution, differences are roundings.
-    fn noise(&self) -> f64 {
-        1e4 * f64::EPSILON * (1.0 + self.here.objective.abs() + self.here.violation)
+    fn rounding_noise(&self) -> f64 {
+        1e4 * f64::EPSILON * (1.0 + self.current.objective.abs() + self.current.violation)
     }
 }
 
-impl Search {
+impl LineSearchState {
     pub fn new() -> Self {
-        Self { filter: Filter::new(f64::INFINITY), full: true, linearised: None }
+        Self { filter: Filter::new(f64::INFINITY), last_step_was_full: true, linearisation_seconds: None }
     }
 
     /// Whether a point is good enough after a step of this length.
-    pub fn accepts(&mut self, by: Globalisation, length: f64, line: &Line, there: &Measure) -> bool {
-        let Line { here, slope } = line;
-        if !there.is_finite() {
+    pub fn accepts(
+        &mut self,
+        globalisation: Globalisation,
+        length: f64,
+        model: &MeritModel,
+        trial_pair: &FilterPair,
+    ) -> bool {
+        let MeritModel { current: here, slope } = model;
+        if !trial_pair.is_finite() {
             return false;
         }
-        let noise = line.noise();
-        match by {
+        let noise = model.rounding_noise();
+        match globalisation {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let slope = slope - here.violation;
-                there.merit() <= here.merit() + ETA_PHI * length * slope.min(0.0) + noise
+                trial_pair.merit() <= here.merit() + ETA_PHI * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
-                if !self.filter.admits(there, noise) {
+                if !self.filter.is_acceptable(trial_pair, noise) {
                     return false;
                 }
-                if objective_decides(length, *slope, here.violation) {
-                    return there.objective <= here.objective + ETA_PHI * length * slope + noise;
+                if switching_condition_holds(length, *slope, here.violation) {
+                    return trial_pair.objective <= here.objective + ETA_PHI * length * slope + noise;
                 }
-                self.filter.improves(there, here, noise)
+                self.filter.augment_if_improved(trial_pair, here, noise)
             }
         }
     }

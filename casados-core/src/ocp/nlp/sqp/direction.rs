@@ -2,151 +2,157 @@
 //! penalties where it is infeasible.
 
 use super::Sqp;
-use super::scaled::{Way, penalties_end, penalties_mut};
-use super::state::State;
+use super::run_state::RunState;
+use super::scaling::{ScalingDirection, saved_penalties_end, saved_penalties_mut};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::ocp::nlp::elastic::Worst;
+use crate::ocp::nlp::elastic_mode::Worst;
 use crate::ocp::solution::log::Iteration;
 use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;
 
 /// The first QP is solved to all digits where forces might be wrong by more, in units of the user.
-const MOST_AT_FIRST: f64 = 1e-2;
+const MAX_FIRST_GRADIENT_ERROR: f64 = 1e-2;
 /// Penalties grow by this where the objective is what holds violations back.
 const PENALTY_FACTOR: f64 = 100.0;
 /// Beside penalties of this multiple the objective counts nothing.
 const MAX_PENALTY_FACTOR: f64 = 1e4;
 /// QPs with hard bounds have this part of the iterations of QPs, and those with penalties so much
 /// of what is left.
-const HARD_SHARE: f64 = 0.35;
-const ELASTIC_SHARE: f64 = 0.6;
+const HARD_QP_ITERATION_SHARE: f64 = 0.35;
+const ELASTIC_QP_ITERATION_SHARE: f64 = 0.6;
 /// What rounding may leave of forces as large as one: no QP is solved to more digits.
 const QP_ROUNDING: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
-const STATIONARY_VIOLATION: f64 = 1.0 - 1e-3;
+const STATIONARY_VIOLATION_RATIO: f64 = 1.0 - 1e-3;
 /// Gaps are closed that are no more than this part of the violations of bounds.
-const CLOSED_GAPS: f64 = 1e-2;
+const CLOSED_GAP_RATIO: f64 = 1e-2;
 /// After so many steps with penalties in a row, gaps that are no more than the violations of bounds
 /// are not closed any further: a step that closes them opens as large ones.
-const STEPS_THAT_CLOSE_GAPS: usize = 4;
+const MAX_GAP_CLOSING_STEPS: usize = 4;
 /// IPOPT's `resto_proximity_weight`: the curvature that keeps a point near the iterate, and the
 /// digits of the QP, as parts of the penalty; then those of an easier QP.
 const PROXIMITY_WEIGHTS: [(f64, f64); 2] = [(2e-5, QP_ROUNDING), (2e-3, 1e-9)];
 
 /// What came of a QP.
-pub(super) enum Direction {
+pub(super) enum DirectionOutcome {
     /// A step.
     Step,
     /// A proof that the sum of violations is stationary.
-    Infeasible(Worst),
+    LocallyInfeasible(Worst),
 }
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    pub(super) fn penalties<'s, P: Program<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
-        self.work.as_ref().get(ocp.ends()..penalties_end(ocp)).unwrap_or_default()
+    pub(super) fn saved_penalties<'s, P: Program<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
+        self.workspace.as_ref().get(ocp.ends()..saved_penalties_end(ocp)).unwrap_or_default()
     }
 
     /// Penalties in place of hard bounds.
-    fn set_elastic<P: Program<T>>(
+    fn enter_elastic_mode<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
+        state: &mut RunState<'_, T>,
         penalty: f64,
     ) {
-        let memory = penalties_mut(self.work.as_mut(), ocp);
-        if !state.elastic {
-            ocp.remember_penalties(memory);
+        let memory = saved_penalties_mut(self.workspace.as_mut(), ocp);
+        if !state.is_elastic {
+            ocp.save_penalties(memory);
         }
         ocp.set_penalties(memory, Some(T::from_f64(penalty)), &[]);
-        state.elastic = true;
+        state.is_elastic = true;
         // Objectives with other penalties are not to be compared.
-        state.search.filter.clear();
+        state.line_search.filter.clear();
     }
 
     /// Bounds as they were given.
-    pub(super) fn leave_elastic<P: Program<T>>(
+    pub(super) fn leave_elastic_mode<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
+        state: &mut RunState<'_, T>,
     ) {
-        if state.elastic {
+        if state.is_elastic {
             // What is remembered is in units.
-            self.scale(ocp, state, Way::Into);
-            ocp.set_penalties(self.penalties(ocp), None, &[]);
-            self.scale(ocp, state, Way::Back);
-            state.elastic = false;
-            state.search.filter.clear();
+            self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
+            ocp.set_penalties(self.saved_penalties(ocp), None, &[]);
+            self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
+            state.is_elastic = false;
+            state.line_search.filter.clear();
         }
     }
 
     /// The QP at the iterate; in elastic mode if it has no solution otherwise.
-    pub(super) fn direction<P: Program<T>>(
+    pub(super) fn compute_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-    ) -> Result<Result<Direction, QpError>, OcpError>
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+    ) -> Result<Result<DirectionOutcome, QpError>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        (state.feasibility_step, state.rewritten) = (false, false);
-        state.residual = row.residuals.largest();
-        self.scale(ocp, state, Way::Into);
-        if state.sizes.is_some() {
-            state.residual = ocp.residuals().0.largest();
+        (state.is_feasibility_step, state.qp_overwritten) = (false, false);
+        state.residual_in_units = log_row.residuals.largest();
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
+        if state.scaling.is_some() {
+            state.residual_in_units = ocp.residuals().0.largest();
         }
-        let mut direction = self.direction_in_units(ocp, state, row);
-        self.scale(ocp, state, Way::Back);
-        if state.feasibility_step || state.rewritten {
+        let mut direction = self.compute_direction_in_units(ocp, state, log_row);
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
+        if state.is_feasibility_step || state.qp_overwritten {
             ocp.linearise(self.curvature)?;
         }
-        if let (Ok(Direction::Infeasible(worst)), Some(_)) = (&mut direction, state.sizes) {
-            *worst = self.in_problem(ocp, *worst);
+        if let (Ok(DirectionOutcome::LocallyInfeasible(worst)), Some(_)) = (&mut direction, state.scaling) {
+            *worst = self.unscaled_violation(ocp, *worst);
         }
         Ok(direction)
     }
 
     /// The same where the QP, the iterate and all constants are in units.
-    fn direction_in_units<P: Program<T>>(
+    fn compute_direction_in_units<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-    ) -> Result<Direction, QpError>
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+    ) -> Result<DirectionOutcome, QpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let forces = ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
+        let largest_multiplier =
+            ocp.iterate.multipliers_mut().iter().fold(T::ZERO, |m, force| force.abs().max(m));
         let reduced = self.curvature.convexification() == Convexification::Reduced;
-        let warm = self.options.warm_start && (row.iteration > 0 || reduced);
-        let part = self.options.qp_accuracy * state.residual;
+        let warm = self.options.warm_start && (log_row.iteration > 0 || reduced);
+        let relative_accuracy = self.options.qp_accuracy * state.residual_in_units;
         // Without multipliers stationarity is the gradient, and says nothing of what is far away.
-        let wrong = part * state.force();
-        let begins = row.iteration == 0 && forces == T::ZERO && wrong > MOST_AT_FIRST;
-        let permitted = if begins || state.exact { 0.0 } else { part };
-        let rounding = if state.sizes.is_some() { ocp.rounding_of_gaps() } else { 0.0 };
-        self.qp_solver.permit(permitted.max(QP_ROUNDING * forces.to_f64()).max(rounding));
+        let gradient_error = relative_accuracy * state.objective_unit();
+        let is_inaccurate_start = log_row.iteration == 0
+            && largest_multiplier == T::ZERO
+            && gradient_error > MAX_FIRST_GRADIENT_ERROR;
+        let permitted_error =
+            if is_inaccurate_start || state.full_qp_accuracy { 0.0 } else { relative_accuracy };
+        let rounding = if state.scaling.is_some() { ocp.gap_rounding_error() } else { 0.0 };
+        self.qp_solver.permit(permitted_error.max(QP_ROUNDING * largest_multiplier.to_f64()).max(rounding));
         // After a step with penalties hard bounds, whose QP had no solution, are not tried again as
         // long as violations stay: a solution with penalties that violates nothing is one of
         // theirs.
-        if core::mem::take(&mut state.stays_elastic) {
-            return self.elastic_direction(ocp, state, row, None);
+        if core::mem::take(&mut state.reenter_elastic_mode) {
+            return self.elastic_direction(ocp, state, log_row, None);
         }
         let start = if warm { QpStart::Warm } else { QpStart::Cold };
-        self.begin_phase(state, row, HARD_SHARE);
-        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
-        let may_help = matches!(
+        self.allot_qp_iterations(state, log_row, HARD_QP_ITERATION_SHARE);
+        let Err(error) = self.solve_regularised_qp(ocp, state, start, log_row) else {
+            return Ok(DirectionOutcome::Step);
+        };
+        let elastic_mode_may_help = matches!(
             error,
             QpError::Infeasible { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. }
         );
-        if !(may_help && self.options.elastic) {
+        if !(elastic_mode_may_help && self.options.elastic) {
             return Err(error);
         }
-        self.elastic_direction(ocp, state, row, Some(error))
+        self.elastic_direction(ocp, state, log_row, Some(error))
     }
 
     /// The step where bounds have penalties, since the QP had no solution; or that violations stay.
@@ -157,47 +163,48 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn elastic_direction<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-        known: Option<QpError>,
-    ) -> Result<Direction, QpError>
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+        hard_qp_error: Option<QpError>,
+    ) -> Result<DirectionOutcome, QpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
         // What is violated and what is possible are compared: by exact solutions.
-        let penalty = self.options.elastic_penalty.max(state.penalty);
-        self.set_elastic(ocp, state, penalty);
+        let penalty = self.options.elastic_penalty.max(state.required_penalty);
+        self.enter_elastic_mode(ocp, state, penalty);
         self.qp_solver.permit(QP_ROUNDING * penalty);
-        row.elastic = true;
-        let (worst, bounds) = ocp.worst(self.penalties(ocp), &[]);
-        let gaps = ocp.gaps();
-        let before = bounds + gaps;
-        if let (Some(error), 0.0) = (known, before) {
+        log_row.elastic = true;
+        let (worst, bound_violation) = ocp.largest_hard_violation(self.saved_penalties(ocp), &[]);
+        let gaps = ocp.gap_sum();
+        let current_violation = bound_violation + gaps;
+        if let (Some(error), 0.0) = (hard_qp_error, current_violation) {
             // Nothing is violated that penalties could stand for.
             return Err(error);
         }
-        self.begin_phase(state, row, ELASTIC_SHARE);
-        if let Err(error) = self.regularised(ocp, state, QpStart::Cold, row) {
-            if before == 0.0 {
+        self.allot_qp_iterations(state, log_row, ELASTIC_QP_ITERATION_SHARE);
+        if let Err(error) = self.solve_regularised_qp(ocp, state, QpStart::Cold, log_row) {
+            if current_violation == 0.0 {
                 return Err(error);
             }
             // Without objective and curvature it is nearly a linear program.
-            self.feasibility_step(ocp, state, row, before).map_err(|_| known.unwrap_or(error))?;
-            return Ok(Self::take_feasibility_step(state, row));
+            self.solve_feasibility_qp(ocp, state, log_row, current_violation)
+                .map_err(|_| hard_qp_error.unwrap_or(error))?;
+            return Ok(Self::take_feasibility_step(state, log_row));
         }
-        let left = self.violation_of_solution(ocp);
-        if left <= self.options.tolerance {
+        let remaining_violation = self.linearised_violation(ocp);
+        if remaining_violation <= self.options.tolerance {
             // It is the solution with hard bounds, too.
-            ocp.set_penalties(self.penalties(ocp), None, &[]);
-            (state.elastic, row.elastic) = (false, false);
-            return Ok(Direction::Step);
+            ocp.set_penalties(self.saved_penalties(ocp), None, &[]);
+            (state.is_elastic, log_row.elastic) = (false, false);
+            return Ok(DirectionOutcome::Step);
         }
-        state.stays_elastic = true;
+        state.reenter_elastic_mode = true;
         match worst.filter(|worst| worst.violation > self.options.tolerance) {
-            Some(worst) if left >= STATIONARY_VIOLATION * before => {
-                Ok(self.steer(ocp, state, row, (worst, [bounds, gaps])))
+            Some(worst) if remaining_violation >= STATIONARY_VIOLATION_RATIO * current_violation => {
+                Ok(self.steer_penalty(ocp, state, log_row, (worst, [bound_violation, gaps])))
             }
-            _ => Ok(Direction::Step),
+            _ => Ok(DirectionOutcome::Step),
         }
     }
 
@@ -205,45 +212,46 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// minimises these alone tells whether larger penalties would (R. H. Byrd, J. Nocedal, R. A.
     /// Waltz, "Steering exact penalty methods for nonlinear programming", Optim. Methods Softw. 23,
     /// 2008).
-    fn steer<P: Program<T>>(
+    fn steer_penalty<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-        (worst, [bounds, gaps]): (Worst, [f64; 2]),
-    ) -> Direction {
-        self.trial.copy_from(&self.solution);
-        let before = bounds + gaps;
-        if self.feasibility_step(ocp, state, row, before).is_ok() {
-            if self.violation_of_solution(ocp) < STATIONARY_VIOLATION * before {
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+        (worst, [bound_violation, gaps]): (Worst, [f64; 2]),
+    ) -> DirectionOutcome {
+        self.trial_point.copy_from(&self.qp_solution);
+        let current_violation = bound_violation + gaps;
+        if self.solve_feasibility_qp(ocp, state, log_row, current_violation).is_ok() {
+            if self.linearised_violation(ocp) < STATIONARY_VIOLATION_RATIO * current_violation {
                 let largest = MAX_PENALTY_FACTOR * self.options.elastic_penalty;
-                let penalty = self.options.elastic_penalty.max(state.penalty);
-                state.penalty = (PENALTY_FACTOR * penalty).min(largest);
-                return Self::take_feasibility_step(state, row);
+                let penalty = self.options.elastic_penalty.max(state.required_penalty);
+                state.required_penalty = (PENALTY_FACTOR * penalty).min(largest);
+                return Self::take_feasibility_step(state, log_row);
             }
-            let closes = gaps > CLOSED_GAPS * bounds && state.elastic_steps < STEPS_THAT_CLOSE_GAPS;
-            if !(closes || gaps > bounds) {
-                return Direction::Infeasible(worst);
+            let closes_gaps =
+                gaps > CLOSED_GAP_RATIO * bound_violation && state.elastic_steps < MAX_GAP_CLOSING_STEPS;
+            if !(closes_gaps || gaps > bound_violation) {
+                return DirectionOutcome::LocallyInfeasible(worst);
             }
         }
         // Gaps are to be closed first, whatever that leaves of bounds. The QP has another objective
         // now, and is to be written again.
-        (state.rewritten, state.penalty) = (true, 0.0);
-        self.set_elastic(ocp, state, self.options.elastic_penalty);
-        core::mem::swap(&mut self.solution, &mut self.trial);
-        Direction::Step
+        (state.qp_overwritten, state.required_penalty) = (true, 0.0);
+        self.enter_elastic_mode(ocp, state, self.options.elastic_penalty);
+        core::mem::swap(&mut self.qp_solution, &mut self.trial_point);
+        DirectionOutcome::Step
     }
 
     /// QPs to come have a share of the iterations that are left.
-    fn begin_phase(&self, state: &mut State<'_, T>, row: &Iteration, share: f64) {
-        let left = self.options.max_qp_iterations.saturating_sub(row.qp_iterations);
-        state.most_qp_iterations = row.qp_iterations + (share * left as f64) as usize;
+    fn allot_qp_iterations(&self, state: &mut RunState<'_, T>, log_row: &Iteration, share: f64) {
+        let remaining_iterations = self.options.max_qp_iterations.saturating_sub(log_row.qp_iterations);
+        state.qp_iteration_budget = log_row.qp_iterations + (share * remaining_iterations as f64) as usize;
     }
 
     /// The step to the nearest point; the QP has another objective than that of the iterate.
-    fn take_feasibility_step(state: &mut State<'_, T>, row: &mut Iteration) -> Direction {
-        (state.feasibility_step, row.regularisation) = (true, 0.0);
-        Direction::Step
+    fn take_feasibility_step(state: &mut RunState<'_, T>, log_row: &mut Iteration) -> DirectionOutcome {
+        (state.is_feasibility_step, log_row.regularisation) = (true, 0.0);
+        DirectionOutcome::Step
     }
 
     /// The point that violates the linearisation least, near the iterate:
@@ -253,62 +261,63 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     ///
     /// Afterwards penalties are those beside which the objective counts nothing.
-    fn feasibility_step<P: Program<T>>(
+    fn solve_feasibility_qp<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
         violation: f64,
     ) -> Result<(), QpError> {
-        let (one, alone) = (self.options.elastic_penalty, MAX_PENALTY_FACTOR * self.options.elastic_penalty);
+        let (base_penalty, dominant_penalty) =
+            (self.options.elastic_penalty, MAX_PENALTY_FACTOR * self.options.elastic_penalty);
         // Of soft bounds that were given there are costs.
-        let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
-        let penalty = if soft { alone } else { one };
-        self.set_elastic(ocp, state, penalty);
-        self.begin_phase(state, row, 1.0);
+        let soft = self.saved_penalties(ocp).iter().any(|penalty| penalty.is_finite());
+        let penalty = if soft { dominant_penalty } else { base_penalty };
+        self.enter_elastic_mode(ocp, state, penalty);
+        self.allot_qp_iterations(state, log_row, 1.0);
         let mut result = Ok(());
-        for (weight, digits) in PROXIMITY_WEIGHTS {
-            self.qp_solver.permit(digits * penalty);
-            ocp.forget_objective(T::from_f64(weight * penalty / violation));
-            result = self.solve_qp(ocp, state, QpStart::Cold, row);
+        for (weight, accuracy) in PROXIMITY_WEIGHTS {
+            self.qp_solver.permit(accuracy * penalty);
+            ocp.set_pure_proximal_objective(T::from_f64(weight * penalty / violation));
+            result = self.solve_qp(ocp, state, QpStart::Cold, log_row);
             if result.is_ok() {
                 break;
             }
         }
-        self.set_elastic(ocp, state, alone);
+        self.enter_elastic_mode(ocp, state, dominant_penalty);
         result
     }
 
     /// The sum of violations that the solution of the QP leaves, by its linearisation.
-    fn violation_of_solution<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
-        core::mem::swap(&mut ocp.iterate, &mut self.solution);
-        let (_, sum) = ocp.worst(self.penalties(ocp), &[]);
-        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+    fn linearised_violation<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
+        core::mem::swap(&mut ocp.iterate, &mut self.qp_solution);
+        let (_, sum) = ocp.largest_hard_violation(self.saved_penalties(ocp), &[]);
+        core::mem::swap(&mut ocp.iterate, &mut self.qp_solution);
         sum
     }
 
     /// The QP with as much regularisation as it takes.
-    fn regularised<P: Program<T>>(
+    fn solve_regularised_qp<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
+        state: &mut RunState<'_, T>,
         start: QpStart,
-        row: &mut Iteration,
+        log_row: &mut Iteration,
     ) -> Result<(), QpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        if state.damping > row.regularisation {
-            ocp.regularise(T::from_f64(state.damping - row.regularisation));
-            row.regularisation = state.damping;
+        if state.damping > log_row.regularisation {
+            ocp.regularise(T::from_f64(state.damping - log_row.regularisation));
+            log_row.regularisation = state.damping;
         }
         if self.curvature.convexification() != Convexification::Reduced {
-            return self.solve_qp(ocp, state, start, row);
+            return self.solve_qp(ocp, state, start, log_row);
         }
-        let (mut correction, mut delta) = (state.inertia, row.regularisation);
-        let solve = |ocp: &Ocp<P, T, D, M>| self.solve_qp(ocp, state, start, row);
+        let (mut correction, mut delta) = (state.inertia_correction, log_row.regularisation);
+        let solve = |ocp: &Ocp<P, T, D, M>| self.solve_qp(ocp, state, start, log_row);
         let result = ocp.correct_inertia(&mut correction, &mut delta, solve);
-        (state.inertia, row.regularisation) = (correction, delta);
+        (state.inertia_correction, log_row.regularisation) = (correction, delta);
         result
     }
 
@@ -316,26 +325,26 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn solve_qp<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
+        state: &mut RunState<'_, T>,
         start: QpStart,
-        row: &mut Iteration,
+        log_row: &mut Iteration,
     ) -> Result<(), QpError> {
-        self.solution.copy_from(&ocp.iterate);
-        let left = state.most_qp_iterations.saturating_sub(row.qp_iterations);
-        if self.options.elastic && left == 0 {
-            let iterations = row.qp_iterations;
-            return Err(QpError::MaxIterations { iterations, residuals: row.residuals });
+        self.qp_solution.copy_from(&ocp.iterate);
+        let remaining_iterations = state.qp_iteration_budget.saturating_sub(log_row.qp_iterations);
+        if self.options.elastic && remaining_iterations == 0 {
+            let iterations = log_row.qp_iterations;
+            return Err(QpError::MaxIterations { iterations, residuals: log_row.residuals });
         }
         // Without penalties there is no other way out: the solver is to say what it can.
-        self.qp_solver.limit(self.options.elastic.then_some(left));
-        let mut asked = 0;
+        self.qp_solver.limit(self.options.elastic.then_some(remaining_iterations));
+        let mut time_checks = 0;
         let over = &mut || {
-            asked += 1;
-            state.is_over()
+            time_checks += 1;
+            state.is_out_of_time()
         };
-        let result = self.qp_solver.solve_until(ocp.qp(), start, self.solution.view_mut(), over);
+        let result = self.qp_solver.solve_until(ocp.qp(), start, self.qp_solution.view_mut(), over);
         self.qp_solver.limit(None);
-        let took = match result {
+        let used_iterations = match result {
             Ok(QpStatistics { iterations, .. })
             | Err(
                 QpError::MaxIterations { iterations, .. }
@@ -343,9 +352,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 | QpError::OutOfTime { iterations, .. },
             ) => iterations,
             // A solver asks in every iteration, and says no number where it finds such a QP.
-            Err(_) => asked,
+            Err(_) => time_checks,
         };
-        row.qp_iterations += took;
+        log_row.qp_iterations += used_iterations;
         result.map(drop)
     }
 }

@@ -15,21 +15,21 @@
 
 mod acceptance;
 mod direction;
-mod measure;
+mod line_search;
+mod merit_function;
 mod multipliers;
 mod options;
 mod restart;
 mod run;
-mod scaled;
-mod search;
-mod state;
+mod run_state;
+mod scaling;
 
 pub use options::{Globalisation, SqpOptions};
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::{Exact, GaussNewton};
-use crate::ocp::nlp::elastic;
+use crate::ocp::nlp::elastic_mode;
 #[cfg(feature = "alloc")]
 use crate::ocp::solution::log::{Iteration, Log};
 #[cfg(feature = "alloc")]
@@ -85,17 +85,17 @@ pub struct Sqp<S, C, T, D, M> {
     /// The solver of QPs.
     pub qp_solver: S,
     /// The solution of a QP.
-    solution: Solution<T, D, M>,
+    qp_solution: Solution<T, D, M>,
     /// A point that is tried.
-    trial: Solution<T, D, M>,
+    trial_point: Solution<T, D, M>,
     /// The best iterate.
-    best: Solution<T, D, M>,
+    best_iterate: Solution<T, D, M>,
     /// The weights of constraints in the merit function, in the places of their multipliers; in
     /// those of variables the guess.
-    weights: Solution<T, D, M>,
+    violation_weights: Solution<T, D, M>,
     /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
     /// exchanges, then units of rows.
-    work: M,
+    workspace: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,
 }
@@ -155,16 +155,17 @@ impl<S, T: Real> HeapSqp<S, Exact, T> {
         qp_solver: S,
     ) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
-        let length = ocp.ends() + elastic::memory(dims) + scaled::memory::<T>(dims);
+        let length =
+            ocp.ends() + elastic_mode::penalty_memory_len(dims) + scaling::unit_memory_len::<T>(dims);
         Ok(Self {
             options: SqpOptions::new::<T>(),
             curvature: Exact::default(),
             qp_solver,
-            solution: Solution::new(dims)?,
-            trial: Solution::new(dims)?,
-            best: Solution::new(dims)?,
-            weights: Solution::new(dims)?,
-            work: crate::qp::zeros(length)?,
+            qp_solution: Solution::new(dims)?,
+            trial_point: Solution::new(dims)?,
+            best_iterate: Solution::new(dims)?,
+            violation_weights: Solution::new(dims)?,
+            workspace: crate::qp::zeros(length)?,
             log: Vec::new(),
         })
     }
@@ -183,25 +184,25 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
     /// The same with the Hessian of the Lagrangian, and another way to make it convex.
     #[must_use]
     pub fn exact(self, curvature: Exact) -> Sqp<S, Exact, T, D, M> {
-        self.with(curvature)
+        self.with_curvature(curvature)
     }
 
     /// The same with the Hessian of Gauss and Newton.
     #[must_use]
     pub fn gauss_newton(self) -> Sqp<S, GaussNewton, T, D, M> {
-        self.with(GaussNewton::default())
+        self.with_curvature(GaussNewton::default())
     }
 
-    fn with<N>(self, curvature: N) -> Sqp<S, N, T, D, M> {
+    fn with_curvature<N>(self, curvature: N) -> Sqp<S, N, T, D, M> {
         Sqp {
             options: self.options,
             curvature,
             qp_solver: self.qp_solver,
-            solution: self.solution,
-            trial: self.trial,
-            best: self.best,
-            weights: self.weights,
-            work: self.work,
+            qp_solution: self.qp_solution,
+            trial_point: self.trial_point,
+            best_iterate: self.best_iterate,
+            violation_weights: self.violation_weights,
+            workspace: self.workspace,
             #[cfg(feature = "alloc")]
             log: self.log,
         }
@@ -215,8 +216,8 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
         Solution::<T, (), ()>::memory(dims)
             .saturating_mul(4)
             .saturating_add(crate::ocp::formulation::program::ends(dims))
-            .saturating_add(elastic::memory(dims))
-            .saturating_add(scaled::memory::<T>(dims))
+            .saturating_add(elastic_mode::penalty_memory_len(dims))
+            .saturating_add(scaling::unit_memory_len::<T>(dims))
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
@@ -242,11 +243,11 @@ impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
             options: SqpOptions::new::<T>(),
             curvature: Exact::default(),
             qp_solver,
-            solution: Solution::in_memory(dims, solution)?,
-            trial: Solution::in_memory(dims, trial)?,
-            best: Solution::in_memory(dims, best)?,
-            weights: Solution::in_memory(dims, weights)?,
-            work,
+            qp_solution: Solution::in_memory(dims, solution)?,
+            trial_point: Solution::in_memory(dims, trial)?,
+            best_iterate: Solution::in_memory(dims, best)?,
+            violation_weights: Solution::in_memory(dims, weights)?,
+            workspace: work,
             #[cfg(feature = "alloc")]
             log: Vec::new(),
         })

@@ -9,8 +9,8 @@
 //! program: its Hessian would know nothing of the dynamics, and its solution is far away.
 
 use super::Sqp;
-use super::scaled::{Way, penalties_mut};
-use super::state::State;
+use super::run_state::RunState;
+use super::scaling::{ScalingDirection, saved_penalties_mut};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
@@ -19,40 +19,40 @@ use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric, part};
 use crate::scalar::Real;
 
 /// `ε`
-const SMALL: f64 = 1e-6;
+const PROXIMAL_WEIGHT: f64 = 1e-6;
 /// First multipliers that are larger are discarded.
-const LARGEST: f64 = 1e3;
+const CONSTR_MULT_INIT_MAX: f64 = 1e3;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Writes them to the iterate that was linearised, if it has none, and linearises it again.
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`].
-    pub(super) fn first_multipliers<P: Program<T>>(
+    pub(super) fn least_squares_multipliers<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &State<'_, T>,
+        state: &RunState<'_, T>,
     ) -> Result<(), OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let given = ocp.iterate.multipliers_mut().iter().any(|&m| m != T::ZERO);
-        if given || ocp.controls_have_curvature() {
+        let has_multipliers = ocp.iterate.multipliers_mut().iter().any(|&m| m != T::ZERO);
+        if has_multipliers || ocp.controls_have_curvature() {
             return Ok(());
         }
-        self.scale(ocp, state, Way::Into);
-        ocp.remember_penalties(penalties_mut(self.work.as_mut(), ocp));
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
+        ocp.save_penalties(saved_penalties_mut(self.workspace.as_mut(), ocp));
         ocp.ignore_inequalities();
-        ocp.flatten(T::from_f64(SMALL), T::ONE);
-        self.solution.copy_from(&ocp.iterate);
+        ocp.set_proximal_objective(T::from_f64(PROXIMAL_WEIGHT), T::ONE);
+        self.qp_solution.copy_from(&ocp.iterate);
         self.qp_solver.permit(self.options.tolerance);
-        let result = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
-        ocp.set_penalties(self.penalties(ocp), None, &[]);
-        let multipliers = self.solution.multipliers_mut();
-        if result.is_ok() && multipliers.iter().all(|m| m.abs() <= T::from_f64(LARGEST)) {
+        let result = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.qp_solution.view_mut());
+        ocp.set_penalties(self.saved_penalties(ocp), None, &[]);
+        let multipliers = self.qp_solution.multipliers_mut();
+        if result.is_ok() && multipliers.iter().all(|m| m.abs() <= T::from_f64(CONSTR_MULT_INIT_MAX)) {
             ocp.iterate.multipliers_mut().copy_from_slice(multipliers);
         }
-        self.scale(ocp, state, Way::Back);
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
         ocp.linearise(self.curvature)
     }
 }
@@ -67,25 +67,25 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     }
 
     /// `½ ε ‖v − v̄‖²` as the objective of the QP at the iterate `v̄`.
-    pub(super) fn forget_objective(&mut self, small: T) {
-        self.flatten(small, T::ZERO);
+    pub(super) fn set_pure_proximal_objective(&mut self, weight: T) {
+        self.set_proximal_objective(weight, T::ZERO);
     }
 
     /// `½ ε ‖v − v̄‖² + s ∇fᵀv` as the objective of the QP at the iterate `v̄`.
-    fn flatten(&mut self, small: T, share: T) {
+    fn set_proximal_objective(&mut self, weight: T, gradient_factor: T) {
         let (v, _) = self.iterate.variables_and_costates();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
             let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
-            let here = part(v, begin, ld);
+            let stage_variables = part(v, begin, ld);
             begin += ld;
-            add_symmetric(gradient, hessian, ld, here, n);
-            gradient.iter_mut().for_each(|g| *g = share * *g);
+            add_symmetric(gradient, hessian, ld, stage_variables, n);
+            gradient.iter_mut().for_each(|g| *g = gradient_factor * *g);
             hessian.fill(T::ZERO);
             let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
-            for ((h, gradient), &v) in diagonal.zip(gradient).zip(here) {
-                *h = small;
-                *gradient = *gradient - small * v;
+            for ((h, gradient), &v) in diagonal.zip(gradient).zip(stage_variables) {
+                *h = weight;
+                *gradient = *gradient - weight * v;
             }
         }
     }

@@ -110,7 +110,7 @@ impl SqpOptions {
 
     /// # Errors
     /// [`OcpError::InvalidOption`]
-    pub(super) fn check(&self) -> Result<(), OcpError> {
+    pub(super) fn validate(&self) -> Result<(), OcpError> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
         let (accuracy, step) = (self.qp_accuracy, self.shortest_step);
         for (name, value, is_valid, allowed) in [

@@ -1,13 +1,13 @@
 //! A second attempt, from a simulation with the controls of the guess.
 
 use super::Sqp;
-use super::state::State;
+use super::run_state::RunState;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::Curvature;
 use crate::ocp::nlp::simulation::{
-    MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
+    GUESS_VIOLATION_RATIO, MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, RestartPoint,
 };
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
@@ -25,75 +25,96 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(super) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        end: Option<Status>,
-        row: &Iteration,
+        state: &mut RunState<'_, T>,
+        final_status: Option<Status>,
+        log_row: &Iteration,
     ) -> bool
     where
         C: Curvature<P::Dynamics, T>,
     {
-        let failed =
-            matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_)));
-        let stalls = end.is_none() && state.elastic_steps == RESTART_AFTER;
-        let can = C::EXACT
+        let failed = matches!(
+            final_status,
+            Some(Status::Infeasible { .. } | Status::NoProgress | Status::QpFailed(_))
+        );
+        let stalls = final_status.is_none() && state.elastic_steps == RESTART_AFTER;
+        let may_restart = C::EXACT
             && self.options.restart
             && !state.second_attempt
-            && state.contradiction.is_none()
-            && row.iteration < self.options.max_iterations;
-        if !((failed || stalls) && can && self.curvature.convexification() == Convexification::Reduced) {
+            && state.contradictory_bounds.is_none()
+            && log_row.iteration < self.options.max_iterations;
+        if !((failed || stalls)
+            && may_restart
+            && self.curvature.convexification() == Convexification::Reduced)
+        {
             return false;
         }
-        self.leave_elastic(ocp, state);
-        let here = violation_of(&row.residuals);
-        let mut found = self.simulate_guess(ocp, SecondStart::Simulated);
-        let is_infeasible = matches!(end, Some(Status::Infeasible { .. }));
-        let of_guess = RESTART_GAIN * here..=VIOLATION_OF_GUESS * here;
-        if is_infeasible && found.is_some_and(|violation| of_guess.contains(&violation)) {
+        self.leave_elastic_mode(ocp, state);
+        let current_violation = primal_infeasibility(&log_row.residuals);
+        let mut simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::Simulation);
+        let is_infeasible = matches!(final_status, Some(Status::Infeasible { .. }));
+        let guess_violation_range =
+            RESTART_GAIN * current_violation..=GUESS_VIOLATION_RATIO * current_violation;
+        if is_infeasible
+            && simulated_violation.is_some_and(|violation| guess_violation_range.contains(&violation))
+        {
             // Where nothing was gained from the guess it may be a maximum of violations.
-            found = self.simulate_guess(ocp, SecondStart::Perturbed);
+            simulated_violation = self.linearise_simulated_guess(ocp, RestartPoint::PerturbedSimulation);
         }
-        if stalls && !found.is_some_and(|violation| violation < RESTART_GAIN * here) {
-            if found.is_some() {
-                ocp.iterate.copy_from(&self.trial);
+        if stalls
+            && !simulated_violation.is_some_and(|violation| violation < RESTART_GAIN * current_violation)
+        {
+            if simulated_violation.is_some() {
+                ocp.iterate.copy_from(&self.trial_point);
             }
-            state.search.linearised = None;
+            state.line_search.linearisation_seconds = None;
             return false;
         }
-        found = found.filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.violation_of_guess);
-        if found.is_none() {
-            ocp.iterate.copy_from(&self.weights);
+        simulated_violation = simulated_violation
+            .filter(|&violation| violation <= MAX_SIMULATED_VIOLATION * state.guess_violation);
+        if simulated_violation.is_none() {
+            ocp.iterate.copy_from(&self.violation_weights);
             ocp.iterate.multipliers_mut().fill(T::ZERO);
         }
         // The best iterate may be that of the first attempt, after the second one, too.
-        let &mut State { sizes, best_residual, best_iteration, .. } = state;
-        let over = state.over.take();
-        let best = State { best_residual, best_iteration, ..State::new() };
-        *state = State { over, second_attempt: true, damping: RESTART_DAMPING, sizes, ..best };
-        self.forget_weights(ocp, state);
+        let &mut RunState { scaling: sizes, best_residual, best_iteration, .. } = state;
+        let over = state.deadline_passed.take();
+        let fresh_state = RunState { best_residual, best_iteration, ..RunState::new() };
+        *state = RunState {
+            deadline_passed: over,
+            second_attempt: true,
+            damping: RESTART_DAMPING,
+            scaling: sizes,
+            ..fresh_state
+        };
+        self.reset_weights(ocp, state);
         true
     }
 
     /// Makes a simulation with the controls of the guess the iterate and linearises there; what was
     /// the iterate is a trial then. What it violates, if it has values.
-    fn simulate_guess<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, start: SecondStart) -> Option<f64>
+    fn linearise_simulated_guess<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        start: RestartPoint,
+    ) -> Option<f64>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        self.trial.copy_from(&self.weights);
-        self.trial.multipliers_mut().fill(T::ZERO);
-        let ends = self.work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if P::LIFTED || !ocp.simulate_guess(&mut self.trial, ends, start) {
+        self.trial_point.copy_from(&self.violation_weights);
+        self.trial_point.multipliers_mut().fill(T::ZERO);
+        let ends = self.workspace.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        if P::LIFTED || !ocp.simulate_guess(&mut self.trial_point, ends, start) {
             return None;
         }
         if ocp.linearise(self.curvature).is_err() {
-            core::mem::swap(&mut ocp.iterate, &mut self.trial);
+            core::mem::swap(&mut ocp.iterate, &mut self.trial_point);
             return None;
         }
-        Some(violation_of(&ocp.residuals().0))
+        Some(primal_infeasibility(&ocp.residuals().0))
     }
 }
 
 /// The largest violation, of equations and of inequalities.
-pub(super) fn violation_of(residuals: &Residuals) -> f64 {
+pub(super) fn primal_infeasibility(residuals: &Residuals) -> f64 {
     nan_max(residuals.dynamics, residuals.inequalities)
 }

@@ -1,18 +1,18 @@
 //! The iterations.
 
 use super::Sqp;
-use super::direction::Direction;
+use super::direction::DirectionOutcome;
 use super::options::Globalisation;
-use super::restart::violation_of;
-use super::scaled::Way;
-use super::state::{Attempt, State, Taken};
+use super::restart::primal_infeasibility;
+use super::run_state::{AcceptedStep, Attempt, RunState};
+use super::scaling::ScalingDirection;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::ocp::nlp::solver::{self, Method, Next};
-use crate::ocp::nlp::watch::Watch;
+use crate::ocp::nlp::solver_loop::{self, IterativeMethod, NextAction};
+use crate::ocp::nlp::stopwatch::Stopwatch;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::{Outcome, Status};
 #[cfg(feature = "alloc")]
@@ -25,7 +25,7 @@ use core::ops::ControlFlow;
 
 /// The log has room for so many iterations before it grows.
 #[cfg(feature = "alloc")]
-const ROOM: usize = 64;
+const LOG_CAPACITY: usize = 64;
 
 /// After so many steps with penalties in a row it is the sum of violations that is made small, and
 /// its curvature counts.
@@ -33,12 +33,12 @@ const ELASTIC_STEPS_WITHOUT_MULTIPLIERS: usize = 4;
 
 const ATTEMPTS: [Attempt; 5] = [
     Attempt::First,
-    Attempt::Exact,
+    Attempt::FullAccuracy,
     Attempt::Damped(1e-2),
     Attempt::Damped(1e0),
-    Attempt::Damped(MOST_DAMPING),
+    Attempt::Damped(MAX_ATTEMPT_DAMPING),
 ];
-const MOST_DAMPING: f64 = 1e2;
+const MAX_ATTEMPT_DAMPING: f64 = 1e2;
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -112,40 +112,44 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
-        over: &mut dyn FnMut() -> bool,
+        deadline_passed: &mut dyn FnMut() -> bool,
     ) -> Result<Outcome, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        ocp.fits(self.solution.dims())?;
-        self.options.check()?;
+        ocp.check_dimensions(self.qp_solution.dims())?;
+        self.options.validate()?;
         self.qp_solver.require(self.options.tolerance);
-        let contradiction = ocp.contradiction(self.options.tolerance);
-        let mut state = State { over: Some(over), contradiction, ..State::new() };
+        let contradiction = ocp.contradictory_bounds(self.options.tolerance);
+        let mut state = RunState {
+            deadline_passed: Some(deadline_passed),
+            contradictory_bounds: contradiction,
+            ..RunState::new()
+        };
         // Steps are to solutions of QPs: what is one stays so.
-        ocp.join_controls();
-        ocp.join_states();
-        self.weights.copy_from(&ocp.iterate);
+        ocp.equalise_shared_controls();
+        ocp.equalise_periodic_states();
+        self.violation_weights.copy_from(&ocp.iterate);
         #[cfg(feature = "alloc")]
         {
             self.log.clear();
-            try_reserve(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
+            try_reserve(&mut self.log, self.options.max_iterations.saturating_add(1).min(LOG_CAPACITY))?;
         }
         let mut outcome = Outcome::new();
-        let result = solver::iterate(self, ocp, &mut state, observer, &mut outcome);
-        self.leave_elastic(ocp, &mut state);
-        let stuck =
+        let result = solver_loop::iterate(self, ocp, &mut state, observer, &mut outcome);
+        self.leave_elastic_mode(ocp, &mut state);
+        let is_stuck =
             matches!(outcome.status, Status::NoProgress | Status::QpFailed(_) | Status::MaxIterations);
-        if stuck && state.has_tightened {
+        if is_stuck && state.has_rescaled_objective {
             outcome.status = Status::Acceptable;
         }
         // What is infeasible is said of the last iterate.
         let is_last =
             matches!(outcome.status, Status::Converged | Status::Infeasible { .. }) && result.is_ok();
         if !is_last && state.best_residual.is_finite() {
-            ocp.iterate.copy_from(&self.best);
+            ocp.iterate.copy_from(&self.best_iterate);
         }
-        ocp.complete(&mut outcome);
+        ocp.complete_outcome(&mut outcome);
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
@@ -155,22 +159,26 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn switch_to_filter<P: Program<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &Iteration,
+        state: &mut RunState<'_, T>,
+        log_row: &Iteration,
     ) where
         C: Curvature<P::Dynamics, T>,
     {
-        if C::EXACT && state.switches_to_filter(row, &self.options) {
-            state.search.filter.clear();
-            self.forget_weights(ocp, state);
+        if C::EXACT && state.update_short_steps(log_row, &self.options) {
+            state.line_search.filter.clear();
+            self.reset_weights(ocp, state);
         }
     }
 
     /// The curvature of the QP along its step, of which the iterate has gone a part.
-    fn curvature_of_step<P: Program<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &State<'_, T>) -> f64 {
-        self.scale(ocp, state, Way::Into);
-        let curvature = ocp.curvature(&self.solution);
-        self.scale(ocp, state, Way::Back);
+    fn curvature_of_step<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &RunState<'_, T>,
+    ) -> f64 {
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Scale);
+        let curvature = ocp.curvature_along_step(&self.qp_solution);
+        self.scale_qp_and_points(ocp, state, ScalingDirection::Unscale);
         curvature
     }
 
@@ -178,17 +186,17 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn take_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-    ) -> Result<Option<Taken>, OcpError>
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+    ) -> Result<Option<AcceptedStep>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
         if self.options.globalisation != Globalisation::FullStep {
-            return self.search(ocp, state, row);
+            return self.line_search(ocp, state, log_row);
         }
-        core::mem::swap(&mut ocp.iterate, &mut self.solution);
-        Ok(Some(Taken { length: 1.0, corrected: false }))
+        core::mem::swap(&mut ocp.iterate, &mut self.qp_solution);
+        Ok(Some(AcceptedStep { length: 1.0, corrected: false }))
     }
 
     /// A step in the direction of the QP; nothing where none is short enough, or the QP has no
@@ -196,71 +204,74 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn attempt_step<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-        watch: &mut Watch,
-    ) -> Result<ControlFlow<Status, Option<Taken>>, OcpError>
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+        watch: &mut Stopwatch,
+    ) -> Result<ControlFlow<Status, Option<AcceptedStep>>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
         let attempt = state.attempt;
         let damping = if let Attempt::Damped(damping) = attempt { damping } else { 0.0 };
-        state.exact = state.second_attempt || attempt != Attempt::First;
-        state.may_reject_short_steps = state.damps(C::EXACT) && damping.max(state.damping) < MOST_DAMPING;
+        state.full_qp_accuracy = state.second_attempt || attempt != Attempt::First;
+        state.may_reject_short_steps =
+            state.uses_levenberg_marquardt(C::EXACT) && damping.max(state.damping) < MAX_ATTEMPT_DAMPING;
         if damping > 0.0 {
             state.damping = damping;
         }
-        let direction = self.direction(ocp, state, row)?;
-        row.times.qp += watch.lap();
-        state.failure = direction.as_ref().err().copied();
-        if state.late {
+        let direction = self.compute_direction(ocp, state, log_row)?;
+        log_row.times.qp += watch.lap();
+        state.qp_failure = direction.as_ref().err().copied();
+        if state.out_of_time {
             return Ok(ControlFlow::Break(Status::OutOfTime));
         }
         match direction {
-            Ok(Direction::Step) => {
-                let taken = self.take_step(ocp, state, row)?;
-                row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
-                return Ok(ControlFlow::Continue(taken));
+            Ok(DirectionOutcome::Step) => {
+                let accepted_step = self.take_step(ocp, state, log_row)?;
+                log_row.times.search += watch.lap() - state.line_search.linearisation_seconds.unwrap_or(0.0);
+                return Ok(ControlFlow::Continue(accepted_step));
             }
-            Ok(Direction::Infeasible(worst)) => {
-                return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
+            Ok(DirectionOutcome::LocallyInfeasible(worst)) => {
+                return Ok(ControlFlow::Break(ocp.infeasible_status(&worst)));
             }
             Err(QpError::Infeasible { .. }) if self.options.elastic => {}
             Err(QpError::NotConvex { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. })
                 if self.curvature.convexification() == Convexification::Reduced => {}
-            Err(error) => return ocp.status_of_error(error).map(ControlFlow::Break),
+            Err(error) => return ocp.qp_failure_status(error).map(ControlFlow::Break),
         }
         Ok(ControlFlow::Continue(None))
     }
 
     /// The iterate stays, and the next iteration tries another QP there; how the run ends if there
     /// is none.
-    fn stay<P: Program<T>>(
+    fn select_next_attempt<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
     ) -> Result<Option<Status>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
-        row.step = 0.0;
-        let failure = state.failure;
+        log_row.step = 0.0;
+        let failure = state.qp_failure;
         let next = ATTEMPTS.iter().skip_while(|attempt| **attempt != state.attempt).skip(1);
         let next = next.copied().find(|attempt| match attempt {
             Attempt::First => false,
-            Attempt::Exact => !(failure.is_some() || row.elastic || state.may_reject_short_steps),
-            Attempt::Damped(damping) => !(state.damps(C::EXACT) && *damping <= state.damping),
+            Attempt::FullAccuracy => !(failure.is_some() || log_row.elastic || state.may_reject_short_steps),
+            Attempt::Damped(damping) => {
+                !(state.uses_levenberg_marquardt(C::EXACT) && *damping <= state.damping)
+            }
         });
         let Some(next) = next else {
             return Ok(Some(match failure {
                 // That the QP at one iterate has no solution says nothing of the problem.
                 None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
-                Some(error) => ocp.status_of_error(error)?,
+                Some(error) => ocp.qp_failure_status(error)?,
             }));
         };
         state.attempt = next;
-        state.search.linearised = None;
+        state.line_search.linearisation_seconds = None;
         if failure.is_some() {
             // The curvature that multipliers have is no help.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -269,7 +280,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-impl<P, S, C, T, D, M> Method<P, T, D, M> for Sqp<S, C, T, D, M>
+impl<P, S, C, T, D, M> IterativeMethod<P, T, D, M> for Sqp<S, C, T, D, M>
 where
     P: Program<T>,
     S: QpSolver<T>,
@@ -278,96 +289,101 @@ where
     D: AsRef<[StageDims]>,
     M: AsRef<[T]> + AsMut<[T]>,
 {
-    type State<'c> = State<'c, T>;
+    type RunState<'c> = RunState<'c, T>;
 
     fn evaluate(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
     ) -> Result<(), OcpError> {
-        match state.search.linearised.take() {
+        match state.line_search.linearisation_seconds.take() {
             // The line search has linearised here already.
-            Some(seconds) => row.times.linearise = seconds,
-            None if row.iteration == 0 => {
+            Some(seconds) => log_row.times.linearise = seconds,
+            None if log_row.iteration == 0 => {
                 let curvature = self.curvature;
                 let linearise = |ocp: &mut Ocp<P, T, D, M>| ocp.linearise(curvature);
-                let perturbs = self.options.perturb_start;
-                row.perturbed = ocp.linearise_guess(linearise, &mut self.trial, perturbs)?;
-                if row.perturbed {
-                    self.weights.copy_from(&ocp.iterate);
+                let may_perturb = self.options.perturb_start;
+                log_row.perturbed = ocp.linearise_guess(linearise, &mut self.trial_point, may_perturb)?;
+                if log_row.perturbed {
+                    self.violation_weights.copy_from(&ocp.iterate);
                 }
             }
             None => ocp.linearise(self.curvature)?,
         }
-        self.leave_elastic(ocp, state);
-        if row.iteration == 0 {
+        self.leave_elastic_mode(ocp, state);
+        if log_row.iteration == 0 {
             if self.options.scaling {
                 self.find_units(ocp, state);
             }
-            self.forget_weights(ocp, state);
-            state.violation_of_guess = violation_of(&ocp.residuals().0);
+            self.reset_weights(ocp, state);
+            state.guess_violation = primal_infeasibility(&ocp.residuals().0);
         }
-        if state.begins && C::EXACT {
-            self.first_multipliers(ocp, state)?;
+        if state.is_run_start && C::EXACT {
+            self.least_squares_multipliers(ocp, state)?;
         }
         let (residuals, objective) = ocp.residuals();
-        (row.residuals, row.objective) = (residuals, objective);
-        state.error = self.judge(ocp, state, &residuals);
-        if state.error < state.best_residual || state.begins && !state.best_residual.is_finite() {
-            (state.best_residual, state.best_iteration) = (state.error, *row);
-            self.best.copy_from(&ocp.iterate);
+        (log_row.residuals, log_row.objective) = (residuals, objective);
+        state.nlp_error = self.nlp_error(ocp, state, &residuals);
+        if state.nlp_error < state.best_residual || state.is_run_start && !state.best_residual.is_finite() {
+            (state.best_residual, state.best_iteration) = (state.nlp_error, *log_row);
+            self.best_iterate.copy_from(&ocp.iterate);
         }
-        state.begins = false;
+        state.is_run_start = false;
         Ok(())
     }
 
-    fn test(&mut self, ocp: &mut Ocp<P, T, D, M>, state: &mut State<'_, T>, row: &Iteration) -> Next {
-        if state.error <= self.options.tolerance && self.tightens(ocp, state) {
-            state.error = self.judge(ocp, state, &row.residuals);
-            (state.best_residual, state.best_iteration) = (state.error, *row);
-            self.best.copy_from(&ocp.iterate);
+    fn check_termination(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut RunState<'_, T>,
+        log_row: &Iteration,
+    ) -> NextAction {
+        if state.nlp_error <= self.options.tolerance && self.rescale_objective(ocp, state) {
+            state.nlp_error = self.nlp_error(ocp, state, &log_row.residuals);
+            (state.best_residual, state.best_iteration) = (state.nlp_error, *log_row);
+            self.best_iterate.copy_from(&ocp.iterate);
         }
-        if state.error <= self.options.tolerance {
-            state.best_iteration = *row;
-            return Next::End(Status::Converged);
+        if state.nlp_error <= self.options.tolerance {
+            state.best_iteration = *log_row;
+            return NextAction::Terminate(Status::Converged);
         }
-        if let Some(status) = state.contradiction {
-            return Next::End(status);
+        if let Some(status) = state.contradictory_bounds {
+            return NextAction::Terminate(status);
         }
-        if row.iteration >= self.options.max_iterations {
-            return Next::End(Status::MaxIterations);
+        if log_row.iteration >= self.options.max_iterations {
+            return NextAction::Terminate(Status::MaxIterations);
         }
-        if state.is_over() { Next::End(Status::OutOfTime) } else { Next::Step }
+        if state.is_out_of_time() { NextAction::Terminate(Status::OutOfTime) } else { NextAction::Step }
     }
 
     fn step(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        row: &mut Iteration,
-        watch: &mut Watch,
+        state: &mut RunState<'_, T>,
+        log_row: &mut Iteration,
+        watch: &mut Stopwatch,
     ) -> Result<Option<Status>, OcpError> {
-        let taken = match self.attempt_step(ocp, state, row, watch)? {
-            ControlFlow::Continue(Some(taken)) => taken,
-            ControlFlow::Continue(None) => return self.stay(ocp, state, row),
+        let accepted_step = match self.attempt_step(ocp, state, log_row, watch)? {
+            ControlFlow::Continue(Some(accepted_step)) => accepted_step,
+            ControlFlow::Continue(None) => return self.select_next_attempt(ocp, state, log_row),
             ControlFlow::Break(status) => return Ok(Some(status)),
         };
         state.attempt = Attempt::First;
-        (row.step, row.corrected) = (taken.length, taken.corrected);
-        let curvature = if state.is_short(row) { self.curvature_of_step(ocp, state) } else { 0.0 };
-        state.damp(row, curvature);
-        self.switch_to_filter(ocp, state, row);
-        state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
-        if row.elastic
+        (log_row.step, log_row.corrected) = (accepted_step.length, accepted_step.corrected);
+        let curvature = if state.is_short_step(log_row) { self.curvature_of_step(ocp, state) } else { 0.0 };
+        state.update_damping(log_row, curvature);
+        self.switch_to_filter(ocp, state, log_row);
+        state.elastic_steps = if log_row.elastic { state.elastic_steps + 1 } else { 0 };
+        if log_row.elastic
             && C::EXACT
-            && (state.feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
+            && (state.is_feasibility_step || state.elastic_steps <= ELASTIC_STEPS_WITHOUT_MULTIPLIERS)
         {
             // On the way to a feasible point forces of penalties are no multipliers: curvatures
             // would be far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
-            state.search.linearised = None;
-            self.forget_weights(ocp, state);
+            state.line_search.linearisation_seconds = None;
+            self.reset_weights(ocp, state);
         }
         Ok(None)
     }
@@ -375,16 +391,16 @@ where
     fn restart(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_, T>,
-        end: Option<Status>,
-        row: &Iteration,
+        state: &mut RunState<'_, T>,
+        final_status: Option<Status>,
+        log_row: &Iteration,
     ) -> bool {
-        let begins = self.try_restart(ocp, state, end, row);
-        if !begins && matches!(end, Some(Status::Infeasible { .. })) {
+        let restarts = self.try_restart(ocp, state, final_status, log_row);
+        if !restarts && matches!(final_status, Some(Status::Infeasible { .. })) {
             // That is said of the last iterate.
-            state.best_iteration = *row;
+            state.best_iteration = *log_row;
         }
-        begins
+        restarts
     }
 
     #[cfg(feature = "alloc")]

@@ -57,12 +57,12 @@ pub struct Covariance<T> {
     dims: [usize; 3],
     /// Rows of states and controls, stage after stage: those of `Z (Zᵀ H Z)^(−½)`.
     rows: Vec<T>,
-    rank: usize,
+    identifiable_count: usize,
     /// Whether a variable moves along a direction that data say nothing of.
-    unknown: Vec<bool>,
+    is_unidentifiable: Vec<bool>,
     directions: Vec<Unidentifiable<T>>,
     /// `s²`
-    scale: T,
+    variance_factor: T,
 }
 
 /// A combination of variables that data say nothing of: the estimate may be moved along it, and the
@@ -132,7 +132,7 @@ impl<T: Real> Covariance<T> {
     /// standard deviation `s² = ‖r‖² / (m − n)`, of `m` residuals and `n` unknowns.
     #[must_use]
     pub fn scaled(self, variance: T) -> Self {
-        Self { scale: self.scale * variance, ..self }
+        Self { variance_factor: self.variance_factor * variance, ..self }
     }
 
     /// The covariance of two variables, each with its stage.
@@ -140,7 +140,7 @@ impl<T: Real> Covariance<T> {
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::NotIdentifiable`]
     pub fn covariance(&self, a: (&str, usize), b: (&str, usize)) -> Result<T, OcpError> {
-        Ok(self.scale * dot(self.row(a)?, self.row(b)?))
+        Ok(self.variance_factor * dot(self.variable_row(a)?, self.variable_row(b)?))
     }
 
     /// The variance of a variable at a stage.
@@ -159,7 +159,7 @@ impl<T: Real> Covariance<T> {
         Ok(self.variance(name, stage)?.sqrt())
     }
 
-    fn row(&self, (name, stage): (&str, usize)) -> Result<&[T], OcpError> {
+    fn variable_row(&self, (name, stage): (&str, usize)) -> Result<&[T], OcpError> {
         let [nx, nu, intervals] = self.dims;
         let position = |names: &[&str]| names.iter().position(|variable| name_matches(name, variable));
         let (index, part_of, stages, known) = match (position(self.names.x), position(self.names.u)) {
@@ -173,11 +173,11 @@ impl<T: Real> Covariance<T> {
         if stage >= stages {
             return Err(OcpError::NoSuchStage { part: part_of, stage, stages });
         }
-        let place = stage * (nx + nu) + index;
-        if self.unknown.get(place).copied().unwrap_or(true) {
+        let row_index = stage * (nx + nu) + index;
+        if self.is_unidentifiable.get(row_index).copied().unwrap_or(true) {
             return Err(OcpError::NotIdentifiable { name: known.copied().unwrap_or_default(), stage });
         }
-        Ok(part(&self.rows, place * self.rank, self.rank))
+        Ok(part(&self.rows, row_index * self.identifiable_count, self.identifiable_count))
     }
 }
 
@@ -244,26 +244,31 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
         let [nx, nu, intervals] = unknowns.dims;
         let n = unknowns.count();
         let rounding = T::from_f64(T::EPSILON * (n * (intervals + 1) * (nx + nu)).max(1) as f64);
-        let information = self.information(&unknowns)?;
-        let units: Vec<T> = (0..n).map(|i| unit(get(&information.data, i * n + i))).collect();
+        let information = self.reduced_hessian(&unknowns)?;
+        let units: Vec<T> = (0..n).map(|i| diagonal_scale(get(&information.data, i * n + i))).collect();
         // Directions that active constraints leave, each unknown in its unit.
-        let mut left = Vec::new();
-        for (value, vector) in self.active_constraints(&unknowns, &units)?.eigen()? {
+        let mut free_directions = Vec::new();
+        for (value, vector) in self.active_constraint_gram(&unknowns, &units)?.eigenpairs()? {
             if value <= rounding {
-                left.push(vector.iter().zip(&units).map(|(&v, &unit)| v * unit).collect::<Vec<T>>());
+                free_directions
+                    .push(vector.iter().zip(&units).map(|(&v, &unit)| v * unit).collect::<Vec<T>>());
             }
         }
-        let mut reduced = information.reduced(&left)?;
-        let scales: Vec<T> = (0..left.len()).map(|i| unit(get(&reduced.data, i * left.len() + i))).collect();
-        for (column, &scale) in reduced.data.chunks_exact_mut(left.len().max(1)).zip(&scales) {
-            column.iter_mut().zip(&scales).for_each(|(a, &other)| *a = *a * scale * other);
+        let mut reduced = information.reduced(&free_directions)?;
+        let direction_scales: Vec<T> = (0..free_directions.len())
+            .map(|i| diagonal_scale(get(&reduced.data, i * free_directions.len() + i)))
+            .collect();
+        for (column, &scale) in
+            reduced.data.chunks_exact_mut(free_directions.len().max(1)).zip(&direction_scales)
+        {
+            column.iter_mut().zip(&direction_scales).for_each(|(a, &other)| *a = *a * scale * other);
         }
-        let eigen = reduced.eigen()?;
+        let eigen = reduced.eigenpairs()?;
         let largest = eigen.iter().fold(T::ZERO, |largest, (value, _)| value.abs().max(largest));
-        let (mut basis, mut null) = (Vec::new(), Vec::new());
+        let (mut basis, mut unidentifiable_directions) = (Vec::new(), Vec::new());
         for (value, vector) in eigen {
             let mut direction = zeros(n)?;
-            for ((left, &scale), &factor) in left.iter().zip(&scales).zip(&vector) {
+            for ((left, &scale), &factor) in free_directions.iter().zip(&direction_scales).zip(&vector) {
                 axpy(factor * scale, left, &mut direction);
             }
             if value > rounding * largest {
@@ -274,17 +279,18 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 let pivot = value.to_f64();
                 return Err(OcpError::Qp(QpError::NotConvex { stage: 0, index: 0, pivot }));
             } else {
-                null.push(direction);
+                unidentifiable_directions.push(direction);
             }
         }
-        let covariance = unknowns.covariance::<P>(&basis, &null, &units, rounding.sqrt())?;
-        let free = (0..self.layout().free).map(|w| self.name_of_free(w)).collect();
+        let covariance =
+            unknowns.covariance::<P>(&basis, &unidentifiable_directions, &units, rounding.sqrt())?;
+        let free = (0..self.layout().free_count).map(|w| self.free_parameter_name(w)).collect();
         Ok(Covariance { free, ..covariance })
     }
 }
 
 /// What makes a diagonal element one; one itself where it is zero.
-fn unit<T: Real>(diagonal: T) -> T {
+fn diagonal_scale<T: Real>(diagonal: T) -> T {
     if diagonal > T::ZERO { T::ONE / diagonal.sqrt() } else { T::ONE }
 }
 
@@ -301,40 +307,41 @@ impl<T: Real> Unknowns<T> {
         let variables = self.rows.len().checked_div(n).unwrap_or(0);
         let mut rows = zeros(variables * basis.len())?;
         let mut unknown = Vec::with_capacity(variables);
-        let length = |values: &mut dyn Iterator<Item = T>| {
+        let norm = |values: &mut dyn Iterator<Item = T>| {
             values.fold(T::ZERO, |sum, value| sum + value * value).sqrt()
         };
-        let lengths: Vec<T> = null
+        let direction_norms: Vec<T> = null
             .iter()
-            .map(|direction| length(&mut direction.iter().zip(units).map(|(&d, &unit)| d / unit)))
+            .map(|direction| norm(&mut direction.iter().zip(units).map(|(&d, &unit)| d / unit)))
             .collect();
         for (v, z) in self.rows.chunks_exact(n.max(1)).enumerate() {
             let row = part_mut(&mut rows, v * basis.len(), basis.len());
             row.iter_mut().zip(basis).for_each(|(element, b)| *element = dot(z, b));
-            let moves = length(&mut z.iter().zip(units).map(|(&z, &unit)| z * unit));
-            let mut directions = null.iter().zip(&lengths);
+            let row_norm = norm(&mut z.iter().zip(units).map(|(&z, &unit)| z * unit));
+            let mut directions = null.iter().zip(&direction_norms);
             unknown.push(
-                directions.any(|(direction, &length)| dot(z, direction).abs() > tolerance * length * moves),
+                directions
+                    .any(|(direction, &length)| dot(z, direction).abs() > tolerance * length * row_norm),
             );
         }
-        let directions = null.iter().zip(&lengths);
+        let directions = null.iter().zip(&direction_norms);
         let directions =
-            directions.map(|(direction, &length)| self.named(direction, units, tolerance * length));
+            directions.map(|(direction, &length)| self.named_direction(direction, units, tolerance * length));
         Ok(Covariance {
             names: const { &<P::Dynamics as Dynamics<T>>::NAMES },
             free: Vec::new(),
             dims: self.dims,
             rows,
-            rank: basis.len(),
-            unknown,
+            identifiable_count: basis.len(),
+            is_unidentifiable: unknown,
             directions: directions.collect(),
-            scale: T::ONE,
+            variance_factor: T::ONE,
         })
     }
 
     /// A direction by the names of its parts, but for those that are no more than the tolerance in
     /// their units.
-    fn named(&self, direction: &[T], units: &[T], tolerance: T) -> Unidentifiable<T> {
+    fn named_direction(&self, direction: &[T], units: &[T], tolerance: T) -> Unidentifiable<T> {
         let largest =
             direction.iter().fold(T::ZERO, |largest, &d| if d.abs() > largest.abs() { d } else { largest });
         let parts = self.names.iter().zip(direction.iter().zip(units));

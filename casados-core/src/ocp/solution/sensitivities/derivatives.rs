@@ -1,13 +1,13 @@
 //! Adjoints of solutions and derivatives of optimal values, by the factors of a solution.
 
-use super::active::Springs;
-use super::answers::{SolutionAdjoint, ValueHessian};
-use super::border::Border;
-use super::column::Column;
+use super::bordered_system::BorderedSystem;
+use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
+use super::kkt_direction::KktDirection;
+use super::results::{SolutionAdjoint, ValueHessian};
 use super::{recursion, solve};
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Curvature;
 use crate::qp::element::{get, set};
@@ -18,25 +18,26 @@ use crate::shape::Shape;
 impl<T: Real> SolutionFactors<T> {
     /// The Hessian of the optimal value.
     pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
-        let ([nx, _, np], given) = (self.dims, self.given());
-        let mut column = core::mem::take(&mut self.column);
+        let ([nx, _, np], given) = (self.dims, self.given_initial_states());
+        let mut direction = core::mem::take(&mut self.direction);
         for i in 0..given {
-            solve::solve_start(self, i, &mut column);
-            copy_common(part_mut(&mut self.of_start, i * nx, nx), column.multipliers(0));
+            solve::solve_initial_state(self, i, &mut direction);
+            copy_common(part_mut(&mut self.hessian_x0, i * nx, nx), direction.multipliers(0));
         }
         for p in 0..np {
-            solve::solve_parameter(self, p, &mut column);
-            copy_common(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
+            solve::solve_parameter(self, p, &mut direction);
+            copy_common(part_mut(&mut self.hessian_x0_p, p * nx, nx), direction.multipliers(0));
             for q in 0..np {
-                let value = get(&self.problem.square, p * np + q) + self.change(q, &column);
-                set(&mut self.square, p * np + q, value);
+                let value = get(&self.parameter_derivatives.value_hessian, p * np + q)
+                    + self.product_with_parameter(q, &direction);
+                set(&mut self.hessian_p, p * np + q, value);
             }
         }
-        self.column = column;
+        self.direction = direction;
         ValueHessian {
-            xx: part(&self.of_start, 0, given * nx),
-            xp: part(&self.cross, 0, given * np),
-            pp: &self.square,
+            xx: part(&self.hessian_x0, 0, given * nx),
+            xp: part(&self.hessian_x0_p, 0, given * np),
+            pp: &self.hessian_p,
         }
     }
 
@@ -51,27 +52,30 @@ impl<T: Real> SolutionFactors<T> {
         seed: &Solution<T, D, M>,
     ) -> Result<SolutionAdjoint<'_, T>, OcpError> {
         self.check_seed(seed)?;
-        let mut column = core::mem::take(&mut self.column);
-        solve::solve_seed(self, seed, &mut column);
+        let mut direction = core::mem::take(&mut self.direction);
+        solve::solve_seed(self, seed, &mut direction);
         for p in 0..self.dims[2] {
-            let value = self.change(p, &column);
+            let value = self.product_with_parameter(p, &direction);
             set(&mut self.adjoint, p, value);
         }
-        self.column = column;
-        Ok(SolutionAdjoint { x0: part(self.column.multipliers(0), 0, self.given()), p: &self.adjoint })
+        self.direction = direction;
+        Ok(SolutionAdjoint {
+            x0: part(self.direction.multipliers(0), 0, self.given_initial_states()),
+            p: &self.adjoint,
+        })
     }
 
     /// The product of a solution of the conditions of optimality with what a parameter changes of
     /// these.
-    fn change(&self, p: usize, column: &Column<T>) -> T {
+    fn product_with_parameter(&self, p: usize, direction: &KktDirection<T>) -> T {
         let [nx, nu, _] = self.dims;
         let mut sum = T::ZERO;
         for k in 0..=self.intervals {
-            let gradient = part(self.problem.gradient(k), p * (nx + nu), nx + nu);
+            let gradient = part(self.parameter_derivatives.gradient_jacobian(k), p * (nx + nu), nx + nu);
             let (of_x, of_u) = gradient.split_at_checked(nx).unwrap_or_default();
-            let end = part(self.problem.end(k), p * nx, nx);
-            let pairs = of_x.iter().zip(column.state(k)).chain(of_u.iter().zip(column.control(k)));
-            let pairs = pairs.chain(end.iter().zip(column.multipliers(k + 1)));
+            let end = part(self.parameter_derivatives.end_jacobian(k), p * nx, nx);
+            let pairs = of_x.iter().zip(direction.state(k)).chain(of_u.iter().zip(direction.control(k)));
+            let pairs = pairs.chain(end.iter().zip(direction.multipliers(k + 1)));
             sum = pairs.fold(sum, |sum, (&a, &b)| sum + a * b);
         }
         sum
@@ -86,9 +90,11 @@ impl<T: Real> SolutionFactors<T> {
         if expected != found {
             return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
         }
-        for (stage, at) in seed.stages().enumerate() {
+        for (stage, stage_point) in seed.stages().enumerate() {
             let controls = if stage < self.intervals { nu } else { 0 };
-            for (part, values, expected) in [(Part::States, at.x, nx), (Part::Controls, at.u, controls)] {
+            for (part, values, expected) in
+                [(Part::States, stage_point.x, nx), (Part::Controls, stage_point.u, controls)]
+            {
                 if values.len() != expected {
                     return Err(OcpError::Length { part, stage, expected, found: values.len() });
                 }
@@ -104,11 +110,11 @@ impl<T: Real> SolutionFactors<T> {
     ///
     /// # Errors
     /// [`OcpError::Qp`]
-    pub(super) fn fill<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    pub(super) fn factorise_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         qp: QpView<'_, T>,
         iterate: &Solution<T, D, M>,
-        parameters: bool,
+        with_parameters: bool,
     ) -> Result<(), OcpError> {
         let mut largest = T::ZERO;
         for stage in qp.stages() {
@@ -116,13 +122,13 @@ impl<T: Real> SolutionFactors<T> {
                 largest = value.abs().max(largest);
             }
         }
-        let mut springs = Springs::new(largest, self.smoothing);
-        recursion::factorise(self, qp, iterate, &mut springs, parameters)?;
-        self.weak = springs.weak;
-        let mut column = core::mem::take(&mut self.column);
-        let result = Border::factorise(self, &mut column);
-        self.column = column;
-        recursion::gradient(qp, iterate, &mut self.gradient);
+        let mut stiffness = BoundStiffness::new(largest, self.smoothing);
+        recursion::factorise(self, qp, iterate, &mut stiffness, with_parameters)?;
+        self.weakly_active = stiffness.weakly_active;
+        let mut direction = core::mem::take(&mut self.direction);
+        let result = BorderedSystem::factorise(self, &mut direction);
+        self.direction = direction;
+        recursion::value_gradient(qp, iterate, &mut self.gradient);
         result
     }
 }
@@ -146,11 +152,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         factors: &mut SolutionFactors<T>,
     ) -> Result<(), OcpError> {
         self.prepare_factors(factors)?;
-        let problem = &mut factors.problem;
-        problem.begin();
-        self.linearise_with_observer(curvature, &mut |k, step| problem.take(k, step))?;
+        let problem = &mut factors.parameter_derivatives;
+        problem.reset();
+        self.linearise_with_observer(curvature, &mut |k, step| problem.add_interval(k, step))?;
         self.differentiate_functions(C::EXACT, problem)?;
-        factors.fill(self.qp.view(), &self.iterate, true)
+        factors.factorise_qp(self.qp.view(), &self.iterate, true)
     }
 
     /// Checks memory and options, and what has to be found beside the recursion.
@@ -159,17 +165,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`],
     /// [`OcpError::FreeParameters`]
     pub(super) fn prepare_factors(&self, factors: &mut SolutionFactors<T>) -> Result<(), OcpError> {
-        if self.initial == Initial::Unknown {
+        if self.initial_state == InitialState::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         if self.free.count() > 0 {
             return Err(OcpError::FreeParameters);
         }
-        if self.initial == Initial::Partly {
+        if self.initial_state == InitialState::PartlyFixed {
             let what = "derivatives of solutions whose controls are linear";
             return Err(OcpError::Unsupported { what, remedy: "Write these as states of the model" });
         }
-        if self.layout().inner > 0 {
+        if self.layout().inner_rows > 0 {
             let what =
                 "derivatives of solutions with bounds of algebraic states or at points inside intervals";
             return Err(OcpError::Unsupported { what, remedy: "Write these as path constraints at nodes" });
@@ -183,13 +189,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             });
         }
         let (part, stage) = (Part::Memory, 0);
-        let given = [P::Shape::NX, P::Shape::NU, P::Shape::NP, self.intervals()];
+        let problem_dims = [P::Shape::NX, P::Shape::NU, P::Shape::NP, self.intervals()];
         let [nx, nu, np] = factors.dims;
-        for (expected, found) in given.into_iter().zip([nx, nu, np, factors.intervals]) {
+        for (expected, found) in problem_dims.into_iter().zip([nx, nu, np, factors.intervals]) {
             if expected != found {
                 return Err(OcpError::Length { part, stage, expected, found });
             }
         }
-        factors.border.prepare(self.qp.view(), self.initial == Initial::Free, [nx, nu, self.intervals()])
+        factors.bordered_system.prepare(
+            self.qp.view(),
+            self.initial_state == InitialState::Free,
+            [nx, nu, self.intervals()],
+        )
     }
 }

@@ -1,9 +1,9 @@
 //! The conditions of optimality at a solution, factorised once for any number of derivatives.
 
-use super::block;
-use super::border::Border;
-use super::column::Column;
-use super::parameters::Parameters;
+use super::bordered_system::BorderedSystem;
+use super::kkt_direction::KktDirection;
+use super::parameters::KktParameterDerivatives;
+use super::stage_matrix;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;
 use crate::ocp::formulation::problem::Formulation;
@@ -79,23 +79,23 @@ pub struct SolutionFactors<T> {
     pub(super) intervals: usize,
     /// `K`, and factors of `M_uu`, of every interval.
     pub(super) gains: Vec<T>,
-    pub(super) controls: Vec<T>,
+    pub(super) control_factors: Vec<T>,
     /// `P` of every stage.
     pub(super) costs_to_go: Vec<T>,
     /// The rows of `[A B]` of every interval.
     pub(super) dynamics: Vec<T>,
     /// How many pivots of controls are negative.
-    pub(super) negative: usize,
-    pub(super) border: Border<T>,
-    pub(super) problem: Parameters<T>,
-    pub(super) column: Column<T>,
+    pub(super) negative_pivots: usize,
+    pub(super) bordered_system: BorderedSystem<T>,
+    pub(super) parameter_derivatives: KktParameterDerivatives<T>,
+    pub(super) direction: KktDirection<T>,
     /// `∂V/∂x₀`, and the Hessian of the value.
     pub(super) gradient: Vec<T>,
-    pub(super) of_start: Vec<T>,
-    pub(super) cross: Vec<T>,
-    pub(super) square: Vec<T>,
+    pub(super) hessian_x0: Vec<T>,
+    pub(super) hessian_x0_p: Vec<T>,
+    pub(super) hessian_p: Vec<T>,
     pub(super) adjoint: Vec<T>,
-    pub(super) weak: usize,
+    pub(super) weakly_active: usize,
     pub(super) work: Vec<T>,
 }
 
@@ -112,20 +112,20 @@ impl<T: Real> SolutionFactors<T> {
             dims,
             intervals: n,
             gains: zeros(n * nu * nx)?,
-            controls: zeros(n * nu * nu)?,
+            control_factors: zeros(n * nu * nu)?,
             costs_to_go: zeros((n + 1) * nx * nx)?,
             dynamics: zeros(n * nx * (nx + nu))?,
-            negative: 0,
-            border: Border::default(),
-            problem: Parameters::new::<P>(n)?,
-            column: Column::new(dims, n)?,
+            negative_pivots: 0,
+            bordered_system: BorderedSystem::default(),
+            parameter_derivatives: KktParameterDerivatives::new::<P>(n)?,
+            direction: KktDirection::new(dims, n)?,
             gradient: zeros(nx)?,
-            of_start: zeros(nx * nx)?,
-            cross: zeros(nx * np)?,
-            square: zeros(np * np)?,
+            hessian_x0: zeros(nx * nx)?,
+            hessian_x0_p: zeros(nx * np)?,
+            hessian_p: zeros(np * np)?,
             adjoint: zeros(np)?,
-            weak: 0,
-            work: zeros(work(nx, nu))?,
+            weakly_active: 0,
+            work: zeros(work_len(nx, nu))?,
         })
     }
 
@@ -134,7 +134,7 @@ impl<T: Real> SolutionFactors<T> {
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.dims;
-        block(&self.gains, stage, nu * nx)
+        stage_matrix(&self.gains, stage, nu * nx)
     }
 
     /// How many bounds have neither a slack nor a multiplier above `ε^¼` (1e-4 in double
@@ -142,24 +142,24 @@ impl<T: Real> SolutionFactors<T> {
     /// smoothed.
     #[must_use]
     pub fn weakly_active(&self) -> usize {
-        self.weak
+        self.weakly_active
     }
 
     /// `∂V/∂x₀`, `NX`; empty where the initial state is free.
     #[must_use]
     pub fn value_gradient_x0(&self) -> &[T] {
-        part(&self.gradient, 0, self.given())
+        part(&self.gradient, 0, self.given_initial_states())
     }
 
     /// `∂V/∂p`, `NP`.
     #[must_use]
     pub fn value_gradient_p(&self) -> &[T] {
-        &self.problem.slopes_of_value
+        &self.parameter_derivatives.value_gradient
     }
 
     /// How many elements of the first state are given: all, or none.
-    pub(super) fn given(&self) -> usize {
-        if self.border.is_free() { 0 } else { self.dims[0] }
+    pub(super) fn given_initial_states(&self) -> usize {
+        if self.bordered_system.has_free_initial_state() { 0 } else { self.dims[0] }
     }
     /// Columns of `P` of a stage.
     pub(super) fn cost_to_go(&self, k: usize) -> impl Iterator<Item = &[T]> {
@@ -167,19 +167,19 @@ impl<T: Real> SolutionFactors<T> {
         part(&self.costs_to_go, k * nx * nx, nx * nx).chunks_exact(nx.max(1))
     }
     /// Rows of `[A B]` of an interval.
-    pub(super) fn rows(&self, k: usize) -> impl Iterator<Item = &[T]> {
+    pub(super) fn dynamics_rows(&self, k: usize) -> impl Iterator<Item = &[T]> {
         let [nx, nu, _] = self.dims;
         part(&self.dynamics, k * nx * (nx + nu), nx * (nx + nu)).chunks_exact((nx + nu).max(1))
     }
     /// A column of `K` of an interval.
-    pub(super) fn gains(&self, k: usize, state: usize) -> &[T] {
+    pub(super) fn gain_column(&self, k: usize, state: usize) -> &[T] {
         let [nx, nu, _] = self.dims;
         part(&self.gains, (k * nx + state) * nu, nu)
     }
 }
 
 /// How many numbers `P [A B]`, `M`, a gradient and a state take.
-const fn work(nx: usize, nu: usize) -> usize {
+const fn work_len(nx: usize, nu: usize) -> usize {
     let size = nx + nu;
     nx * size + size * size + size + nx
 }

@@ -14,17 +14,17 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 /// A symmetric matrix of `n` unknowns, column after column, both triangles.
-pub(super) struct Gram<T> {
+pub(super) struct GramMatrix<T> {
     n: usize,
     pub data: Vec<T>,
 }
 
-impl<T: Real> Gram<T> {
+impl<T: Real> GramMatrix<T> {
     pub fn new(n: usize) -> Result<Self, OcpError> {
         Ok(Self { n, data: zeros(n * n)? })
     }
     /// Adds `factor (a bᵀ + b aᵀ) / 2`.
-    pub fn add(&mut self, factor: T, a: &[T], b: &[T]) {
+    pub fn add_symmetric_product(&mut self, factor: T, a: &[T], b: &[T]) {
         let half = T::from_f64(0.5) * factor;
         for ((column, &x), &y) in self.data.chunks_exact_mut(self.n.max(1)).zip(a).zip(b) {
             axpy(half * y, a, column);
@@ -47,7 +47,7 @@ impl<T: Real> Gram<T> {
         Ok(result)
     }
     /// Eigenvalues, each with its eigenvector (Jacobi's method).
-    pub fn eigen(mut self) -> Result<Vec<(T, Vec<T>)>, OcpError> {
+    pub fn eigenpairs(mut self) -> Result<Vec<(T, Vec<T>)>, OcpError> {
         let n = self.n;
         let mut vectors = zeros(n * n)?;
         (0..n).for_each(|i| add(&mut vectors, i * n + i, T::ONE));
@@ -59,8 +59,8 @@ impl<T: Real> Gram<T> {
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// `Zᵀ H Z`
-    pub(super) fn information(&self, unknowns: &Unknowns<T>) -> Result<Gram<T>, OcpError> {
-        let mut gram = Gram::new(unknowns.count())?;
+    pub(super) fn reduced_hessian(&self, unknowns: &Unknowns<T>) -> Result<GramMatrix<T>, OcpError> {
+        let mut gram = GramMatrix::new(unknowns.count())?;
         for (k, stage) in self.qp().stages().enumerate() {
             let view = stage.arrays();
             for j in 0..view.n {
@@ -68,7 +68,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                     let value = get(view.hessian, j * view.ld + i);
                     if value != T::ZERO {
                         let factor = if i == j { value } else { value + value };
-                        gram.add(factor, unknowns.row(k, i), unknowns.row(k, j));
+                        gram.add_symmetric_product(factor, unknowns.row(k, i), unknowns.row(k, j));
                     }
                 }
             }
@@ -78,19 +78,19 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
 
     /// `Σ c cᵀ` of the gradients of active constraints by the unknowns in their units, each of
     /// length one.
-    pub(super) fn active_constraints(
+    pub(super) fn active_constraint_gram(
         &self,
         unknowns: &Unknowns<T>,
         units: &[T],
-    ) -> Result<Gram<T>, OcpError> {
+    ) -> Result<GramMatrix<T>, OcpError> {
         let n = unknowns.count();
-        let mut gram = Gram::new(n)?;
+        let mut gram = GramMatrix::new(n)?;
         let mut row = zeros(n)?;
-        let mut take = |row: &mut [T]| {
+        let mut add_row = |row: &mut [T]| {
             row.iter_mut().zip(units).for_each(|(c, &unit)| *c = *c * unit);
             let square = dot(row, row);
             if square > T::ZERO {
-                gram.add(T::ONE / square, row, row);
+                gram.add_symmetric_product(T::ONE / square, row, row);
             }
             row.fill(T::ZERO);
         };
@@ -103,14 +103,14 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                 let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
                 if is_active(&stage.x_bounds(), i, x, multipliers) {
                     copy_common(&mut row, unknowns.row(k, i));
-                    take(&mut row);
+                    add_row(&mut row);
                 }
             }
             for (j, &u) in point.u.iter().enumerate() {
                 let multipliers = [get(point.u_lower, j), get(point.u_upper, j)];
                 if is_active(&stage.u_bounds(), j, u, multipliers) {
                     copy_common(&mut row, unknowns.row(k, nx + j));
-                    take(&mut row);
+                    add_row(&mut row);
                 }
             }
             for (g, (&lower, &upper)) in point.g_lower.iter().zip(point.g_upper).enumerate() {
@@ -120,14 +120,14 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
                     for (i, &factor) in column.iter().enumerate() {
                         axpy(factor, unknowns.row(k, i), &mut row);
                     }
-                    take(&mut row);
+                    add_row(&mut row);
                 }
             }
         }
         for i in marked_indices(qp.periodic()) {
             copy_common(&mut row, unknowns.row(0, i));
             axpy(-T::ONE, unknowns.row(self.intervals(), i), &mut row);
-            take(&mut row);
+            add_row(&mut row);
         }
         Ok(gram)
     }

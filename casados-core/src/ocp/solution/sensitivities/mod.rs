@@ -9,28 +9,28 @@
 //! | `covariance` | the covariance of an estimate, and what data say nothing of |
 //! | `unknowns`, `gram` | its unknowns, and the reduced Hessian over these |
 
-mod active;
-mod answers;
-mod border;
-mod column;
+mod bordered_system;
+mod bound_stiffness;
 mod covariance;
 mod derivatives;
 mod factors;
 mod gram;
+mod kkt_direction;
 mod parameters;
 mod recursion;
 pub(in crate::ocp) mod references;
+mod results;
 mod solve;
 mod unknowns;
 
 use crate::qp::element::get;
-pub use answers::{SolutionAdjoint, ValueHessian};
 pub use covariance::{Covariance, Unidentifiable};
 pub use factors::SolutionFactors;
+pub use results::{SolutionAdjoint, ValueHessian};
 
 use crate::ocp::formulation::error::{OcpError, Part};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::instance::{Initial, Ocp};
+use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Curvature;
@@ -111,73 +111,75 @@ impl<T: Real> Sensitivities<T> {
     #[must_use]
     pub fn dx(&self, stage: usize) -> &[T] {
         let [nx, _, _] = self.factors.dims;
-        block(&self.x, stage, nx * nx)
+        stage_matrix(&self.x, stage, nx * nx)
     }
     /// `du_k/dx₀`, `NU × NX`, column after column; zero where the initial state is free.
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.factors.dims;
-        block(&self.u, stage, nu * nx)
+        stage_matrix(&self.u, stage, nu * nx)
     }
     /// `dx_k/dp`, `NX × NP`, column after column.
     #[must_use]
     pub fn dx_dp(&self, stage: usize) -> &[T] {
         let [nx, _, np] = self.factors.dims;
-        block(&self.x_p, stage, nx * np)
+        stage_matrix(&self.x_p, stage, nx * np)
     }
     /// `du_k/dp`, `NU × NP`, column after column.
     #[must_use]
     pub fn du_dp(&self, stage: usize) -> &[T] {
         let [_, nu, np] = self.factors.dims;
-        block(&self.u_p, stage, nu * np)
+        stage_matrix(&self.u_p, stage, nu * np)
     }
 
-    fn by_initial_state(&mut self) {
+    fn differentiate_by_initial_state(&mut self) {
         let Self { factors, x, u, .. } = self;
         let ([nx, nu, _], n) = (factors.dims, factors.intervals);
-        let mut column = core::mem::take(&mut factors.column);
+        let mut direction = core::mem::take(&mut factors.direction);
         x.fill(T::ZERO);
         u.fill(T::ZERO);
-        for i in 0..factors.given() {
-            solve::solve_start(factors, i, &mut column);
+        for i in 0..factors.given_initial_states() {
+            solve::solve_initial_state(factors, i, &mut direction);
             for k in 0..=n {
-                copy_common(part_mut(x, (k * nx + i) * nx, nx), column.state(k));
-                copy_common(part_mut(u, (k * nx + i) * nu, nu), column.control(k));
+                copy_common(part_mut(x, (k * nx + i) * nx, nx), direction.state(k));
+                copy_common(part_mut(u, (k * nx + i) * nu, nu), direction.control(k));
             }
         }
-        factors.column = column;
+        factors.direction = direction;
     }
 
     /// A derivative that is not finite: the stage, which of `(x, u)` is differentiated by which of
     /// `(x₀, p)`, and its value.
-    fn not_finite(&self) -> Option<(usize, usize, usize, f64)> {
+    fn find_non_finite(&self) -> Option<(usize, usize, usize, f64)> {
         let [nx, nu, np] = self.factors.dims;
-        let all = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
+        let by_initial_state = [(&self.x, [0, nx], [0, nx]), (&self.u, [nx, nu], [0, nx])];
         let by_parameters = [(&self.x_p, [0, nx], [nx, np]), (&self.u_p, [nx, nu], [nx, np])];
-        all.into_iter().chain(by_parameters).find_map(|(list, [row, rows], [column, columns])| {
-            let index = list.iter().position(|value| !value.is_finite())?;
-            let (i, j) = (index % rows, index / rows % columns);
-            Some((index / (rows * columns), row + i, column + j, list.get(index)?.to_f64()))
-        })
+        by_initial_state.into_iter().chain(by_parameters).find_map(
+            |(list, [row, rows], [column, columns])| {
+                let index = list.iter().position(|value| !value.is_finite())?;
+                let (i, j) = (index % rows, index / rows % columns);
+                Some((index / (rows * columns), row + i, column + j, list.get(index)?.to_f64()))
+            },
+        )
     }
 
-    fn by_parameters(&mut self) {
+    fn differentiate_by_parameters(&mut self) {
         let Self { factors, x_p, u_p, .. } = self;
         let ([nx, nu, np], n) = (factors.dims, factors.intervals);
-        let mut column = core::mem::take(&mut factors.column);
+        let mut direction = core::mem::take(&mut factors.direction);
         for p in 0..np {
-            solve::solve_parameter(factors, p, &mut column);
+            solve::solve_parameter(factors, p, &mut direction);
             for k in 0..=n {
-                copy_common(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
-                copy_common(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
+                copy_common(part_mut(x_p, (k * np + p) * nx, nx), direction.state(k));
+                copy_common(part_mut(u_p, (k * np + p) * nu, nu), direction.control(k));
             }
         }
-        factors.column = column;
+        factors.direction = direction;
     }
 }
 
 /// The matrix of a stage; empty where there is none.
-fn block<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
+fn stage_matrix<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
     let begin = stage.checked_mul(length);
     let end = begin.and_then(|begin| begin.checked_add(length));
     begin.zip(end).and_then(|(begin, end)| matrices.get(begin..end)).unwrap_or_default()
@@ -200,9 +202,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         result: &mut Sensitivities<T>,
     ) -> Result<(), OcpError> {
         self.factorise(curvature, &mut result.factors)?;
-        result.by_initial_state();
-        result.by_parameters();
-        match result.not_finite() {
+        result.differentiate_by_initial_state();
+        result.differentiate_by_parameters();
+        match result.find_non_finite() {
             Some((stage, of, by, value)) => {
                 let Names { x, u, p, .. } = <P::Dynamics as Dynamics<T>>::NAMES;
                 let name = |names: &[&'static str], i: usize| names.get(i).copied().unwrap_or("");
@@ -224,12 +226,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// is of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian is not
     /// positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
-        self.is_uncoupled()?;
-        if self.initial == Initial::Free {
+        self.check_uncoupled()?;
+        if self.initial_state == InitialState::Free {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         self.prepare_factors(&mut result.factors)?;
-        result.factors.fill(self.qp.view(), &self.iterate, false)?;
+        result.factors.factorise_qp(self.qp.view(), &self.iterate, false)?;
         let Sensitivities { x, u, x_p, u_p, .. } = result;
         for derivatives in [x, u, x_p, u_p] {
             derivatives.fill(T::ZERO);

@@ -1,8 +1,8 @@
 //! The Riccati recursion of derivatives.
 
-use super::active::Springs;
-use super::column::solve;
+use super::bound_stiffness::BoundStiffness;
 use super::factors::SolutionFactors;
+use super::kkt_direction::solve_controls;
 use crate::linalg::{axpy, dot};
 use crate::ocp::formulation::error::OcpError;
 use crate::qp::element::{add, get, set};
@@ -13,7 +13,7 @@ use crate::scalar::Real;
 
 /// `∂V/∂x₀`: the derivative of the Lagrangian by the first state, without the multipliers that it
 /// has because it is given. Periodic states are those of the last stage, too.
-pub(super) fn gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(super) fn value_gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
     result: &mut [T],
@@ -21,29 +21,30 @@ pub(super) fn gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]
     let mut stages = qp.stages().zip(iterate.stages());
     let Some((stage, point)) = stages.next() else { return };
     for (i, slope) in result.iter_mut().enumerate() {
-        *slope = slope_of(&stage, &point, i);
+        *slope = lagrangian_derivative(&stage, &point, i);
     }
-    let (Some((stage, point)), Some(before)) = (stages.next_back(), iterate.stages().rev().nth(1)) else {
+    let (Some((stage, point)), Some(previous_point)) = (stages.next_back(), iterate.stages().rev().nth(1))
+    else {
         return;
     };
     for i in marked_indices(qp.periodic()) {
         let bounds = get(point.x_upper, i) - get(point.x_lower, i);
-        add(result, i, slope_of(&stage, &point, i) + bounds - get(before.dynamics, i));
+        add(result, i, lagrangian_derivative(&stage, &point, i) + bounds - get(previous_point.dynamics, i));
     }
 }
 
 /// The derivative by a variable of a stage of its cost, and of its constraints and the next state
 /// times their multipliers.
-fn slope_of<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> T {
+fn lagrangian_derivative<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> T {
     let view = stage.arrays();
     let v = point.x.iter().chain(point.u);
-    let curved = v.enumerate().fold(get(view.gradient, i), |sum, (j, &v)| {
+    let cost_derivative = v.enumerate().fold(get(view.gradient, i), |sum, (j, &v)| {
         sum + get(view.hessian, i.min(j) * view.ld + i.max(j)) * v
     });
     let mu = point.g_upper.iter().zip(point.g_lower).map(|(&upper, &lower)| upper - lower);
     let rows = view.matrix.chunks_exact(view.ld.max(1));
     rows.zip(point.dynamics.iter().copied().chain(mu))
-        .fold(curved, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
+        .fold(cost_derivative, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
 }
 
 /// `P_k`, `K_k` and the factors of `M_uu`, backwards. With `parameters`, what these change is
@@ -55,18 +56,18 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     factors: &mut SolutionFactors<T>,
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
-    springs: &mut Springs<T>,
-    parameters: bool,
+    stiffness: &mut BoundStiffness<T>,
+    with_parameters: bool,
 ) -> Result<(), OcpError> {
     let [nx, nu, _] = factors.dims;
     let (size, n) = (nx + nu, factors.intervals);
     let mut memory = core::mem::take(&mut factors.work);
-    factors.negative = 0;
+    factors.negative_pivots = 0;
     let (product, rest) = memory.split_at_mut_checked(nx * size).unwrap_or_default();
     let m = part_mut(rest, 0, size * size);
     let mut result = Ok(());
     for (k, (stage, point)) in qp.stages().zip(iterate.stages()).enumerate().rev() {
-        begin_stage(factors, m, [k, size], (&stage, &point), springs, parameters);
+        write_stage_hessian(factors, m, [k, size], (&stage, &point), stiffness, with_parameters);
         if k < n {
             let view = stage.arrays();
             for l in 0..nx {
@@ -75,12 +76,12 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let next = part(&factors.costs_to_go, (k + 1) * nx * nx, nx * nx);
             let dynamics = part(&factors.dynamics, k * nx * size, nx * size);
-            add_quadratic(m, product, next, dynamics, [nx, size]);
-            factors.border.take_rows(k, m);
-            let controls = part_mut(&mut factors.controls, k * nu * nu, nu * nu);
-            let allowed = factors.border.conditions() - factors.negative;
-            match eliminate(m, size, [nx, nu], controls, allowed) {
-                Ok(negative) => factors.negative += negative,
+            add_cost_to_go(m, product, next, dynamics, [nx, size]);
+            factors.bordered_system.extract_shared_control_rows(k, m);
+            let controls = part_mut(&mut factors.control_factors, k * nu * nu, nu * nu);
+            let max_negative = factors.bordered_system.condition_count() - factors.negative_pivots;
+            match factorise_controls(m, size, [nx, nu], controls, max_negative) {
+                Ok(negative) => factors.negative_pivots += negative,
                 Err((index, pivot)) => {
                     result = Err(OcpError::Qp(QpError::NotConvex { stage: k, index, pivot }));
                     break;
@@ -88,7 +89,7 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let gain = part_mut(&mut factors.gains, k * nu * nx, nu * nx);
             for (state, gain) in gain.chunks_exact_mut(nu.max(1)).enumerate() {
-                solve(controls, part(m, state * size + nx, nu), gain);
+                solve_controls(controls, part(m, state * size + nx, nu), gain);
             }
         }
         // P = M_xx + M_xu K
@@ -108,53 +109,53 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 }
 
 /// `M = H` and the springs of the bounds, its lower triangle, column after column.
-fn begin_stage<T: Real>(
+fn write_stage_hessian<T: Real>(
     factors: &mut SolutionFactors<T>,
     m: &mut [T],
     [k, size]: [usize; 2],
     (stage, point): (&Stage<'_, T>, &SolutionStage<'_, T>),
-    springs: &mut Springs<T>,
-    parameters: bool,
+    stiffness: &mut BoundStiffness<T>,
+    with_parameters: bool,
 ) {
     let view = stage.arrays();
-    let (here, ld) = (view.n, view.ld);
-    for j in 0..here {
-        for i in j..here {
+    let (variables, ld) = (view.n, view.ld);
+    for j in 0..variables {
+        for i in j..variables {
             set(m, j * size + i, get(view.hessian, j * ld + i));
         }
     }
     // The state that is given does not move in this way.
-    let states = if k == 0 && !factors.border.is_free() { &[] } else { point.x };
+    let states = if k == 0 && !factors.bordered_system.has_free_initial_state() { &[] } else { point.x };
     for (i, &x) in states.iter().enumerate() {
         let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
-        add(m, i * size + i, springs.both(&stage.x_bounds(), i, x, multipliers));
+        add(m, i * size + i, stiffness.stiffness_of_bound(&stage.x_bounds(), i, x, multipliers));
     }
     for (i, &u) in point.u.iter().enumerate() {
         let multipliers = [get(point.u_lower, i), get(point.u_upper, i)];
         let place = (point.x.len() + i) * (size + 1);
-        add(m, place, springs.both(&stage.u_bounds(), i, u, multipliers));
+        add(m, place, stiffness.stiffness_of_bound(&stage.u_bounds(), i, u, multipliers));
     }
     for (row, (&lower, &upper)) in point.g_lower.iter().zip(point.g_upper).enumerate() {
-        let c = part(view.matrix, (view.next + row) * ld, here);
+        let c = part(view.matrix, (view.next + row) * ld, variables);
         let (of_x, of_u) = c.split_at_checked(point.x.len()).unwrap_or_default();
         let value = dot(of_x, point.x) + dot(of_u, point.u);
-        let stiff = springs.both(&stage.g_bounds(), row, value, [lower, upper]);
-        if stiff == T::ZERO {
+        let row_stiffness = stiffness.stiffness_of_bound(&stage.g_bounds(), row, value, [lower, upper]);
+        if row_stiffness == T::ZERO {
             continue;
         }
         for (j, &factor) in c.iter().enumerate() {
-            for i in j..here {
-                add(m, j * size + i, stiff * get(c, i) * factor);
+            for i in j..variables {
+                add(m, j * size + i, row_stiffness * get(c, i) * factor);
             }
         }
-        if parameters {
-            factors.problem.constrain([k, row], stiff, c);
+        if with_parameters {
+            factors.parameter_derivatives.add_constraint([k, row], row_stiffness, c);
         }
     }
 }
 
 /// Adds `[A B]ᵀ P [A B]`: `P` is symmetric, and rows of `[A B]` lie side by side.
-fn add_quadratic<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[T], [nx, size]: [usize; 2]) {
+fn add_cost_to_go<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[T], [nx, size]: [usize; 2]) {
     product.fill(T::ZERO);
     for (i, row) in product.chunks_exact_mut(size.max(1)).enumerate() {
         for (l, ab) in dynamics.chunks_exact(size.max(1)).enumerate() {
@@ -172,12 +173,12 @@ fn add_quadratic<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[T
 
 /// Factors `L D Lᵀ` of `M_uu` and how many pivots are negative; the pivot that vanishes or is
 /// negative beyond those that are allowed, if there is one.
-fn eliminate<T: Real>(
+fn factorise_controls<T: Real>(
     m: &[T],
     size: usize,
     [nx, nu]: [usize; 2],
     factors: &mut [T],
-    allowed: usize,
+    max_negative: usize,
 ) -> Result<usize, (usize, f64)> {
     let at = |i: usize, j: usize| j * nu + i;
     let mut negative = 0;
@@ -189,7 +190,7 @@ fn eliminate<T: Real>(
     for j in 0..nu {
         let pivot = get(factors, at(j, j));
         negative += usize::from(pivot < T::ZERO);
-        let is_allowed = pivot > T::ZERO || (pivot < T::ZERO && negative <= allowed);
+        let is_allowed = pivot > T::ZERO || (pivot < T::ZERO && negative <= max_negative);
         if !is_allowed {
             return Err((j, pivot.to_f64()));
         }

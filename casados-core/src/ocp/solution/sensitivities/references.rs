@@ -3,10 +3,10 @@
 use super::factors::SolutionFactors;
 use crate::ocp::assembly::algebraic;
 use crate::ocp::formulation::error::{OcpError, Part};
-use crate::ocp::formulation::functions::cost::{At, Cost};
-use crate::ocp::formulation::functions::point::read;
+use crate::ocp::formulation::functions::cost::{Cost, CostContext};
+use crate::ocp::formulation::functions::node_evaluation::write_variables;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::{Node, split};
+use crate::ocp::formulation::instance::data::{Node, split_data};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::{StageDims, take_mut};
 use crate::scalar::Real;
@@ -15,13 +15,13 @@ use bytemuck::Zeroable;
 
 /// How many references a problem with so many intervals has: those of the stages, one after the
 /// other, then that of the end.
-pub(in crate::ocp) fn count<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
+pub(in crate::ocp) fn reference_count<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
     intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES
 }
 
 /// What is asked.
 #[derive(Clone, Copy)]
-enum Of<'a, T> {
+enum DifferentiatedQuantity<'a, T> {
     Value,
     Adjoint(&'a SolutionFactors<T>),
 }
@@ -65,7 +65,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         factors: &SolutionFactors<T>,
         to: &mut [T],
     ) -> Result<(), OcpError> {
-        self.by_references(Of::Adjoint(factors), to)
+        self.differentiate_by_references(DifferentiatedQuantity::Adjoint(factors), to)
     }
 
     /// `∂V/∂r` of the optimal value at the iterate, which must be a solution; as
@@ -74,28 +74,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// As [`Ocp::adjoint_by_references`].
     pub fn value_gradient_by_references(&mut self, to: &mut [T]) -> Result<(), OcpError> {
-        self.by_references(Of::Value, to)
+        self.differentiate_by_references(DifferentiatedQuantity::Value, to)
     }
 
-    fn by_references(&mut self, of: Of<'_, T>, mut to: &mut [T]) -> Result<(), OcpError> {
+    fn differentiate_by_references(
+        &mut self,
+        quantity: DifferentiatedQuantity<'_, T>,
+        mut to: &mut [T],
+    ) -> Result<(), OcpError> {
         let (intervals, free) = (self.intervals(), self.free.view());
-        let (expected, found) = (count::<P, T>(intervals), to.len());
+        let (expected, found) = (reference_count::<P, T>(intervals), to.len());
         if expected != found {
             return Err(OcpError::Length { part: Part::Reference, stage: 0, expected, found });
         }
         to.fill(T::ZERO);
         let layout = self.layout();
-        let data = split::<P, T>(self.data.as_mut(), layout);
+        let data = split_data::<P, T>(self.data.as_mut(), layout);
         let Problem { stage_cost, terminal_cost, running, .. } = self.problem.parts();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        for (k, at) in self.iterate.stages().enumerate() {
+        for (k, stage_point) in self.iterate.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, layout, k);
-            node.read::<P::Shape>(&mut point, &at, z, free);
+            let (z, dz) = algebraic::values_and_jacobian::<P::Shape, T>(data.algebraic, layout, k);
+            node.write_variables::<P::Shape>(&mut point, &stage_point, z, free);
             let mut direction = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-            if let Of::Adjoint(factors) = of {
-                let (x, u) = (factors.column.state(k), factors.column.control(k));
-                read::<P::Shape, T>(&mut direction, [x, &[], u, &[]], T::ZERO);
+            if let DifferentiatedQuantity::Adjoint(factors) = quantity {
+                let (x, u) = (factors.direction.state(k), factors.direction.control(k));
+                write_variables::<P::Shape, T>(&mut direction, [x, &[], u, &[]], T::ZERO);
                 let n = P::Shape::NX + P::Shape::NU;
                 let of_z = direction.as_mut().get_mut(2 * P::Shape::NX..).unwrap_or_default();
                 for (of_z, row) in of_z.iter_mut().zip(dz.chunks_exact(n.max(1))) {
@@ -103,13 +107,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     *of_z = products.fold(T::ZERO, |sum, product| sum + product);
                 }
             }
-            let place = At { stage: k, factor: node.factor, exact: true, from: &[] };
-            let direction = matches!(of, Of::Adjoint(_)).then_some(&direction);
+            let cost_context = CostContext { stage: k, factor: node.factor, exact: true, model_origin: &[] };
+            let direction = matches!(quantity, DifferentiatedQuantity::Adjoint(_)).then_some(&direction);
             if k < intervals {
                 let to = take_mut(&mut to, P::StageCost::REFERENCES);
-                stage_cost.refer((&point, direction), node.reference, place, to)?;
+                stage_cost.add_reference_derivatives(
+                    (&point, direction),
+                    node.reference,
+                    cost_context,
+                    to,
+                )?;
             } else {
-                terminal_cost.refer((&point, direction), node.reference, place, to)?;
+                terminal_cost.add_reference_derivatives(
+                    (&point, direction),
+                    node.reference,
+                    cost_context,
+                    to,
+                )?;
                 break;
             }
         }

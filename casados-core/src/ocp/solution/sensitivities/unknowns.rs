@@ -5,7 +5,7 @@ use crate::linalg::axpy;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::data::Layout;
-use crate::ocp::formulation::instance::{HeapOcp, Initial};
+use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::add;
 use crate::qp::{is_marked, marked_indices, part, part_mut, zeros};
@@ -28,28 +28,28 @@ impl<T: Real> Unknowns<T> {
     pub fn count(&self) -> usize {
         self.names.len()
     }
-    fn place(&self, stage: usize, index: usize) -> usize {
+    fn row_start(&self, stage: usize, index: usize) -> usize {
         let [nx, nu, _] = self.dims;
         (stage * (nx + nu) + index) * self.count()
     }
     pub fn row(&self, stage: usize, index: usize) -> &[T] {
-        part(&self.rows, self.place(stage, index), self.count())
+        part(&self.rows, self.row_start(stage, index), self.count())
     }
 
     /// Those of a problem that has been linearised.
     pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let Layout { intervals, free, .. } = ocp.layout();
+        let Layout { intervals, free_count: free, .. } = ocp.layout();
         let (nx, nu) = (P::Shape::NX, free + P::Shape::NU);
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
         let qp = ocp.qp();
         let mut names = Vec::new();
-        if ocp.initial == Initial::Free {
-            names.extend(known.x.iter().map(|&name| (name, 0)));
+        if ocp.initial_state == InitialState::Free {
+            names.extend(model_names.x.iter().map(|&name| (name, 0)));
         }
         let is_shared = |j: usize| is_marked(qp.shared(), j);
         let name = |j: usize| match j.checked_sub(free) {
-            None => ocp.name_of_free(j),
-            Some(j) => known.u.get(j).copied().unwrap_or_default(),
+            None => ocp.free_parameter_name(j),
+            Some(j) => model_names.u.get(j).copied().unwrap_or_default(),
         };
         names.extend(marked_indices(qp.shared()).map(|j| (name(j), 0)));
         for k in 0..intervals {
@@ -57,30 +57,30 @@ impl<T: Real> Unknowns<T> {
         }
         let count = names.len();
         let rows = zeros((intervals + 1) * (nx + nu) * count)?;
-        let mut all = Self { dims: [nx, nu, intervals], names, rows };
-        let first = if ocp.initial == Initial::Free { nx } else { 0 };
+        let mut unknowns = Self { dims: [nx, nu, intervals], names, rows };
+        let first = if ocp.initial_state == InitialState::Free { nx } else { 0 };
         for i in 0..first {
-            let place = all.place(0, i) + i;
-            add(&mut all.rows, place, T::ONE);
+            let place = unknowns.row_start(0, i) + i;
+            add(&mut unknowns.rows, place, T::ONE);
         }
         // Free parameters are there at the last stage too.
         for w in 0..free {
-            let place = all.place(intervals, nx + w) + first + w;
-            add(&mut all.rows, place, T::ONE);
+            let place = unknowns.row_start(intervals, nx + w) + first + w;
+            add(&mut unknowns.rows, place, T::ONE);
         }
         let shared = marked_indices(qp.shared()).count();
-        let mut own = first + shared;
+        let mut next_own = first + shared;
         for (k, stage) in qp.stages().enumerate().take(intervals) {
-            let mut joint = first;
+            let mut next_shared = first;
             for j in 0..nu {
-                let unknown = if is_shared(j) { &mut joint } else { &mut own };
-                let place = all.place(k, nx + j) + *unknown;
+                let unknown = if is_shared(j) { &mut next_shared } else { &mut next_own };
+                let place = unknowns.row_start(k, nx + j) + *unknown;
                 *unknown += 1;
-                add(&mut all.rows, place, T::ONE);
+                add(&mut unknowns.rows, place, T::ONE);
             }
             let view = stage.arrays();
             let (before, behind) =
-                all.rows.split_at_mut_checked((k + 1) * (nx + nu) * count).unwrap_or_default();
+                unknowns.rows.split_at_mut_checked((k + 1) * (nx + nu) * count).unwrap_or_default();
             let here = part(before, k * (nx + nu) * count, (nx + nu) * count);
             for i in 0..nx {
                 let next = part_mut(behind, i * count, count);
@@ -90,6 +90,6 @@ impl<T: Real> Unknowns<T> {
                 }
             }
         }
-        Ok(all)
+        Ok(unknowns)
     }
 }

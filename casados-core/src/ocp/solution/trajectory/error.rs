@@ -78,11 +78,11 @@ impl fmt::Display for TrajectoryError {
             }
             Self::Unknown { model, name, known } => {
                 write!(f, "the solution of `{model}` has no `{name}`: it has")?;
-                list(f, known)
+                write_names(f, known)
             }
             Self::Ambiguous { name, found } => {
                 write!(f, "`{name}` is ambiguous, it matches")?;
-                list(f, found)
+                write_names(f, found)
             }
             Self::Length { name, found, expected } => write!(
                 f,
@@ -99,7 +99,7 @@ impl fmt::Display for TrajectoryError {
     }
 }
 
-fn list(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
+fn write_names(f: &mut fmt::Formatter<'_>, names: &[String]) -> fmt::Result {
     for (i, name) in names.iter().enumerate() {
         let comma = if i == 0 { "" } else { "," };
         write!(f, "{comma} `{name}`")?;

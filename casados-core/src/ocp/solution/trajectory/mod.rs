@@ -10,19 +10,19 @@
 //! | `series` | one quantity over time |
 //! | `violations` | which bounds a trajectory is beyond |
 
-mod between;
-mod collect;
 mod csv;
+mod dense_solution;
 mod error;
+mod from_iterate;
 #[cfg(feature = "serde")]
 mod read;
 mod restore;
 mod series;
 mod violations;
 
-pub(in crate::ocp) use collect::names;
 pub use csv::Csv;
 pub use error::TrajectoryError;
+pub(in crate::ocp) use from_iterate::constraint_names;
 pub use series::{Kind, Series};
 pub use violations::Violation;
 
@@ -85,7 +85,7 @@ pub struct Trajectory<T = f64> {
 
 impl<T: Real> Trajectory<T> {
     /// Of a model, with the unit of its times.
-    pub(in crate::ocp) fn of_series(
+    pub(in crate::ocp) fn from_series(
         (model, time_unit): (&str, &str),
         times: Vec<T>,
         series: Vec<Series<T>>,
@@ -138,14 +138,14 @@ impl<T: Real> Trajectory<T> {
             self.time_unit = unit.into();
             return Ok(self);
         }
-        let mut meant = self.series.iter_mut().filter(|series| series.is_meant(name)).peekable();
-        if meant.peek().is_none() {
-            drop(meant);
+        let mut matching_series = self.series.iter_mut().filter(|series| series.matches(name)).peekable();
+        if matching_series.peek().is_none() {
+            drop(matching_series);
             // The error that lists the names.
             self.get(name)?;
             return Ok(self);
         }
-        meant.for_each(|series| series.unit = unit.into());
+        matching_series.for_each(|series| series.unit = unit.into());
         Ok(self)
     }
 
@@ -175,8 +175,8 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// [`TrajectoryError::Unknown`], [`TrajectoryError::Ambiguous`]
     pub fn get(&self, name: &str) -> Result<&Series<T>, TrajectoryError> {
-        let kind = self.series.iter().find(|series| series.is_meant(name)).map(|series| series.kind);
-        self.find(name, |series| kind.is_none_or(|kind| series.kind == kind))
+        let kind = self.series.iter().find(|series| series.matches(name)).map(|series| series.kind);
+        self.find_series(name, |series| kind.is_none_or(|kind| series.kind == kind))
     }
 
     /// Everything of a kind at one of the times, as a struct of the model; `None` where there is
@@ -211,19 +211,23 @@ impl<T: Real> Trajectory<T> {
         R::from_slice(&values?)
     }
 
-    fn of(&self, name: &str, kind: Kind) -> Result<&Series<T>, TrajectoryError> {
-        self.find(name, |series| series.kind == kind)
+    fn series_of_kind(&self, name: &str, kind: Kind) -> Result<&Series<T>, TrajectoryError> {
+        self.find_series(name, |series| series.kind == kind)
     }
 
-    fn find(&self, name: &str, among: impl Fn(&Series<T>) -> bool) -> Result<&Series<T>, TrajectoryError> {
-        let candidates = || self.series.iter().filter(|series| among(series));
-        let mut found = candidates().filter(|series| series.is_meant(name));
+    fn find_series(
+        &self,
+        name: &str,
+        is_candidate: impl Fn(&Series<T>) -> bool,
+    ) -> Result<&Series<T>, TrajectoryError> {
+        let candidates = || self.series.iter().filter(|series| is_candidate(series));
+        let mut found = candidates().filter(|series| series.matches(name));
         let names = |series: &Series<T>| series.name.clone();
         match (found.next(), found.next()) {
             (Some(series), None) => Ok(series),
             (Some(_), Some(_)) => Err(TrajectoryError::Ambiguous {
                 name: name.into(),
-                found: candidates().filter(|series| series.is_meant(name)).map(names).collect(),
+                found: candidates().filter(|series| series.matches(name)).map(names).collect(),
             }),
             (None, _) => Err(TrajectoryError::Unknown {
                 model: self.model.clone(),
@@ -238,7 +242,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn state(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::State)?.values)
+        Ok(&self.series_of_kind(name, Kind::State)?.values)
     }
 
     /// An algebraic state at every point but the last.
@@ -246,7 +250,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn algebraic(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Algebraic)?.values)
+        Ok(&self.series_of_kind(name, Kind::Algebraic)?.values)
     }
 
     /// A control at every point but the last; one that is linear in intervals at every point.
@@ -254,7 +258,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn control(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Control)?.values)
+        Ok(&self.series_of_kind(name, Kind::Control)?.values)
     }
 
     /// The rate of a linear control in every interval: `du` of `u`.
@@ -262,7 +266,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn rate(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Rate)?.values)
+        Ok(&self.series_of_kind(name, Kind::Rate)?.values)
     }
 
     /// An integral from the start to every node.
@@ -270,7 +274,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn integral(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Integral)?.values)
+        Ok(&self.series_of_kind(name, Kind::Integral)?.values)
     }
 
     /// A parameter at every node.
@@ -278,7 +282,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn parameter(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Parameter)?.values)
+        Ok(&self.series_of_kind(name, Kind::Parameter)?.values)
     }
 
     /// An output of the path constraints at every node but the last.
@@ -286,7 +290,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn constraint(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Path)?.values)
+        Ok(&self.series_of_kind(name, Kind::Path)?.values)
     }
 
     /// An output of the terminal constraints.
@@ -294,7 +298,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn terminal(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Terminal)?.values)
+        Ok(&self.series_of_kind(name, Kind::Terminal)?.values)
     }
 
     /// A path constraint or a bounded variable at a point inside of every interval, a part of it:
@@ -303,7 +307,7 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn inside(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::Inside)?.values)
+        Ok(&self.series_of_kind(name, Kind::Inside)?.values)
     }
 
     /// `λ_upper − λ_lower` of the bounds of a state, control or constraint at every node that has
@@ -321,6 +325,6 @@ impl<T: Real> Trajectory<T> {
     /// # Errors
     /// As [`Trajectory::get`].
     pub fn costate(&self, name: &str) -> Result<&[T], TrajectoryError> {
-        Ok(&self.of(name, Kind::State)?.costates)
+        Ok(&self.series_of_kind(name, Kind::State)?.costates)
     }
 }

@@ -1,10 +1,10 @@
 //! A trajectory as the iterate of a problem, or as its guess.
 
-use super::collect::names;
+use super::from_iterate::constraint_names;
 use super::{Kind, Series, Trajectory, TrajectoryError};
 use crate::ocp::formulation::functions::dynamics::Dynamics;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::instance::data::node_rows;
+use crate::ocp::formulation::instance::data::node_row_count;
 use crate::ocp::formulation::problem::Formulation;
 use crate::qp::element::{get, set};
 use crate::qp::{SolutionStageMut, StageDims};
@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// Where values and multipliers of a kind are in a stage: values, `λ` of both sides.
-type Places<T> = for<'a, 'b> fn(&'b mut SolutionStageMut<'a, T>) -> [&'b mut [T]; 3];
+type StageAccess<T> = for<'a, 'b> fn(&'b mut SolutionStageMut<'a, T>) -> [&'b mut [T]; 3];
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes a trajectory the iterate, with its multipliers: a run that starts warm goes on from
@@ -25,14 +25,18 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// in the last case.
     pub fn restore(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
         let intervals = self.intervals();
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
-        let of_rows: Places<T> = |stage| [&mut [], &mut *stage.g_lower, &mut *stage.g_upper];
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
+        let row_access: StageAccess<T> = |stage| [&mut [], &mut *stage.g_lower, &mut *stage.g_upper];
         let list = |names: &[&str]| names.iter().map(|&name| name.into()).collect::<Vec<String>>();
-        let kinds: [(Kind, Vec<String>, Places<T>); 4] = [
-            (Kind::State, list(known.x), |stage| [&mut *stage.x, &mut *stage.x_lower, &mut *stage.x_upper]),
-            (Kind::Control, list(known.u), |stage| [&mut *stage.u, &mut *stage.u_lower, &mut *stage.u_upper]),
-            (Kind::Path, names::<P::Path, _, T>().collect(), of_rows),
-            (Kind::Terminal, names::<P::Terminal, _, T>().collect(), of_rows),
+        let kinds: [(Kind, Vec<String>, StageAccess<T>); 4] = [
+            (Kind::State, list(model_names.x), |stage| {
+                [&mut *stage.x, &mut *stage.x_lower, &mut *stage.x_upper]
+            }),
+            (Kind::Control, list(model_names.u), |stage| {
+                [&mut *stage.u, &mut *stage.u_lower, &mut *stage.u_upper]
+            }),
+            (Kind::Path, constraint_names::<P::Path, _, T>().collect(), row_access),
+            (Kind::Terminal, constraint_names::<P::Terminal, _, T>().collect(), row_access),
         ];
         // All is found before anything is written.
         let mut found = Vec::new();
@@ -45,34 +49,34 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let of_kind = trajectory.series.iter().filter(|series| series.kind == kind);
             let of_kind: Vec<_> = of_kind.collect();
             for (index, name) in names.into_iter().enumerate() {
-                let called = match kind {
-                    Kind::State => known.kind_of_state(index),
-                    Kind::Control if known.linear_state(index).is_some() => Kind::Rate,
+                let series_kind = match kind {
+                    Kind::State => model_names.state_kind(index),
+                    Kind::Control if model_names.linear_state(index).is_some() => Kind::Rate,
                     kind => kind,
                 };
                 // Functions that are there twice have the same names, in the same order.
                 let series = match of_kind.get(index).filter(|series| series.name == name) {
                     Some(&series) => series,
-                    None => trajectory.of(&name, called)?,
+                    None => trajectory.series_of_kind(&name, series_kind)?,
                 };
                 let costates = if kind == Kind::State { intervals } else { 0 };
-                has(series, [count, count, count, costates])?;
+                check_lengths(series, [count, count, count, costates])?;
                 let index = if kind == Kind::Control { self.free.count() + index } else { index };
                 found.push((index, first, series, places));
             }
         }
-        for index in 0..self.layout().inner {
-            let at_node = self.inner.row::<P>(index).is_none_or(|row| row.point() == 0);
+        for index in 0..self.layout().inner_rows {
+            let at_node = self.inner_points.row::<P>(index).is_none_or(|row| row.point() == 0);
             let kind = if at_node { Kind::Algebraic } else { Kind::Inside };
-            let series = trajectory.of(&self.inside_name(index).0, kind)?;
-            has(series, [intervals, intervals, intervals, 0])?;
-            found.push((node_rows::<P, T>() + index, 0, series, of_rows));
+            let series = trajectory.series_of_kind(&self.inner_row_name_and_unit(index).0, kind)?;
+            check_lengths(series, [intervals, intervals, intervals, 0])?;
+            found.push((node_row_count::<P, T>() + index, 0, series, row_access));
         }
         let mut free = Vec::new();
-        for (parameter, &name) in known.p.iter().enumerate() {
-            if let Some(w) = self.free.view().of(parameter) {
-                let series = trajectory.of(name, Kind::Parameter)?;
-                has(
+        for (parameter, &name) in model_names.p.iter().enumerate() {
+            if let Some(w) = self.free.view().index_of(parameter) {
+                let series = trajectory.series_of_kind(name, Kind::Parameter)?;
+                check_lengths(
                     series,
                     [intervals + 1, series.lower_multipliers.len(), series.upper_multipliers.len(), 0],
                 )?;
@@ -80,7 +84,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         for (w, series) in free {
-            self.write_free(w, get(&series.values, 0));
+            self.write_free_parameter(w, get(&series.values, 0));
             if let Some(first) = self.iterate.stage_mut(0) {
                 set(first.u_lower, w, get(&series.lower_multipliers, 0));
                 set(first.u_upper, w, get(&series.upper_multipliers, 0));
@@ -100,8 +104,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
             }
         }
-        self.copy_start();
-        self.has_algebraic = false;
+        self.update_initial_state_copies();
+        self.algebraic_is_current = false;
         self.check_iterate()?;
         Ok(self)
     }
@@ -139,41 +143,44 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn guess_from(&mut self, trajectory: &Trajectory<T>) -> Result<&mut Self, TrajectoryError> {
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
-        let all = |names: &[&str], kind| {
-            names.iter().map(|&name| trajectory.of(name, kind)).collect::<Result<Vec<_>, _>>()
+        let model_names = <P::Dynamics as Dynamics<T>>::NAMES;
+        let all_series = |names: &[&str], kind| {
+            names.iter().map(|&name| trajectory.series_of_kind(name, kind)).collect::<Result<Vec<_>, _>>()
         };
-        let own = known.x.get(..known.own_states()).unwrap_or_default();
-        let controls: Vec<&str> = (0..known.u.len()).map(|control| known.control(control)).collect();
-        let (states, controls) = (all(own, Kind::State)?, all(&controls, Kind::Control)?);
+        let model_states = model_names.x.get(..model_names.model_state_count()).unwrap_or_default();
+        let controls: Vec<&str> =
+            (0..model_names.u.len()).map(|control| model_names.control_name(control)).collect();
+        let (states, controls) =
+            (all_series(model_states, Kind::State)?, all_series(&controls, Kind::Control)?);
         let (mut x, mut u) = (Vec::new(), Vec::new());
         for k in 0..=self.intervals() {
-            let unit = if self.free.view().end().is_some() { trajectory.end_time() } else { T::ONE };
+            let unit =
+                if self.free.view().end_time_index().is_some() { trajectory.end_time() } else { T::ONE };
             let time = unit * get(self.times(), k);
-            let (before, along) = place(&trajectory.times, time);
+            let (before, fraction) = interval_and_fraction(&trajectory.times, time);
             x.clear();
             u.clear();
             let linear = |series: &Series<T>| {
-                let [start, end] = [before, before + 1].map(|k| held(&series.values, k));
-                start + along * (end - start)
+                let [start, end] = [before, before + 1].map(|k| element_or_last(&series.values, k));
+                start + fraction * (end - start)
             };
             x.extend(states.iter().map(|series| linear(series)));
-            if k < self.intervals() || !known.linear.is_empty() {
+            if k < self.intervals() || !model_names.linear.is_empty() {
                 // One that is linear has a value at the last time too.
                 let is_linear = |series: &Series<T>| series.values.len() == trajectory.times.len();
                 let at = |series: &&Series<T>| match is_linear(series) {
                     true => linear(series),
-                    false => held(&series.values, before),
+                    false => element_or_last(&series.values, before),
                 };
                 u.extend(controls.iter().map(at));
             }
             self.guess_stage(k, &x, &u)?;
         }
-        for (parameter, &name) in known.p.iter().enumerate() {
-            if let Some(w) = self.free.view().of(parameter)
-                && let Ok(series) = trajectory.of(name, Kind::Parameter)
+        for (parameter, &name) in model_names.p.iter().enumerate() {
+            if let Some(w) = self.free.view().index_of(parameter)
+                && let Ok(series) = trajectory.series_of_kind(name, Kind::Parameter)
             {
-                self.write_free(w, get(&series.values, 0));
+                self.write_free_parameter(w, get(&series.values, 0));
             }
         }
         self.check_iterate()?;
@@ -183,21 +190,22 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
 /// The point at or before a time, but for rounding, and which part of the way to the next one it
 /// is.
-fn place<T: Real>(times: &[T], time: T) -> (usize, T) {
-    let rounding = T::from_f64(16.0 * T::EPSILON) * (held(times, times.len()) - held(times, 0));
+fn interval_and_fraction<T: Real>(times: &[T], time: T) -> (usize, T) {
+    let rounding =
+        T::from_f64(16.0 * T::EPSILON) * (element_or_last(times, times.len()) - element_or_last(times, 0));
     let next = times.iter().position(|&other| time + rounding < other).unwrap_or(times.len());
     let before = next.saturating_sub(1);
-    let (start, end) = (held(times, before), held(times, before + 1));
+    let (start, end) = (element_or_last(times, before), element_or_last(times, before + 1));
     if start < time && start < end { (before, (time - start) / (end - start)) } else { (before, T::ZERO) }
 }
 
 /// An element, or the last one.
-fn held<T: Real>(values: &[T], index: usize) -> T {
+fn element_or_last<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).or(values.last()).copied().unwrap_or(T::ZERO)
 }
 
 /// Whether a series has these lengths: values, multipliers of both sides, costates.
-fn has<T>(series: &Series<T>, expected: [usize; 4]) -> Result<(), TrajectoryError> {
+fn check_lengths<T>(series: &Series<T>, expected: [usize; 4]) -> Result<(), TrajectoryError> {
     let Series { values, lower_multipliers, upper_multipliers, costates, name, .. } = series;
     let lists = [values, lower_multipliers, upper_multipliers, costates].map(Vec::len);
     match lists.into_iter().zip(expected).find(|(found, expected)| found != expected) {

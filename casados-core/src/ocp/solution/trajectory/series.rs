@@ -126,7 +126,7 @@ impl<T: Real> Series<T> {
     }
 
     /// Whether a name means it; of `x.cart.position` also `cart.position`.
-    pub(super) fn is_meant(&self, name: &str) -> bool {
+    pub(super) fn matches(&self, name: &str) -> bool {
         let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
         name_matches(name, &self.name) || field.is_some_and(|field| name_matches(name, field))
     }
@@ -141,24 +141,24 @@ impl<T: Real> Series<T> {
     /// the slack, which has a penalty.
     #[must_use]
     pub fn violations(&self) -> Vec<T> {
-        let beyond = |k: usize, value: T| {
-            let below = side(&self.lower, k).map_or(T::ZERO, |bound| bound - value);
-            let above = side(&self.upper, k).map_or(T::ZERO, |bound| value - bound);
-            let most = if below < above { above } else { below };
-            if T::ZERO < most { most } else { T::ZERO }
+        let violation = |k: usize, value: T| {
+            let below = bound_at(&self.lower, k).map_or(T::ZERO, |bound| bound - value);
+            let above = bound_at(&self.upper, k).map_or(T::ZERO, |bound| value - bound);
+            let larger = if below < above { above } else { below };
+            if T::ZERO < larger { larger } else { T::ZERO }
         };
-        self.values.iter().enumerate().map(|(k, &value)| beyond(k, value)).collect()
+        self.values.iter().enumerate().map(|(k, &value)| violation(k, value)).collect()
     }
 
     /// Whether a value is at one of its bounds, to a distance, or beyond it.
     #[must_use]
     pub fn is_active(&self, index: usize, distance: T) -> bool {
         let Some(&value) = self.values.get(index) else { return false };
-        side(&self.lower, index).is_some_and(|bound| value - bound <= distance)
-            || side(&self.upper, index).is_some_and(|bound| bound - value <= distance)
+        bound_at(&self.lower, index).is_some_and(|bound| value - bound <= distance)
+            || bound_at(&self.upper, index).is_some_and(|bound| bound - value <= distance)
     }
 }
 
-pub(super) fn side<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
+pub(super) fn bound_at<T: Real>(bounds: &[Option<T>], index: usize) -> Option<T> {
     bounds.get(index).copied().flatten()
 }

@@ -1,7 +1,7 @@
 //! Which bounds a trajectory is beyond, by name.
 
 use super::Trajectory;
-use super::series::side;
+use super::series::bound_at;
 use crate::qp::Side;
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -62,9 +62,11 @@ impl<T: Real> Trajectory<T> {
         let mut found = Vec::new();
         for series in &self.series {
             for (k, &value) in series.values.iter().enumerate() {
-                let below = side(&series.lower, k).map(|bound| (Side::Lower, bound - value));
-                let over = side(&series.upper, k).map(|bound| (Side::Upper, value - bound));
-                for (side, amount) in below.into_iter().chain(over).filter(|(_, amount)| *amount > above) {
+                let below_lower = bound_at(&series.lower, k).map(|bound| (Side::Lower, bound - value));
+                let above_upper = bound_at(&series.upper, k).map(|bound| (Side::Upper, value - bound));
+                for (side, amount) in
+                    below_lower.into_iter().chain(above_upper).filter(|(_, amount)| *amount > above)
+                {
                     found.push(Violation { name: &series.name, stage: series.first + k, side, amount });
                 }
             }

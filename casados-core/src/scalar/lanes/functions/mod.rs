@@ -98,13 +98,19 @@ mod one {
 
 /// Replaces the lanes of `result` that are rare by what the function of one number gives.
 #[inline(always)]
-fn repair<D: Double>(rare: D::Mask, a: D, result: &mut D, f: fn(f64) -> f64) {
+fn replace_special_lanes<D: Double>(rare: D::Mask, a: D, result: &mut D, f: fn(f64) -> f64) {
     D::replace(rare, [a, a], result, f, |f, a, _| f(a));
 }
 
 /// The same for a function of two numbers.
 #[inline(always)]
-fn repair2<D: Double>(rare: D::Mask, a: D, b: D, result: &mut D, f: fn(f64, f64) -> f64) {
+fn replace_special_lanes_of_two<D: Double>(
+    rare: D::Mask,
+    a: D,
+    b: D,
+    result: &mut D,
+    f: fn(f64, f64) -> f64,
+) {
     D::replace(rare, [a, b], result, f, |f, a, b| f(a, b));
 }
 

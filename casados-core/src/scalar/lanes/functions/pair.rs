@@ -7,66 +7,66 @@ use crate::scalar::{fast_two_sum, two_sum};
 
 /// `high + low`, with `|low|` at most a few units in the last place of `high`.
 #[derive(Clone, Copy)]
-pub struct Pair<D> {
+pub struct DoubleDouble<D> {
     pub high: D,
     pub low: D,
 }
 
 /// A constant.
 #[inline(always)]
-pub fn c<D: Double>(value: f64) -> D {
+pub fn constant<D: Double>(value: f64) -> D {
     D::from_f64(value)
 }
 
 /// A bit pattern.
 #[inline(always)]
-pub fn pattern<D: Double>(bits: u64) -> D {
+pub fn bit_pattern<D: Double>(bits: u64) -> D {
     D::from_f64(f64::from_bits(bits))
 }
 
 /// `a + b`, exactly.
 #[inline(always)]
-pub fn sum<D: Double>(a: D, b: D) -> Pair<D> {
+pub fn exact_sum<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     let [high, low] = two_sum(a, b);
-    Pair { high, low }
+    DoubleDouble { high, low }
 }
 
 /// `a + b`, exactly where `a = 0` or `|a| ≥ |b|`.
 #[inline(always)]
-pub fn ordered_sum<D: Double>(a: D, b: D) -> Pair<D> {
+pub fn exact_ordered_sum<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     let [high, low] = fast_two_sum(a, b);
-    Pair { high, low }
+    DoubleDouble { high, low }
 }
 
 /// `a b`, exactly as long as nothing overflows or underflows.
 #[inline(always)]
-pub fn product<D: Double>(a: D, b: D) -> Pair<D> {
+pub fn exact_product<D: Double>(a: D, b: D) -> DoubleDouble<D> {
     let high = a * b;
     if D::FUSED {
-        return Pair { high, low: a.mul_add(b, -high) };
+        return DoubleDouble { high, low: a.mul_add(b, -high) };
     }
-    let ((a1, a2), (b1, b2)) = (halves(a), halves(b));
-    Pair { high, low: a2 * b2 - (((high - a1 * b1) - a2 * b1) - a1 * b2) }
+    let ((a1, a2), (b1, b2)) = (veltkamp_split(a), veltkamp_split(b));
+    DoubleDouble { high, low: a2 * b2 - (((high - a1 * b1) - a2 * b1) - a1 * b2) }
 }
 
 /// The upper and the lower half of the digits (Veltkamp).
 #[inline(always)]
-fn halves<D: Double>(a: D) -> (D, D) {
-    let scaled = a * c(134_217_729.0);
+fn veltkamp_split<D: Double>(a: D) -> (D, D) {
+    let scaled = a * constant(134_217_729.0);
     let upper = scaled - (scaled - a);
     (upper, a - upper)
 }
 
-impl<D: Double> Pair<D> {
+impl<D: Double> DoubleDouble<D> {
     /// `a` itself.
     #[inline(always)]
     pub fn new(a: D) -> Self {
-        Self { high: a, low: c(0.0) }
+        Self { high: a, low: constant(0.0) }
     }
     /// A constant and what it lacks.
     #[inline(always)]
     pub fn constant(high: f64, low: f64) -> Self {
-        Self { high: c(high), low: c(low) }
+        Self { high: constant(high), low: constant(low) }
     }
     /// `mask ? a : b`
     #[inline(always)]
@@ -80,8 +80,8 @@ impl<D: Double> Pair<D> {
     }
     /// The same number with the least `low`.
     #[inline(always)]
-    pub fn tidy(self) -> Self {
-        ordered_sum(self.high, self.low)
+    pub fn normalise(self) -> Self {
+        exact_ordered_sum(self.high, self.low)
     }
     /// Another sign.
     #[inline(always)]
@@ -91,37 +91,37 @@ impl<D: Double> Pair<D> {
     /// The sum.
     #[inline(always)]
     pub fn add(self, other: Self) -> Self {
-        let s = sum(self.high, other.high);
-        Self { high: s.high, low: s.low + (self.low + other.low) }.tidy()
+        let s = exact_sum(self.high, other.high);
+        Self { high: s.high, low: s.low + (self.low + other.low) }.normalise()
     }
     /// The sum, where `self` is zero or the larger one.
     #[inline(always)]
     pub fn add_smaller(self, other: Self) -> Self {
-        let s = ordered_sum(self.high, other.high);
+        let s = exact_ordered_sum(self.high, other.high);
         Self { high: s.high, low: s.low + (self.low + other.low) }
     }
     /// The product.
     #[inline(always)]
     pub fn mul(self, other: Self) -> Self {
-        let p = product(self.high, other.high);
+        let p = exact_product(self.high, other.high);
         Self { high: p.high, low: self.low.mul_add(other.high, self.high.mul_add(other.low, p.low)) }
     }
     /// The product with a double.
     #[inline(always)]
     pub fn scale(self, factor: D) -> Self {
-        let p = product(self.high, factor);
+        let p = exact_product(self.high, factor);
         Self { high: p.high, low: self.low.mul_add(factor, p.low) }
     }
     /// The product with a power of two, or with ½ or such.
     #[inline(always)]
-    pub fn shift(self, power: D) -> Self {
+    pub fn scale_by_power_of_two(self, power: D) -> Self {
         Self { high: self.high * power, low: self.low * power }
     }
     /// The quotient of a double.
     #[inline(always)]
     pub fn quotient(a: D, b: Self) -> Self {
         if D::FUSED {
-            let reciprocal = c::<D>(1.0) / b.high;
+            let reciprocal = constant::<D>(1.0) / b.high;
             let quotient = a * reciprocal;
             let rest = (-quotient).mul_add(b.low, (-quotient).mul_add(b.high, a));
             return Self { high: quotient, low: rest * reciprocal };
@@ -132,14 +132,14 @@ impl<D: Double> Pair<D> {
     #[inline(always)]
     pub fn div(self, other: Self) -> Self {
         // One division: the quotient may be off by two units, of which the rest knows.
-        let reciprocal = c::<D>(1.0) / other.high;
+        let reciprocal = constant::<D>(1.0) / other.high;
         let quotient = self.high * reciprocal;
         let rest = if D::FUSED {
             // The first product leaves less than a double has digits for.
             let rest = (-quotient).mul_add(other.high, self.high);
             (-quotient).mul_add(other.low, rest + self.low)
         } else {
-            let p = product(quotient, other.high);
+            let p = exact_product(quotient, other.high);
             ((self.high - p.high) - p.low) + (self.low - quotient * other.low)
         };
         Self { high: quotient, low: rest * reciprocal }
@@ -148,10 +148,10 @@ impl<D: Double> Pair<D> {
     #[inline(always)]
     pub fn sqrt(self) -> Self {
         let root = self.high.sqrt();
-        let p = product(root, root);
+        let p = exact_product(root, root);
         let rest = ((self.high - p.high) - p.low) + self.low;
         let low = rest / (root + root);
-        Self { high: root, low: D::select(root.eq(c(0.0)), root, low) }
+        Self { high: root, low: D::select(root.eq(constant(0.0)), root, low) }
     }
 }
 
@@ -159,9 +159,9 @@ impl<D: Double> Pair<D> {
 #[inline(always)]
 pub fn polynomial<D: Double, const K: usize>(x: D, coefficients: [f64; K]) -> D {
     let square = x * x;
-    let mut sums: [D; 2] = [c(coefficients[K - 1]), c(coefficients[K - 2])];
+    let mut sums: [D; 2] = [constant(coefficients[K - 1]), constant(coefficients[K - 2])];
     for k in (0..K - 2).rev() {
-        sums = [sums[1], sums[0].mul_add(square, c(coefficients[k]))];
+        sums = [sums[1], sums[0].mul_add(square, constant(coefficients[k]))];
     }
     sums[0].mul_add(x, sums[1])
 }

@@ -1,6 +1,6 @@
 //! Elementary functions of registers against references of 100 bits, and where they are special.
 
-use super::reference::{self, Function};
+use super::reference::{self, ReferenceFunction};
 use super::{cell, inside, on_every_register, same, specials};
 use crate::scalar::lanes::functions::{self, Call, Elementary};
 use crate::scalar::lanes::*;
@@ -33,7 +33,7 @@ struct Case<L> {
     name: &'static str,
     of_lanes: fn(L, L) -> L,
     of_one: fn(f64, f64) -> f64,
-    reference: Function,
+    reference: ReferenceFunction,
     argument: fn(&mut Random) -> (f64, f64),
     bound: f64,
 }
@@ -124,7 +124,7 @@ fn scaled(a: f64, n: i32) -> f64 {
 }
 
 /// The error of a result in units in the last place of the exact one, for a type of so many bits.
-fn error(result: f64, (exact, n): (reference::Long, i32), bits: i32) -> f64 {
+fn error(result: f64, (exact, n): (reference::DoubleDouble, i32), bits: i32) -> f64 {
     let unit = 2.0_f64.powi(exact.high.abs().log2().floor() as i32 + 1 - bits);
     (scaled(result, -n) - exact.high - exact.low).abs() / unit
 }
@@ -299,7 +299,7 @@ fn lanes_do_not_disturb_each_other() {
 }
 
 #[test]
-fn sine_and_cosine_together_are_what_they_are_alone() {
+fn sin_cos_equals_sin_and_cos() {
     macro_rules! check {
         ($name:ident, $single:ident, $($lanes:literal),*) => { $( {
             let mut random = Random(362436069);
@@ -363,7 +363,7 @@ fn assert_same_lanes<L: Lanes>(found: L, expected: L, argument: L) {
 /// an argument and a result, one with two of each. Registers are those that are all used, of four
 /// doubles such as have room for two in one as well, and one of each with a lane that is not used.
 #[test]
-fn those_together_are_what_each_is() {
+fn several_arguments_in_one_call() {
     macro_rules! all {
         ($register:ty: $($function:ident)*) => {
             $( at_once::<$register, _, _, _, 2>(functions::$function); at_once::<$register, _, _, _, 4>(functions::$function); )*

@@ -115,7 +115,7 @@ fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
 }
 
 /// `c − a b`, rounded once where the machine can.
-fn products<L: Lanes>(fused: bool) {
+fn check_fused_products<L: Lanes>(fused: bool) {
     inside::<L>(|| {
         let a = 1.0 + f64::EPSILON;
         let product = L::from_f64(1.0).subtract_product(L::from_f64(a), L::from_f64(1.0 - f64::EPSILON));
@@ -231,14 +231,14 @@ fn arithmetic_has_the_bits_of_single_numbers() {
 
 #[test]
 fn products_are_subtracted_with_one_rounding_where_the_machine_can() {
-    products::<F64x2<2>>(cfg!(target_arch = "aarch64"));
+    check_fused_products::<F64x2<2>>(cfg!(target_arch = "aarch64"));
     #[cfg(target_arch = "x86_64")]
     if is_there(Level::Avx2) {
-        products::<F64x4<3>>(true);
+        check_fused_products::<F64x4<3>>(true);
     }
     #[cfg(target_arch = "x86_64")]
     if is_there(Level::Avx512) {
-        products::<F64x8<5>>(true);
+        check_fused_products::<F64x8<5>>(true);
     }
 }
 
@@ -247,15 +247,15 @@ fn the_level_is_one_that_the_machine_has_and_the_limit_allows() {
     let widest = level();
     assert!(is_there(widest) && widest >= Level::Base);
     for lower in [Level::Base, Level::Single] {
-        limit(lower);
+        limit_level(lower);
         assert_eq!(level(), lower);
     }
-    limit(Level::Avx512);
+    limit_level(Level::Avx512);
     assert_eq!(level(), widest);
 }
 
 #[test]
-fn transposes() {
+fn transposition() {
     macro_rules! check {
         ($name:ident, $element:ident, $($n:literal),*) => { $(transposed::<$name<$n>>();)* };
     }
@@ -276,7 +276,7 @@ fn quotients_by_constants() {
 }
 
 #[test]
-fn coarse_numbers() {
+fn demoted_numbers() {
     macro_rules! check {
         ($name:ident, $element:ident, $($n:literal),*) => { $(demote::<$name<$n>>();)* };
     }

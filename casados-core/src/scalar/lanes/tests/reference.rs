@@ -6,7 +6,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `high + low`
 #[derive(Clone, Copy, Debug)]
-pub struct Long {
+pub struct DoubleDouble {
     pub high: f64,
     pub low: f64,
 }
@@ -15,25 +15,25 @@ pub struct Long {
 const PI_2: [f64; 3] = [core::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33];
 const LN_2_PARTS: [f64; 3] = [LN_2, 2.3190468138462996e-17, 5.707708438416212e-34];
 /// ln 10 to 106 bits, OEIS A002392
-const LN_10: Long = Long { high: core::f64::consts::LN_10, low: -2.1707562233822494e-16 };
+const LN_10: DoubleDouble = DoubleDouble { high: core::f64::consts::LN_10, low: -2.1707562233822494e-16 };
 
-pub fn long(high: f64) -> Long {
-    Long { high, low: 0.0 }
+pub fn double_double(high: f64) -> DoubleDouble {
+    DoubleDouble { high, low: 0.0 }
 }
 
-fn two_sum(a: f64, b: f64) -> Long {
+fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     let part = high - a;
-    Long { high, low: (a - (high - part)) + (b - part) }
+    DoubleDouble { high, low: (a - (high - part)) + (b - part) }
 }
 
-fn two_product(a: f64, b: f64) -> Long {
+fn two_product(a: f64, b: f64) -> DoubleDouble {
     let high = a * b;
-    Long { high, low: a.mul_add(b, -high) }
+    DoubleDouble { high, low: a.mul_add(b, -high) }
 }
 
 /// The sum of a few numbers, however they cancel: what every addition loses is added again.
-fn sum_of<const K: usize>(mut terms: [f64; K]) -> Long {
+fn accurate_sum<const K: usize>(mut terms: [f64; K]) -> DoubleDouble {
     for _ in 0..K {
         for i in 1..K {
             let s = two_sum(terms[i - 1], terms[i]);
@@ -44,7 +44,7 @@ fn sum_of<const K: usize>(mut terms: [f64; K]) -> Long {
     two_sum(terms[K - 1], rest)
 }
 
-impl Add for Long {
+impl Add for DoubleDouble {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         let (s, t) = (two_sum(self.high, other.high), two_sum(self.low, other.low));
@@ -52,37 +52,37 @@ impl Add for Long {
         two_sum(s.high, s.low + t.low)
     }
 }
-impl Neg for Long {
+impl Neg for DoubleDouble {
     type Output = Self;
     fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
 }
-impl Sub for Long {
+impl Sub for DoubleDouble {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
-impl Mul for Long {
+impl Mul for DoubleDouble {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let p = two_product(self.high, other.high);
         two_sum(p.high, p.low + (self.high * other.low + self.low * other.high))
     }
 }
-impl Div for Long {
+impl Div for DoubleDouble {
     type Output = Self;
     fn div(self, other: Self) -> Self {
         let first = self.high / other.high;
-        let rest = self - other * long(first);
+        let rest = self - other * double_double(first);
         let second = rest.high / other.high;
-        let rest = rest - other * long(second);
-        two_sum(first, second) + long(rest.high / other.high)
+        let rest = rest - other * double_double(second);
+        two_sum(first, second) + double_double(rest.high / other.high)
     }
 }
 
-impl Long {
+impl DoubleDouble {
     fn times_two_to_the(self, n: i32) -> Self {
         // In two steps: 2¹⁰²⁴ is no double.
         let (half, rest) = (2.0_f64.powi(n / 2), 2.0_f64.powi(n - n / 2));
@@ -92,8 +92,8 @@ impl Long {
         if self.high == 0.0 {
             return self;
         }
-        let root = long(self.high.sqrt());
-        (root + self / root) * long(0.5)
+        let root = double_double(self.high.sqrt());
+        (root + self / root) * double_double(0.5)
     }
     fn square(self) -> Self {
         self * self
@@ -101,66 +101,66 @@ impl Long {
 }
 
 /// `eᵃ − 1` for `|a| ≤ 1`: Taylor's series of a 512th, and `(1 + e)² − 1 = 2e + e²`.
-fn exp_m1_near(a: Long) -> Long {
+fn exp_m1_small(a: DoubleDouble) -> DoubleDouble {
     let r = a.times_two_to_the(-9);
-    let mut e = long(0.0);
+    let mut e = double_double(0.0);
     for k in (1..=14).rev() {
-        e = (long(1.0) + e) * r / long(f64::from(k));
+        e = (double_double(1.0) + e) * r / double_double(f64::from(k));
     }
     for _ in 0..9 {
-        e = long(2.0) * e + e.square();
+        e = double_double(2.0) * e + e.square();
     }
     e
 }
 
 /// `(e, n)` with `eᵃ = (1 + e) 2ⁿ`
-fn exp_parts(a: Long) -> (Long, i32) {
+fn exp_with_exponent(a: DoubleDouble) -> (DoubleDouble, i32) {
     let n = (a.high / LN_2).round();
     let [p, q, r] = LN_2_PARTS.map(|part| two_product(n, part));
-    let rest = sum_of([a.high, -p.high, a.low, -p.low, -q.high, -q.low, -r.high]);
-    (exp_m1_near(rest), n as i32)
+    let rest = accurate_sum([a.high, -p.high, a.low, -p.low, -q.high, -q.low, -r.high]);
+    (exp_m1_small(rest), n as i32)
 }
 
-fn exp_m1_long(a: Long) -> Long {
+fn exp_m1_long(a: DoubleDouble) -> DoubleDouble {
     if a.high.abs() < 1.0 {
-        return exp_m1_near(a);
+        return exp_m1_small(a);
     }
-    let (e, n) = exp_parts(a);
-    (long(1.0) + e).times_two_to_the(n) - long(1.0)
+    let (e, n) = exp_with_exponent(a);
+    (double_double(1.0) + e).times_two_to_the(n) - double_double(1.0)
 }
 
 /// `ln(1 + f)`: one step of Halley's method from what `f64` gives.
-fn ln_1p_long(f: Long) -> Long {
+fn ln_1p_long(f: DoubleDouble) -> DoubleDouble {
     if f.high > 1e9 {
-        return ln_long(long(1.0) + f);
+        return ln_long(double_double(1.0) + f);
     }
-    let start = long(f.high.ln_1p());
-    let c = f + exp_m1_long(-start) * (long(1.0) + f);
-    start + long(2.0) * c / (long(2.0) + c)
+    let start = double_double(f.high.ln_1p());
+    let c = f + exp_m1_long(-start) * (double_double(1.0) + f);
+    start + double_double(2.0) * c / (double_double(2.0) + c)
 }
 
-fn ln_long(a: Long) -> Long {
+fn ln_long(a: DoubleDouble) -> DoubleDouble {
     if (0.5..2.0).contains(&a.high) {
-        return ln_1p_long(a - long(1.0));
+        return ln_1p_long(a - double_double(1.0));
     }
-    let start = long(a.high.ln());
-    let (e, n) = exp_parts(-start);
-    let half = |a: Long| a.times_two_to_the(n / 2).times_two_to_the(n - n / 2);
-    let c = half(a * (long(1.0) + e)) - long(1.0);
-    start + long(2.0) * c / (long(2.0) + c)
+    let start = double_double(a.high.ln());
+    let (e, n) = exp_with_exponent(-start);
+    let half = |a: DoubleDouble| a.times_two_to_the(n / 2).times_two_to_the(n - n / 2);
+    let c = half(a * (double_double(1.0) + e)) - double_double(1.0);
+    start + double_double(2.0) * c / (double_double(2.0) + c)
 }
 
 /// `(sin a, cos a)` for `|a| < 10⁷`
-fn sin_cos_long(a: Long) -> (Long, Long) {
+fn sin_cos_long(a: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
     let n = (a.high / PI_2[0]).round();
     let [p, q, r] = PI_2.map(|part| two_product(n, part));
-    let rest = sum_of([a.high, -p.high, a.low, -p.low, -q.high, -q.low, -r.high]);
+    let rest = accurate_sum([a.high, -p.high, a.low, -p.low, -q.high, -q.low, -r.high]);
     let square = rest.square();
-    let (mut sin, mut cos) = (long(1.0), long(1.0));
+    let (mut sin, mut cos) = (double_double(1.0), double_double(1.0));
     for k in (1..=18).rev() {
         let k = f64::from(k);
-        sin = long(1.0) - sin * square / long(2.0 * k * (2.0 * k + 1.0));
-        cos = long(1.0) - cos * square / long(2.0 * k * (2.0 * k - 1.0));
+        sin = double_double(1.0) - sin * square / double_double(2.0 * k * (2.0 * k + 1.0));
+        cos = double_double(1.0) - cos * square / double_double(2.0 * k * (2.0 * k - 1.0));
     }
     sin = sin * rest;
     match n.rem_euclid(4.0) {
@@ -172,113 +172,121 @@ fn sin_cos_long(a: Long) -> (Long, Long) {
 }
 
 /// The angle of `(x, y)`: what `f64` gives, and the small angle that is left.
-fn angle(y: Long, x: Long) -> Long {
+fn angle(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble {
     let start = f64::atan2(y.high, x.high);
-    let (sin, cos) = sin_cos_long(long(start));
+    let (sin, cos) = sin_cos_long(double_double(start));
     let rest = (y * cos - x * sin) / (x * cos + y * sin);
-    long(start) + (rest - rest * rest.square() / long(3.0))
+    double_double(start) + (rest - rest * rest.square() / double_double(3.0))
 }
 
 /// A function of two numbers (of which most use one): `(value, n)` for the result `value · 2ⁿ`.
-pub type Function = fn(f64, f64) -> (Long, i32);
+pub type ReferenceFunction = fn(f64, f64) -> (DoubleDouble, i32);
 
-fn hyperbolic(a: f64, sign: f64) -> (Long, i32) {
-    let (e, n) = exp_parts(long(a.abs()));
-    let rising = long(1.0) + e;
+fn half_exponential_sum(a: f64, sign: f64) -> (DoubleDouble, i32) {
+    let (e, n) = exp_with_exponent(double_double(a.abs()));
+    let rising = double_double(1.0) + e;
     // Of |a| > 40, the falling exponential is less than the last bit.
-    let falling = if n < 60 { (long(1.0) / rising).times_two_to_the(-2 * n) } else { long(0.0) };
-    (rising + falling * long(sign), n - 1)
+    let falling =
+        if n < 60 { (double_double(1.0) / rising).times_two_to_the(-2 * n) } else { double_double(0.0) };
+    (rising + falling * double_double(sign), n - 1)
 }
 
-fn plain(value: Long) -> (Long, i32) {
+fn unscaled(value: DoubleDouble) -> (DoubleDouble, i32) {
     (value, 0)
 }
 
-pub fn cbrt(a: f64, _: f64) -> (Long, i32) {
-    let root = long(a.cbrt());
+pub fn cbrt(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let root = double_double(a.cbrt());
     let square = root.square();
-    plain(root - (square * root - long(a)) / (long(3.0) * square))
+    unscaled(root - (square * root - double_double(a)) / (double_double(3.0) * square))
 }
-pub fn exp(a: f64, _: f64) -> (Long, i32) {
-    let (e, n) = exp_parts(long(a));
-    (long(1.0) + e, n)
+pub fn exp(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let (e, n) = exp_with_exponent(double_double(a));
+    (double_double(1.0) + e, n)
 }
-pub fn exp2(a: f64, _: f64) -> (Long, i32) {
+pub fn exp2(a: f64, _: f64) -> (DoubleDouble, i32) {
     let n = a.round();
-    (long(1.0) + exp_m1_near(Long { high: LN_2, low: LN_2_PARTS[1] } * long(a - n)), n as i32)
+    (
+        double_double(1.0)
+            + exp_m1_small(DoubleDouble { high: LN_2, low: LN_2_PARTS[1] } * double_double(a - n)),
+        n as i32,
+    )
 }
-pub fn exp_m1(a: f64, _: f64) -> (Long, i32) {
-    if a > 100.0 { exp(a, 0.0) } else { plain(exp_m1_long(long(a))) }
+pub fn exp_m1(a: f64, _: f64) -> (DoubleDouble, i32) {
+    if a > 100.0 { exp(a, 0.0) } else { unscaled(exp_m1_long(double_double(a))) }
 }
-pub fn ln(a: f64, _: f64) -> (Long, i32) {
-    plain(ln_long(long(a)))
+pub fn ln(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(ln_long(double_double(a)))
 }
-pub fn ln_1p(a: f64, _: f64) -> (Long, i32) {
-    plain(ln_1p_long(long(a)))
+pub fn ln_1p(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(ln_1p_long(double_double(a)))
 }
-pub fn log2(a: f64, _: f64) -> (Long, i32) {
-    plain(ln_long(long(a)) / Long { high: LN_2, low: LN_2_PARTS[1] })
+pub fn log2(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(ln_long(double_double(a)) / DoubleDouble { high: LN_2, low: LN_2_PARTS[1] })
 }
-pub fn log10(a: f64, _: f64) -> (Long, i32) {
-    plain(ln_long(long(a)) / LN_10)
+pub fn log10(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(ln_long(double_double(a)) / LN_10)
 }
-pub fn sin(a: f64, _: f64) -> (Long, i32) {
-    plain(sin_cos_long(long(a)).0)
+pub fn sin(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(sin_cos_long(double_double(a)).0)
 }
-pub fn cos(a: f64, _: f64) -> (Long, i32) {
-    plain(sin_cos_long(long(a)).1)
+pub fn cos(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(sin_cos_long(double_double(a)).1)
 }
-pub fn tan(a: f64, _: f64) -> (Long, i32) {
-    let (sin, cos) = sin_cos_long(long(a));
-    plain(sin / cos)
+pub fn tan(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let (sin, cos) = sin_cos_long(double_double(a));
+    unscaled(sin / cos)
 }
-pub fn asin(a: f64, _: f64) -> (Long, i32) {
-    plain(angle(long(a), (long(1.0) - long(a).square()).sqrt()))
+pub fn asin(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(angle(double_double(a), (double_double(1.0) - double_double(a).square()).sqrt()))
 }
-pub fn acos(a: f64, _: f64) -> (Long, i32) {
-    plain(angle((long(1.0) - long(a).square()).sqrt(), long(a)))
+pub fn acos(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(angle((double_double(1.0) - double_double(a).square()).sqrt(), double_double(a)))
 }
-pub fn atan(a: f64, _: f64) -> (Long, i32) {
-    plain(angle(long(a), long(1.0)))
+pub fn atan(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(angle(double_double(a), double_double(1.0)))
 }
-pub fn atan2(y: f64, x: f64) -> (Long, i32) {
-    plain(angle(long(y), long(x)))
+pub fn atan2(y: f64, x: f64) -> (DoubleDouble, i32) {
+    unscaled(angle(double_double(y), double_double(x)))
 }
-pub fn sinh(a: f64, _: f64) -> (Long, i32) {
-    let sign = long(a.signum());
+pub fn sinh(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let sign = double_double(a.signum());
     if a.abs() < 1.0 {
-        let e = exp_m1_near(long(a.abs()));
-        return plain((e + e / (long(1.0) + e)) * long(0.5) * sign);
+        let e = exp_m1_small(double_double(a.abs()));
+        return unscaled((e + e / (double_double(1.0) + e)) * double_double(0.5) * sign);
     }
-    let (value, n) = hyperbolic(a, -1.0);
+    let (value, n) = half_exponential_sum(a, -1.0);
     (value * sign, n)
 }
-pub fn cosh(a: f64, _: f64) -> (Long, i32) {
-    hyperbolic(a, 1.0)
+pub fn cosh(a: f64, _: f64) -> (DoubleDouble, i32) {
+    half_exponential_sum(a, 1.0)
 }
-pub fn tanh(a: f64, _: f64) -> (Long, i32) {
+pub fn tanh(a: f64, _: f64) -> (DoubleDouble, i32) {
     if a.abs() > 50.0 {
-        return plain(long(a.signum()));
+        return unscaled(double_double(a.signum()));
     }
-    let e = exp_m1_long(long(2.0 * a));
-    plain(e / (e + long(2.0)))
+    let e = exp_m1_long(double_double(2.0 * a));
+    unscaled(e / (e + double_double(2.0)))
 }
-pub fn asinh(a: f64, _: f64) -> (Long, i32) {
-    let square = long(a).square();
-    let f = long(a.abs()) + square / (long(1.0) + (long(1.0) + square).sqrt());
-    plain(ln_1p_long(f) * long(a.signum()))
+pub fn asinh(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let square = double_double(a).square();
+    let f = double_double(a.abs()) + square / (double_double(1.0) + (double_double(1.0) + square).sqrt());
+    unscaled(ln_1p_long(f) * double_double(a.signum()))
 }
-pub fn acosh(a: f64, _: f64) -> (Long, i32) {
-    let t = long(a) - long(1.0);
-    plain(ln_1p_long(t + (t * (t + long(2.0))).sqrt()))
+pub fn acosh(a: f64, _: f64) -> (DoubleDouble, i32) {
+    let t = double_double(a) - double_double(1.0);
+    unscaled(ln_1p_long(t + (t * (t + double_double(2.0))).sqrt()))
 }
-pub fn atanh(a: f64, _: f64) -> (Long, i32) {
-    plain(ln_1p_long(long(2.0) * long(a) / (long(1.0) - long(a))) * long(0.5))
+pub fn atanh(a: f64, _: f64) -> (DoubleDouble, i32) {
+    unscaled(
+        ln_1p_long(double_double(2.0) * double_double(a) / (double_double(1.0) - double_double(a)))
+            * double_double(0.5),
+    )
 }
-pub fn hypot(a: f64, b: f64) -> (Long, i32) {
-    plain((long(a).square() + long(b).square()).sqrt())
+pub fn hypot(a: f64, b: f64) -> (DoubleDouble, i32) {
+    unscaled((double_double(a).square() + double_double(b).square()).sqrt())
 }
-pub fn powf(a: f64, b: f64) -> (Long, i32) {
-    let (e, n) = exp_parts(ln_long(long(a)) * long(b));
-    (long(1.0) + e, n)
+pub fn powf(a: f64, b: f64) -> (DoubleDouble, i32) {
+    let (e, n) = exp_with_exponent(ln_long(double_double(a)) * double_double(b));
+    (double_double(1.0) + e, n)
 }

@@ -3,9 +3,9 @@
 //! With the QP written at the iterate, one step of the interior point of QPs from there is a step
 //! of that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
-use super::lengths::{Lengths, reading};
-use super::work::Work;
-use crate::ocp::assembly::units::Sizes;
+use super::dimensions::{KktDimensions, reading_options};
+use super::workspace::Workspace;
+use crate::ocp::assembly::units::ProblemScaling;
 use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
 use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, copy_common, take_mut};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
@@ -16,17 +16,18 @@ use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
 pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     qp: QpView<'a, T>,
-    lengths: &Lengths,
+    lengths: &KktDimensions,
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
 ) -> Result<Iterate<'a, T>, QpError> {
-    let mut numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
+    let mut numbers = numbers.at_least(lengths.number_count, QpField::Numbers)?;
     let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
-    let first = if lengths.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
-    let mut sides = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
-    let Sizes { force, least } = lengths.sizes;
-    sides.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
-    let mut iterate = Iterate::new(qp, &lengths.extent, first, sides, &mut numbers);
+    let first =
+        if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
+    let mut inequalities = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
+    let ProblemScaling { objective_unit: force, min_row_unit: least } = lengths.scaling;
+    inequalities.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
+    let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
     iterate.sides.free_step = take_mut(&mut numbers, lengths.counts.equations);
     Ok(iterate)
 }
@@ -38,14 +39,14 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
 /// As [`kkt_view`].
 pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
     qp: QpView<'a, T>,
-    lengths: &Lengths,
+    lengths: &KktDimensions,
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
     units: &[T],
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
-    iterate.sides.list(qp, &reading(qp));
-    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.sizes.least));
+    iterate.sides.list(qp, &reading_options(qp));
+    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.scaling.min_row_unit));
     for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
         let ratio = least / at(units, row);
         *stiffness = ratio * ratio;
@@ -55,30 +56,34 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
 
 /// Evaluates all residuals at a point with its multipliers `π`: the largest of those of the
 /// problem, and what violations of soft bounds cost.
-pub(in crate::ocp::nlp::ipm) fn evaluate<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn evaluate_residuals<T: Real>(
     iterate: &mut Iterate<'_, T>,
     at: &mut SolutionView<'_, T>,
 ) -> (Residuals, f64) {
     iterate.load_point(at);
     iterate.load_initial_state();
     let mut found = Default::default();
-    T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics, found: &mut found });
+    T::run_precompiled::<EvaluateResidualsCompiled>(EvaluateResiduals {
+        iterate,
+        pi: at.dynamics,
+        output: &mut found,
+    });
     found
 }
 
-struct Evaluate<'r, 'a, 's, T> {
+struct EvaluateResiduals<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
-    found: &'s mut (Residuals, f64),
+    output: &'s mut (Residuals, f64),
 }
 
 compiled!(/// See [`Evaluate`].
-EvaluateCompiled: Evaluate<'r, 'a, 's, T>);
+EvaluateResidualsCompiled: EvaluateResiduals<'r, 'a, 's, T>);
 
-impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, pi, found } = self;
+        let Self { iterate, pi, output: found } = self;
         iterate.evaluate_with_costates::<E>(pi);
         let penalties = iterate.sides.violation_cost().to_f64();
         *found = (iterate.point_residuals::<E>().into(), penalties);
@@ -86,18 +91,18 @@ impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
 }
 
 /// Residuals of what is linear in the QP at the iterate, after its constants have changed.
-pub(in crate::ocp::nlp::ipm) fn evaluate_values<T: Real>(iterate: &mut Iterate<'_, T>) {
-    T::compiled::<EvaluateValuesCompiled>(EvaluateValues { iterate });
+pub(in crate::ocp::nlp::ipm) fn evaluate_linear_residuals<T: Real>(iterate: &mut Iterate<'_, T>) {
+    T::run_precompiled::<EvaluateLinearResidualsCompiled>(EvaluateLinearResiduals { iterate });
 }
 
-struct EvaluateValues<'r, 'a, T> {
+struct EvaluateLinearResiduals<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
 }
 
 compiled!(/// See [`EvaluateValues`].
-EvaluateValuesCompiled: EvaluateValues<'r, 'a, T>);
+EvaluateLinearResidualsCompiled: EvaluateLinearResiduals<'r, 'a, T>);
 
-impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
+impl<T: Real> Registers<T> for EvaluateLinearResiduals<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.evaluate_values::<E>();
@@ -109,7 +114,7 @@ impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
 /// # Errors
 /// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
-pub(in crate::ocp::nlp::ipm) fn step<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn newton_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     mu: T,
     delta: T,
@@ -138,11 +143,17 @@ fn solve_newton<T: Real>(
     factor: bool,
 ) -> Result<(), QpError> {
     let mut result = Ok(());
-    T::compiled::<StepCompiled>(Step { iterate, mu, corrected, factor, result: &mut result });
+    T::run_precompiled::<NewtonStepCompiled>(NewtonStep {
+        iterate,
+        mu,
+        corrected,
+        factor,
+        result: &mut result,
+    });
     result
 }
 
-struct Step<'r, 'a, T> {
+struct NewtonStep<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
     mu: T,
     corrected: bool,
@@ -151,9 +162,9 @@ struct Step<'r, 'a, T> {
 }
 
 compiled!(/// See [`Step`].
-StepCompiled: Step<'r, 'a, T>);
+NewtonStepCompiled: NewtonStep<'r, 'a, T>);
 
-impl<T: Real> Registers<T> for Step<'_, '_, T> {
+impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, mu, corrected, factor, result } = self;
@@ -179,19 +190,19 @@ const REFINEMENT_GAIN: f64 = 0.5;
 ///
 /// # Errors
 /// Those of the recursion.
-pub(in crate::ocp::nlp::ipm) fn refine<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
     units: &[T],
 ) -> Result<(), QpError> {
-    let mut last = f64::INFINITY;
+    let mut last_residual = f64::INFINITY;
     for _ in 0..MAX_REFINEMENTS {
-        let left = lack_of_equations(iterate, units);
-        if !(left > 0.0 && left <= REFINEMENT_GAIN * last) {
+        let residual = largest_equation_residual(iterate, units);
+        if !(residual > 0.0 && residual <= REFINEMENT_GAIN * last_residual) {
             break;
         }
-        last = left;
+        last_residual = residual;
         let mut result = Ok(());
-        T::compiled::<RefineCompiled>(Refine { iterate, result: &mut result });
+        T::run_precompiled::<RefineStepCompiled>(RefineStep { iterate, result: &mut result });
         result?;
     }
     Ok(())
@@ -199,27 +210,31 @@ pub(in crate::ocp::nlp::ipm) fn refine<T: Real>(
 
 /// The largest residual of an equation after the full step, in units; zero if none is more than
 /// rounding.
-fn lack_of_equations<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
-    let sides = &iterate.sides;
+fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
+    let inequalities = &iterate.sides;
     let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
-    let residuals = sides.equations.iter().zip(&*sides.equation_residual);
+    let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
     let lacks = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();
-        let lacks = (residual + at(iterate.step, row)).abs().to_f64();
-        if lacks <= rounding * (unit + at(iterate.v, row).abs().to_f64()) { 0.0 } else { lacks / unit }
+        let residual_after_step = (residual + at(iterate.step, row)).abs().to_f64();
+        if residual_after_step <= rounding * (unit + at(iterate.v, row).abs().to_f64()) {
+            0.0
+        } else {
+            residual_after_step / unit
+        }
     });
     lacks.fold(0.0, f64::max)
 }
 
-struct Refine<'r, 'a, T> {
+struct RefineStep<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
     result: &'r mut Result<(), QpError>,
 }
 
 compiled!(/// See [`Refine`].
-RefineCompiled: Refine<'r, 'a, T>);
+RefineStepCompiled: RefineStep<'r, 'a, T>);
 
-impl<T: Real> Registers<T> for Refine<'_, '_, T> {
+impl<T: Real> Registers<T> for RefineStep<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, result } = self;
@@ -229,30 +244,30 @@ impl<T: Real> Registers<T> for Refine<'_, '_, T> {
 
 /// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
 /// back bit by bit.
-pub(in crate::ocp::nlp::ipm) fn dynamics_after<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn costates_after_step<T: Real>(
     iterate: &mut Iterate<'_, T>,
-    work: &mut Work<'_, T>,
+    work: &mut Workspace<'_, T>,
     delta: T,
 ) {
-    copy_common(work.rows, iterate.v);
-    copy_common(work.slacks, iterate.sides.multiplier);
-    copy_common(work.free_step, iterate.sides.free);
+    copy_common(work.row_values, iterate.v);
+    copy_common(work.trial_slacks, iterate.sides.multiplier);
+    copy_common(work.saved_free_step, iterate.sides.free);
     iterate.proximal = delta;
-    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
-    copy_common(iterate.v, work.rows);
-    copy_common(iterate.sides.multiplier, work.slacks);
-    copy_common(iterate.sides.free, work.free_step);
+    T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
+    copy_common(iterate.v, work.row_values);
+    copy_common(iterate.sides.multiplier, work.trial_slacks);
+    copy_common(iterate.sides.free, work.saved_free_step);
 }
 
-struct After<'r, 'a, 's, T> {
+struct CostatesAfterStep<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
 }
 
 compiled!(/// See [`After`].
-AfterCompiled: After<'r, 'a, 's, T>);
+CostatesAfterStepCompiled: CostatesAfterStep<'r, 'a, 's, T>);
 
-impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for CostatesAfterStep<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.step_without_slacks();
@@ -261,7 +276,7 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
 }
 
 /// The weight of the identity in place of the Hessian in [`least_squares`], in units of forces.
-const IDENTITY: f64 = 1e8;
+const IDENTITY_HESSIAN_WEIGHT: f64 = 1e8;
 
 /// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
 /// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are
@@ -270,35 +285,41 @@ const IDENTITY: f64 = 1e8;
 ///
 /// # Errors
 /// Those of the recursion.
-pub(in crate::ocp::nlp::ipm) fn least_squares<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate: &mut Iterate<'_, T>,
-    work: &mut Work<'_, T>,
-    force: f64,
+    work: &mut Workspace<'_, T>,
+    objective_unit: f64,
 ) -> Result<(), QpError> {
-    let identity = T::from_f64(IDENTITY * force);
-    copy_common(work.slacks, iterate.sides.multiplier);
-    general_multipliers(iterate, |_| T::ZERO);
+    let identity = T::from_f64(IDENTITY_HESSIAN_WEIGHT * objective_unit);
+    copy_common(work.trial_slacks, iterate.sides.multiplier);
+    set_general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
-    T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, identity, result: &mut result });
+    T::run_precompiled::<LeastSquaresMultipliersCompiled>(LeastSquaresMultipliers {
+        iterate,
+        pi: work.next_costates,
+        identity,
+        result: &mut result,
+    });
     result?;
-    let sides = &mut iterate.sides;
-    copy_common(work.hessian_multipliers, sides.multiplier_step);
-    sides.multiplier_step.fill(T::ZERO);
-    general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
-    copy_common(work.rows, iterate.v);
+    let inequalities = &mut iterate.sides;
+    copy_common(work.hessian_multipliers, inequalities.multiplier_step);
+    inequalities.multiplier_step.fill(T::ZERO);
+    set_general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
+    copy_common(work.row_values, iterate.v);
     iterate.proximal = identity;
-    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
-    copy_common(iterate.v, work.rows);
-    copy_common(iterate.sides.multiplier, work.slacks);
+    T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
+    copy_common(iterate.v, work.row_values);
+    copy_common(iterate.sides.multiplier, work.trial_slacks);
     Ok(())
 }
 
 /// Sets multipliers of sides of general constraints.
-fn general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
-    let sides = &mut iterate.sides;
-    let count = sides.counts.sides();
-    let general = is_general::<T>(iterate.qp, sides.rows);
-    for (i, (multiplier, general)) in sides.multiplier.iter_mut().zip(general).enumerate().take(count) {
+fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
+    let inequalities = &mut iterate.sides;
+    let count = inequalities.counts.sides();
+    let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);
+    for (i, (multiplier, general)) in inequalities.multiplier.iter_mut().zip(general).enumerate().take(count)
+    {
         if general {
             *multiplier = value(i);
         }
@@ -306,7 +327,7 @@ fn general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usi
 }
 
 /// Whether rows, first those of lower and then those of upper sides, belong to general constraints.
-pub(in crate::ocp::nlp::ipm) fn is_general<'a, T: Real>(
+pub(in crate::ocp::nlp::ipm) fn general_constraint_flags<'a, T: Real>(
     qp: QpView<'a, T>,
     rows: &'a [u32],
 ) -> impl Iterator<Item = bool> + 'a {
@@ -323,7 +344,7 @@ pub(in crate::ocp::nlp::ipm) fn is_general<'a, T: Real>(
     })
 }
 
-struct LeastSquares<'r, 'a, 's, T> {
+struct LeastSquaresMultipliers<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
     identity: T,
@@ -331,9 +352,9 @@ struct LeastSquares<'r, 'a, 's, T> {
 }
 
 compiled!(/// See [`LeastSquares`].
-LeastSquaresCompiled: LeastSquares<'r, 'a, 's, T>);
+LeastSquaresMultipliersCompiled: LeastSquaresMultipliers<'r, 'a, 's, T>);
 
-impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for LeastSquaresMultipliers<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, pi, identity, result } = self;
@@ -341,15 +362,15 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
         iterate.evaluate_with_costates::<E>(pi);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;
-        let sides = &mut iterate.sides;
-        sides.residual.fill(T::ZERO);
-        sides.equation_residual.fill(T::ZERO);
-        sides.free_step.fill(T::ZERO);
-        sides.target.fill(T::ZERO);
-        sides.inverse.fill(T::ZERO);
-        let general = is_general::<T>(iterate.qp, sides.rows);
+        let inequalities = &mut iterate.sides;
+        inequalities.residual.fill(T::ZERO);
+        inequalities.equation_residual.fill(T::ZERO);
+        inequalities.free_step.fill(T::ZERO);
+        inequalities.target.fill(T::ZERO);
+        inequalities.inverse.fill(T::ZERO);
+        let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);
         for ((inverse, multiplier), general) in
-            sides.inverse.iter_mut().zip(&mut *sides.multiplier).zip(general)
+            inequalities.inverse.iter_mut().zip(&mut *inequalities.multiplier).zip(general)
         {
             if general {
                 (*inverse, *multiplier) = (T::ONE, identity);

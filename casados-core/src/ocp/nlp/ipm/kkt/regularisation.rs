@@ -1,7 +1,7 @@
 //! Newton's step, with as much on the diagonal (`δ_w`) as makes the reduced Hessian positive
 //! definite.
 
-use super::newton::step;
+use super::newton::newton_step;
 use crate::qp::QpError;
 use crate::qp::interior::Iterate;
 use crate::scalar::Real;
@@ -9,7 +9,7 @@ use crate::scalar::Real;
 /// The first `δ_w`, as all of them in units of forces over the squares of those of variables.
 const FIRST_HESSIAN_PERTURBATION: f64 = 1e-4;
 /// With this on the diagonal, directions without curvature may be left alone.
-const FLAT: f64 = 1e-6;
+const VANISHING_PIVOT_PERTURBATION: f64 = 1e-6;
 /// `δ_w` is never less.
 const MIN_HESSIAN_PERTURBATION: f64 = 1e-20;
 /// Where this is not enough nothing is.
@@ -20,23 +20,23 @@ const PERTURB_INC_FACT: f64 = 8.0;
 /// The first `δ_w` of an iteration is this part of the last one.
 const PERTURB_DEC_FACT: f64 = 1.0 / 3.0;
 /// A step that goes no farther than this part of what bounds leave of it is short,
-const SHORT: f64 = 0.1;
+const SHORT_STEP_FRACTION: f64 = 0.1;
 /// and after so many in sequence the next ones are damped,
 const SHORT_STEPS_BEFORE_DAMPING: usize = 8;
 /// at first by this, as `δ_w` is,
 const FIRST_DAMPING: f64 = 1e-3;
 /// and not at all any more where this does not help.
-const MOST_DAMPING: f64 = 1e2;
+const MAX_DAMPING: f64 = 1e2;
 
 /// What is remembered of `δ_w`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::ocp::nlp) struct Regularisation {
     /// The last one that curvature asked for.
-    last: f64,
+    last_delta: f64,
     /// No less is taken while steps are short.
     damping: f64,
     /// So many steps in sequence were short.
-    short: usize,
+    short_steps: usize,
 }
 
 impl Regularisation {
@@ -44,20 +44,20 @@ impl Regularisation {
     /// curved and the reduced Hessian is nearly singular, full steps leave the constraints at once,
     /// and what the line search leaves of them is nothing: as in a trust region shorter steps in
     /// another direction go farther.
-    pub fn gone(&mut self, part: f64) {
-        if part >= SHORT {
-            self.short = 0;
-            if part >= 1.0 {
-                let less = self.damping / 3.0;
-                self.damping = if less > 1e-2 * FIRST_DAMPING { less } else { 0.0 };
+    pub fn update_damping(&mut self, step_fraction: f64) {
+        if step_fraction >= SHORT_STEP_FRACTION {
+            self.short_steps = 0;
+            if step_fraction >= 1.0 {
+                let reduced_damping = self.damping / 3.0;
+                self.damping = if reduced_damping > 1e-2 * FIRST_DAMPING { reduced_damping } else { 0.0 };
             }
             return;
         }
-        self.short += 1;
-        if self.short >= SHORT_STEPS_BEFORE_DAMPING || self.damping > 0.0 {
-            self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last);
-            if self.damping > MOST_DAMPING {
-                (self.damping, self.short) = (0.0, 0);
+        self.short_steps += 1;
+        if self.short_steps >= SHORT_STEPS_BEFORE_DAMPING || self.damping > 0.0 {
+            self.damping = (8.0 * self.damping).max(FIRST_DAMPING).max(self.last_delta);
+            if self.damping > MAX_DAMPING {
+                (self.damping, self.short_steps) = (0.0, 0);
             }
         }
     }
@@ -66,49 +66,49 @@ impl Regularisation {
     ///
     /// # Errors
     /// Those of the recursion.
-    pub fn direction<T: Real>(
+    pub fn compute_regularised_step<T: Real>(
         &mut self,
         iterate: &mut Iterate<'_, T>,
         mu: T,
-        force: f64,
+        objective_unit: f64,
     ) -> Result<f64, QpError> {
-        let mut failed = match self.attempt(iterate, mu, self.damping, force) {
-            Ok(()) => return Ok(self.damping * force),
+        let mut last_error = match self.try_factorisation(iterate, mu, self.damping, objective_unit) {
+            Ok(()) => return Ok(self.damping * objective_unit),
             Err(failed) => failed,
         };
-        let mut delta = if self.last > 0.0 {
-            (PERTURB_DEC_FACT * self.last).max(MIN_HESSIAN_PERTURBATION)
+        let mut delta = if self.last_delta > 0.0 {
+            (PERTURB_DEC_FACT * self.last_delta).max(MIN_HESSIAN_PERTURBATION)
         } else {
             FIRST_HESSIAN_PERTURBATION
         };
         delta = delta.max(8.0 * self.damping);
         while delta < MAX_HESSIAN_PERTURBATION {
-            match self.attempt(iterate, mu, delta, force) {
+            match self.try_factorisation(iterate, mu, delta, objective_unit) {
                 Ok(()) => {
-                    self.last = delta;
-                    return Ok(delta * force);
+                    self.last_delta = delta;
+                    return Ok(delta * objective_unit);
                 }
-                Err(error) => failed = error,
+                Err(error) => last_error = error,
             }
-            delta *= if self.last > 0.0 { PERTURB_INC_FACT } else { PERTURB_INC_FACT_FIRST };
+            delta *= if self.last_delta > 0.0 { PERTURB_INC_FACT } else { PERTURB_INC_FACT_FIRST };
         }
-        Err(failed)
+        Err(last_error)
     }
 
     /// One factorisation; a step that is not finite is no step.
-    fn attempt<T: Real>(
+    fn try_factorisation<T: Real>(
         &self,
         iterate: &mut Iterate<'_, T>,
         mu: T,
         delta: f64,
-        force: f64,
+        objective_unit: f64,
     ) -> Result<(), QpError> {
-        match step(iterate, mu, T::from_f64(delta * force)) {
+        match newton_step(iterate, mu, T::from_f64(delta * objective_unit)) {
             Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
             }
             // Directions in which pivots vanished would not move at all.
-            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
+            Ok(()) if iterate.riccati.regularised > 0 && delta < VANISHING_PIVOT_PERTURBATION => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
             }
             result => result,

@@ -2,18 +2,18 @@
 //!
 //! A. Wächter, L. T. Biegler, Math. Program. 106 (2006), equations (5) and (6).
 
-use crate::ocp::assembly::units::{Units, WIDE, of_tolerance};
+use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ScalingUnits, tolerance_factor};
 use crate::qp::interior::{Inequalities, Iterate, at};
 use crate::qp::{Places, Residuals, StageDims, nan_max, part};
 use crate::scalar::Real;
 
 /// Gaps of a state need not be less than this part of it times the tolerance.
-const ROUNDING: f64 = 1e-5;
+const MIN_RELATIVE_GAP_UNIT: f64 = 1e-5;
 /// `s_max`: a mean multiplier that is larger relaxes tolerances.
 const S_MAX: f64 = 100.0;
 
 /// Gaps of dynamics, each with the unit of its state.
-pub(in crate::ocp::nlp::ipm) fn of_gaps<'a, T: Real>(
+pub(in crate::ocp::nlp::ipm) fn gaps_with_units<'a, T: Real>(
     dims: &'a [StageDims],
     gaps: &'a [T],
     units: &'a [T],
@@ -25,7 +25,7 @@ pub(in crate::ocp::nlp::ipm) fn of_gaps<'a, T: Real>(
 }
 
 /// Numbers of sides, each with the unit of its row.
-pub(in crate::ocp::nlp::ipm) fn of_sides<'a, T: Real>(
+pub(in crate::ocp::nlp::ipm) fn row_values_with_units<'a, T: Real>(
     rows: &'a [u32],
     values: &'a [T],
     units: &'a [T],
@@ -34,70 +34,84 @@ pub(in crate::ocp::nlp::ipm) fn of_sides<'a, T: Real>(
 }
 
 /// The sum of sizes in their units.
-pub(in crate::ocp::nlp::ipm) fn sum<T: Real>(values: impl Iterator<Item = (T, T)>) -> f64 {
+pub(in crate::ocp::nlp::ipm) fn sum_in_units<T: Real>(values: impl Iterator<Item = (T, T)>) -> f64 {
     values.fold(0.0, |sum, (value, unit)| sum + (value / unit).abs().to_f64())
 }
 
 /// Residuals relative to units.
-pub(in crate::ocp::nlp::ipm) struct Relative {
+pub(in crate::ocp::nlp::ipm) struct ScaledResiduals {
     /// Of the barrier problem: all of them, and what products are divided by.
-    pub barrier: (Residuals, f64),
+    pub barrier_residuals: (Residuals, f64),
     /// The largest of those that are compared with tolerances.
-    pub error: f64,
+    pub nlp_error: f64,
     /// The largest of them but complementarity.
-    pub others: f64,
+    pub error_without_complementarity: f64,
 }
 
 /// Residuals in their units, relative to the mean sizes of multipliers where these are large: `s_d`
 /// is that of all of them, `s_c` that of sides.
-pub(in crate::ocp::nlp::ipm) fn relative<T: Real>(
+pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     residuals: &Residuals,
     iterate: &Iterate<'_, T>,
     pi: &[T],
-    units: Units<'_, T>,
-    of_stages: f64,
-) -> Relative {
-    let (force, units) = (units.sizes.force, units.rows);
-    let (sides, dims) = (&iterate.sides, iterate.qp.dims);
+    units: ScalingUnits<'_, T>,
+    stage_residual: f64,
+) -> ScaledResiduals {
+    let (force, units) = (units.scaling.objective_unit, units.rows);
+    let (inequalities, dims) = (&iterate.sides, iterate.qp.dims);
     let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
-    let in_rows = of_sides(sides.rows, sides.multiplier, units).fold(0.0, size);
-    let others = part(sides.multiplier, sides.counts.sides(), sides.counts.soft);
-    let in_sides = others.iter().zip(&*sides.soft).fold(in_rows, |sum, (&value, &side)| {
-        size(sum, (value, at(units, sides.rows.get(side as usize).copied().unwrap_or(0))))
-    });
-    let in_equations = of_sides(sides.equations, sides.free, units).fold(0.0, size);
-    let (all, count) = of_gaps(dims, pi, units)
-        .fold((in_sides + in_equations, 0), |(sum, count), pair| (size(sum, pair), count + 1));
+    let bound_multiplier_sum =
+        row_values_with_units(inequalities.rows, inequalities.multiplier, units).fold(0.0, size);
+    let violation_multipliers =
+        part(inequalities.multiplier, inequalities.counts.sides(), inequalities.counts.soft);
+    let inequality_multiplier_sum = violation_multipliers.iter().zip(&*inequalities.soft).fold(
+        bound_multiplier_sum,
+        |sum, (&value, &side)| {
+            size(sum, (value, at(units, inequalities.rows.get(side as usize).copied().unwrap_or(0))))
+        },
+    );
+    let equation_multiplier_sum =
+        row_values_with_units(inequalities.equations, inequalities.free, units).fold(0.0, size);
+    let (all, count) = gaps_with_units(dims, pi, units)
+        .fold((inequality_multiplier_sum + equation_multiplier_sum, 0), |(sum, count), pair| {
+            (size(sum, pair), count + 1)
+        });
     let mean = |sum: f64, count: usize| (sum / force / count.max(1) as f64 / S_MAX).max(1.0);
-    let pairs = sides.counts.pair_count();
-    let (s_d, s_c) = (mean(all, count + pairs + sides.counts.equations), mean(in_sides, pairs));
-    let (mut in_units, mut judged, wide) = (T::ZERO, T::ZERO, T::from_f64(WIDE));
+    let pairs = inequalities.counts.pair_count();
+    let (s_d, s_c) =
+        (mean(all, count + pairs + inequalities.counts.equations), mean(inequality_multiplier_sum, pairs));
+    let (mut barrier_stationarity, mut tolerance_stationarity, wide) =
+        (T::ZERO, T::ZERO, T::from_f64(NEAR_ONE_RATIO));
     for (&g, &unit) in iterate.stationarity.iter().zip(units) {
-        in_units = nan_max(in_units, (g * unit).abs());
+        barrier_stationarity = nan_max(barrier_stationarity, (g * unit).abs());
         let unit = T::ONE.min(wide * unit).max(unit / wide);
-        judged = nan_max(judged, (g * unit).abs());
+        tolerance_stationarity = nan_max(tolerance_stationarity, (g * unit).abs());
     }
     let barrier = Residuals {
-        stationarity: in_units.to_f64() / (force * s_d),
-        dynamics: nan_max(gaps(iterate, units), of_stages),
-        inequalities: inequalities(sides, units, |unit| unit),
+        stationarity: barrier_stationarity.to_f64() / (force * s_d),
+        dynamics: nan_max(largest_scaled_gap(iterate, units), stage_residual),
+        inequalities: largest_scaled_inequality(inequalities, units, |unit| unit),
         complementarity: residuals.complementarity / (force * s_c),
     };
-    let of_force = of_tolerance(force);
-    let judged = Residuals {
-        stationarity: judged.to_f64() / (of_force * s_d),
-        inequalities: inequalities(sides, units, of_tolerance),
-        complementarity: residuals.complementarity / (of_force * s_c),
+    let objective_tolerance_unit = tolerance_factor(force);
+    let tolerance_residuals = Residuals {
+        stationarity: tolerance_stationarity.to_f64() / (objective_tolerance_unit * s_d),
+        inequalities: largest_scaled_inequality(inequalities, units, tolerance_factor),
+        complementarity: residuals.complementarity / (objective_tolerance_unit * s_c),
         ..barrier
     };
-    let others = Residuals { complementarity: 0.0, ..judged }.largest();
-    Relative { barrier: (barrier, force * s_c), error: judged.largest(), others }
+    let others = Residuals { complementarity: 0.0, ..tolerance_residuals }.largest();
+    ScaledResiduals {
+        barrier_residuals: (barrier, force * s_c),
+        nlp_error: tolerance_residuals.largest(),
+        error_without_complementarity: others,
+    }
 }
 
 /// The largest gap in units of states that are not above one, nor below what rounding leaves of
 /// states.
-fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
-    let rounding = T::from_f64(ROUNDING);
+fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
+    let rounding = T::from_f64(MIN_RELATIVE_GAP_UNIT);
     let coupling = iterate
         .coupling
         .as_ref()
@@ -114,11 +128,15 @@ fn gaps<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
 }
 
 /// The largest residual of sides and equations in the units of their rows.
-fn inequalities<T: Real>(sides: &Inequalities<'_, T>, units: &[T], of: impl Fn(f64) -> f64) -> f64 {
-    let equations = of_sides(sides.equations, sides.equation_residual, units);
-    let sides = sides.rows.iter().zip(&*sides.scratch);
-    sides
+fn largest_scaled_inequality<T: Real>(
+    inequalities: &Inequalities<'_, T>,
+    units: &[T],
+    tolerance_unit: impl Fn(f64) -> f64,
+) -> f64 {
+    let equations = row_values_with_units(inequalities.equations, inequalities.equation_residual, units);
+    let distances = inequalities.rows.iter().zip(&*inequalities.scratch);
+    distances
         .map(|(&row, &distance)| ((-distance).max(T::ZERO), at(units, row)))
         .chain(equations)
-        .fold(0.0, |m, (value, unit)| nan_max(m, value.abs().to_f64() / of(unit.to_f64())))
+        .fold(0.0, |m, (value, unit)| nan_max(m, value.abs().to_f64() / tolerance_unit(unit.to_f64())))
 }

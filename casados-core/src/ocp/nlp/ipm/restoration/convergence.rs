@@ -1,13 +1,13 @@
 //! How a run may end, from residuals of an iterate.
 
-use super::elastic;
+use super::elastic_mode;
 use super::phase;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::ipm::Ipm;
-use crate::ocp::nlp::ipm::kkt::work::Work;
-use crate::ocp::nlp::ipm::state::State;
-use crate::ocp::nlp::solver::Next;
+use crate::ocp::nlp::ipm::kkt::workspace::Workspace;
+use crate::ocp::nlp::ipm::run_state::RunState;
+use crate::ocp::nlp::solver_loop::NextAction;
 use crate::ocp::solution::log::Iteration;
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
@@ -15,56 +15,64 @@ use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I> {
     /// What follows the residuals of an iteration.
-    pub(in crate::ocp::nlp::ipm) fn next<P: Program<T>>(
+    pub(in crate::ocp::nlp::ipm) fn check_convergence<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        row: &Iteration,
-    ) -> Next {
-        let mut work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
-        if let Some(status) = state.contradiction {
-            return Next::End(status);
+        state: &mut RunState<'_>,
+        log_row: &Iteration,
+    ) -> NextAction {
+        let mut work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
+        if let Some(status) = state.contradictory_bounds {
+            return NextAction::Terminate(status);
         }
-        if state.lengths.alone {
-            let next = phase::check_convergence(ocp, state, (work.penalties, work.units), &self.options);
+        if state.dimensions.in_restoration {
+            let next =
+                phase::check_restoration(ocp, state, (work.saved_penalties, work.units), &self.options);
             if let Some(next) = next {
                 return next;
             }
-        } else if state.error <= self.options.tolerance {
-            if state.tightens(ocp, &mut work, self.options.tolerance) {
-                return Next::Evaluate;
+        } else if state.nlp_error <= self.options.tolerance {
+            if state.rescale_objective(ocp, &mut work, self.options.tolerance) {
+                return NextAction::Reevaluate;
             }
-            let cost = row.objective - ocp.objective.to_f64();
-            let end = elastic::verdict(ocp, state, (work.penalties, work.units), cost, &self.options);
-            return end.map_or(Next::Evaluate, Next::End);
+            let cost = log_row.objective - ocp.objective.to_f64();
+            let end = elastic_mode::status_at_stationary_point(
+                ocp,
+                state,
+                (work.saved_penalties, work.units),
+                cost,
+                &self.options,
+            );
+            return end.map_or(NextAction::Reevaluate, NextAction::Terminate);
         }
-        if state.acceptable >= self.options.acceptable_iterations.max(1) {
-            return Next::End(Status::Acceptable);
+        if state.acceptable_iterations >= self.options.acceptable_iterations.max(1) {
+            return NextAction::Terminate(Status::Acceptable);
         }
-        if row.iteration >= self.options.max_iterations {
-            return Next::End(Status::MaxIterations);
+        if log_row.iteration >= self.options.max_iterations {
+            return NextAction::Terminate(Status::MaxIterations);
         }
-        Next::Step
+        NextAction::Step
     }
 }
 
-impl State<'_> {
+impl RunState<'_> {
     /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
-    fn tightens<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    fn rescale_objective<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
-        work: &mut Work<'_, T>,
+        work: &mut Workspace<'_, T>,
         tolerance: f64,
     ) -> bool {
-        if self.has_tightened || self.elastic.is_some() {
+        if self.has_rescaled_objective || self.elastic_penalty.is_some() {
             return false;
         }
-        let force = self.lengths.sizes.force;
-        let Some(smaller) = ocp.smaller_force(work.units, force, tolerance, work.scratch) else {
+        let force = self.dimensions.scaling.objective_unit;
+        let Some(smaller) = ocp.reduced_objective_unit(work.units, force, tolerance, work.scratch) else {
             return false;
         };
-        self.has_tightened = true;
-        (self.lengths.sizes.force, self.capacity.sizes.force) = (smaller, smaller);
+        self.has_rescaled_objective = true;
+        (self.dimensions.scaling.objective_unit, self.max_dimensions.scaling.objective_unit) =
+            (smaller, smaller);
         self.filter.clear();
         self.best_residual = f64::INFINITY;
         true

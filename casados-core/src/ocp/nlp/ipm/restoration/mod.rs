@@ -1,7 +1,7 @@
 //! Restoration: violations alone, penalties of bounds, a second attempt, and verdicts.
 
 pub(in crate::ocp::nlp::ipm) mod convergence;
-pub(in crate::ocp::nlp::ipm) mod elastic;
+pub(in crate::ocp::nlp::ipm) mod elastic_mode;
 pub(in crate::ocp::nlp::ipm) mod phase;
 pub(in crate::ocp::nlp::ipm) mod restart;
 pub(in crate::ocp::nlp::ipm) mod unbounded;

@@ -1,15 +1,15 @@
 //! A second attempt, from a simulation with the controls of the guess.
 
-use super::phase::exit;
+use super::phase::exit_restoration;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact};
 use crate::ocp::nlp::ipm::Ipm;
-use crate::ocp::nlp::ipm::kkt::work::Work;
-use crate::ocp::nlp::ipm::state::State;
-use crate::ocp::nlp::ipm::violations::Phase;
+use crate::ocp::nlp::ipm::kkt::workspace::Workspace;
+use crate::ocp::nlp::ipm::run_state::RunState;
+use crate::ocp::nlp::ipm::violations::RestorationPhase;
 use crate::ocp::nlp::simulation::{
-    MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, SecondStart, VIOLATION_OF_GUESS,
+    GUESS_VIOLATION_RATIO, MAX_SIMULATED_VIOLATION, RESTART_AFTER, RESTART_GAIN, RestartPoint,
 };
 use crate::ocp::solution::outcome::Status;
 use crate::qp::{StageDims, Store};
@@ -24,47 +24,57 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     pub(in crate::ocp::nlp::ipm) fn try_restart<P: Program<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        state: &mut State<'_>,
-        end: Option<Status>,
+        state: &mut RunState<'_>,
+        final_status: Option<Status>,
     ) -> bool
     where
         Exact: Curvature<P::Dynamics, T>,
     {
-        let stalls = end.is_none() && state.stalled_iterations == RESTART_AFTER;
-        let failed = matches!(end, Some(Status::Infeasible { .. } | Status::NoProgress));
+        let stalls = final_status.is_none() && state.stalled_iterations == RESTART_AFTER;
+        let failed = matches!(final_status, Some(Status::Infeasible { .. } | Status::NoProgress));
         if !(failed || stalls) || !self.options.restart || state.second_attempt || P::LIFTED {
             return false;
         }
-        let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
-        let here = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
-        let left = match end {
+        let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
+        let current_violation = ocp
+            .largest_hard_violation(work.saved_penalties, work.units)
+            .0
+            .map_or(0.0, |worst| worst.violation);
+        let reference_violation = match final_status {
             Some(Status::NoProgress) => state.best_violation,
-            Some(_) => here,
-            None => state.violation.max(here),
+            Some(_) => current_violation,
+            None => state.violation.max(current_violation),
         };
         // Where nothing was gained from the guess it may be a maximum of violations.
-        let is_infeasible = matches!(end, Some(Status::Infeasible { .. })) && state.contradiction.is_none();
-        let mut is_that_of_guess = false;
-        for start in [SecondStart::Simulated, SecondStart::Perturbed] {
-            let most = match start {
-                SecondStart::Simulated => RESTART_GAIN,
-                SecondStart::Perturbed if is_infeasible && is_that_of_guess => MAX_SIMULATED_VIOLATION,
-                SecondStart::Perturbed => break,
+        let is_infeasible =
+            matches!(final_status, Some(Status::Infeasible { .. })) && state.contradictory_bounds.is_none();
+        let mut equals_guess_violation = false;
+        for start in [RestartPoint::Simulation, RestartPoint::PerturbedSimulation] {
+            let max_violation_ratio = match start {
+                RestartPoint::Simulation => RESTART_GAIN,
+                RestartPoint::PerturbedSimulation if is_infeasible && equals_guess_violation => {
+                    MAX_SIMULATED_VIOLATION
+                }
+                RestartPoint::PerturbedSimulation => break,
             };
-            self.trial.copy_from(&self.guess);
-            let work = Work::new(ocp.ends(), &state.capacity, self.work.as_mut());
-            if !ocp.simulate_guess(&mut self.trial, work.ends, start) {
+            self.trial_point.copy_from(&self.guess);
+            let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());
+            if !ocp.simulate_guess(&mut self.trial_point, work.interval_ends, start) {
                 continue;
             }
             let is_linearised = P::slopes(ocp).is_ok();
-            let found = ocp.worst(work.penalties, work.units).0.map_or(0.0, |worst| worst.violation);
-            if is_linearised && found < most * left {
-                exit(ocp, state, work.penalties, &self.options);
-                (state.phase, state.is_linearised, state.second_attempt) = (Phase::default(), true, true);
+            let simulated_violation = ocp
+                .largest_hard_violation(work.saved_penalties, work.units)
+                .0
+                .map_or(0.0, |worst| worst.violation);
+            if is_linearised && simulated_violation < max_violation_ratio * reference_violation {
+                exit_restoration(ocp, state, work.saved_penalties, &self.options);
+                (state.restoration, state.is_linearised, state.second_attempt) =
+                    (RestorationPhase::default(), true, true);
                 return true;
             }
-            is_that_of_guess = found <= VIOLATION_OF_GUESS * left;
-            core::mem::swap(&mut ocp.iterate, &mut self.trial);
+            equals_guess_violation = simulated_violation <= GUESS_VIOLATION_RATIO * reference_violation;
+            core::mem::swap(&mut ocp.iterate, &mut self.trial_point);
             state.is_linearised = false;
         }
         false

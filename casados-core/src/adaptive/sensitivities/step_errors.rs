@@ -1,0 +1,16 @@
+//! Where errors are.
+
+use super::*;
+
+/// An error of a step is one of the run.
+pub(super) fn with_step_number(mut error: Error, number: usize) -> Error {
+    match &mut error {
+        Error::NonFiniteModel { at, .. }
+        | Error::NonFiniteFunction { at, .. }
+        | Error::Singular { at, .. }
+        | Error::NotConverged { at, .. } => at.step = number,
+        Error::Overflow { step, .. } => *step = number,
+        _ => {}
+    }
+    error
+}

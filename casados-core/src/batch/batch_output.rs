@@ -1,0 +1,128 @@
+//! The questions that a batch can be asked, each known by what it answers.
+
+use super::intervals::{Interval, vector};
+use super::lanes::{MOST_LANES, Unpack, Verdict, yes};
+use super::single::{Group, Single};
+use crate::error::Error;
+use crate::linalg::dispatch;
+use crate::model::Dae;
+use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
+use crate::scalar::{Lanes, Real};
+use crate::shape::{Matrix, Plain, Shape, copy_into};
+
+/// A result of several intervals, with a number for each of them in the lanes of its registers. All
+/// of it is inlined into kernels.
+pub trait Wide<E: Lanes, R> {
+    /// Whether all numbers are finite, lane by lane, but for those that were looked at when they
+    /// were written: matrices.
+    fn is_finite(&self) -> E::Mask;
+    /// The results of the lanes that are good, each in its element of a slice that has it somewhere
+    /// inside.
+    fn unpack<Q>(&self, valid: &[bool], results: &mut [Q], select: impl Fn(&mut Q) -> &mut R + Copy);
+}
+
+/// The elements of a field, for each lane that is good in its result.
+macro_rules! unpack_field {
+    ($self:ident, $field:ident, $good:ident, $results:ident, $get:ident) => {{
+        let mut to: [&mut [T]; MOST_LANES] = Default::default();
+        for ((to, result), &good) in to.iter_mut().zip($results.iter_mut()).zip($good) {
+            if good {
+                *to = $get(result).$field.as_mut_slice();
+            }
+        }
+        dispatch(Unpack { from: $self.$field.as_slice(), to: &mut to });
+    }};
+}
+
+macro_rules! wide {
+    ($type:ident $(: $inner:ident)?; $($field:ident),*; $($matrix:ident),*) => {
+        impl<M: Dae, T: Plain, E: Lanes<Cell: AsRef<[T]>>> Wide<E, $type<M, T>> for $type<M, E> {
+            #[inline(always)]
+            fn is_finite(&self) -> E::Mask {
+                let finite = yes::<E>();
+                $(let finite = E::and(finite, Wide::<E, _>::is_finite(&self.$inner));)?
+                $(let finite = are_finite(self.$field.as_slice(), finite);)*
+                finite
+            }
+            #[inline(always)]
+            fn unpack<Q>(
+                &self,
+                good: &[bool],
+                results: &mut [Q],
+                get: impl Fn(&mut Q) -> &mut $type<M, T> + Copy,
+            ) {
+                $(self.$inner.unpack(good, results, move |result| &mut get(result).$inner);)?
+                $(unpack_field!(self, $field, good, results, get);)*
+                $(unpack_field!(self, $matrix, good, results, get);)*
+            }
+        }
+    };
+}
+wide!(Nominal; x, z, z0;);
+wide!(Forward: nominal;; dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp);
+wide!(Adjoint: nominal; grad_x0, grad_u, grad_p;);
+wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p;);
+wide!(Hessian: first;; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
+
+/// Which lanes are finite, beside those that are not in `finite`.
+#[inline(always)]
+fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
+    for &value in values {
+        finite = E::and(finite, value.is_finite());
+    }
+    finite
+}
+
+/// What a call of a batch answers for each interval.
+pub trait Answer<M: Dae, T: Real>: Copy + Send {
+    /// The same with a number for each lane.
+    type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
+    /// How many columns of derivatives are computed for it.
+    const COLUMNS: usize;
+
+    /// For several intervals at once.
+    fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+        group: &mut I::Group<E>,
+    ) -> Verdict<'_, E, Self::Wide<E>>;
+
+    /// For one interval, where it belongs: results that are large are written once.
+    fn alone<I: Single<Model = M, Number = T>>(
+        &mut self,
+        single: &mut I,
+        interval: &Interval<'_, M, T>,
+    ) -> Result<(), Error>;
+}
+
+macro_rules! answer {
+    ($type:ident, $together:ident, $columns:expr, |$single:ident, $at:ident, $to:ident| $alone:expr) => {
+        impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
+            type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
+            const COLUMNS: usize = $columns;
+
+            fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+                group: &mut I::Group<E>,
+            ) -> Verdict<'_, E, Self::Wide<E>> {
+                group.$together()
+            }
+            fn alone<I: Single<Model = M, Number = T>>(
+                &mut self,
+                $single: &mut I,
+                $at: &Interval<'_, M, T>,
+            ) -> Result<(), Error> {
+                let $to = self;
+                $alone
+            }
+        }
+    };
+}
+answer!(Nominal, solve, 0, |single, at, to| {
+    copy_into(to, single.solve_with_quadrature(at.x0, &vector(at.u), at.h, None)?);
+    Ok(())
+});
+answer!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
+answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single.forward_adjoint_to(at, to));
+answer!(Adjoint, adjoint, 1, |single, at, to| {
+    copy_into(to, single.adjoint_with_quadrature(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
+    Ok(())
+});
+answer!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));

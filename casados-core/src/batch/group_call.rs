@@ -1,0 +1,125 @@
+//! The intervals of a group side by side, and what each of them gets.
+
+use super::batch_output::{Answer, Wide};
+use super::chunk::{BatchTask, IntervalChunk};
+use super::intervals::Interval;
+use super::lanes::MOST_LANES;
+use super::single::{Group, Single};
+use super::statistics::BatchStatistics;
+use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::options::Start;
+use crate::scalar::{Lanes, Widest};
+use alloc::boxed::Box;
+use core::any::Any;
+
+/// Groups of the registers that a machine has.
+pub type GroupCache = [Option<Box<dyn Any + Send + Sync>>; 2];
+
+/// The intervals of a group that can be computed, each in its lane.
+pub type LaneIntervals<'a, I> =
+    [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MOST_LANES];
+
+/// Gives every interval its result, where all is well and finite.
+struct Distribute<'a, E: Lanes, W, R> {
+    converged_lanes: E::Mask,
+    lane_results: &'a W,
+    /// On entry which lanes are asked for, on return which are good.
+    valid_lanes: &'a mut [bool; MOST_LANES],
+    results: &'a mut [R],
+}
+
+impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { converged_lanes: good, lane_results: wide, valid_lanes: done, results } = self;
+        let good = E::and(good, wide.is_finite());
+        let mut valid_cell: E::Cell = bytemuck::Zeroable::zeroed();
+        E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut valid_cell);
+        for (lane, done) in done.iter_mut().enumerate().take(E::LANES) {
+            *done &= E::lane(&valid_cell, lane) != 0.0;
+        }
+        wide.unpack(&*done, results, |result| result);
+    }
+}
+
+/// The intervals of a group side by side.
+pub struct GroupCall<'a, 'b, 'c, I: Single, R> {
+    pub task: &'a BatchTask<'b, I>,
+    pub groups: &'a mut GroupCache,
+    pub statistics: &'a mut BatchStatistics,
+    pub intervals: &'a LaneIntervals<'b, I>,
+    pub chunk: &'a mut IntervalChunk<'c, I, R>,
+}
+
+impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for GroupCall<'_, '_, '_, I, R> {
+    /// For which intervals there is a result.
+    type Output = Result<[bool; MOST_LANES], Error>;
+
+    // What callers have of it they do not have to optimise again.
+    #[inline(never)]
+    fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> Self::Output {
+        let Self { task: work, groups, statistics, intervals, chunk: share } = self;
+        let mut valid_lanes = [false; MOST_LANES];
+        let has_group_type = |group: &Box<dyn Any + Send + Sync>| (**group).is::<I::Group<E>>();
+        // Its own place, or one that is free.
+        let cache_slot = groups.iter_mut().find(|place| place.as_ref().is_none_or(has_group_type));
+        let group = cache_slot.map(|group| {
+            group.get_or_insert_with(|| Box::new(I::Group::<E>::new(work.options, work.tableau)))
+        });
+        let group = group.and_then(|group| group.downcast_mut::<I::Group<E>>());
+        // Lanes that nobody needs hold a copy of the first interval.
+        let first_lane = intervals.iter().position(Option::is_some);
+        let (Some(group), Some(first_lane)) = (group, first_lane) else { return Ok(valid_lanes) };
+        let Some(Some(padding_interval)) = intervals.get(first_lane) else { return Ok(valid_lanes) };
+        let mut lanes = [padding_interval; MOST_LANES];
+        for (lane, interval) in lanes.iter_mut().zip(intervals).take(E::LANES) {
+            *lane = interval.as_ref().unwrap_or(padding_interval);
+        }
+        let source_lane =
+            |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first_lane };
+
+        let steps = work.options.steps;
+        let mut stages: [&[I::Stages]; MOST_LANES] = [&[]; MOST_LANES];
+        let mut has_initial_stages =
+            I::ITERATES && (work.options.start == Start::Warm || work.reuses_solutions);
+        if has_initial_stages {
+            for (lane, stages) in stages.iter_mut().enumerate().take(E::LANES) {
+                let from = share.stages.chunks_exact(steps).nth(source_lane(lane));
+                *stages = from.unwrap_or_default();
+                has_initial_stages &= share.has_stages.get(source_lane(lane)).copied().unwrap_or(false);
+            }
+        }
+        let lanes = lanes.get(..E::LANES).unwrap_or_default();
+        group.load_intervals(
+            lanes,
+            work.start_values,
+            has_initial_stages.then_some(&stages),
+            work.reuses_solutions,
+        )?;
+
+        let (good, wide) = R::together::<I, E>(group)?;
+        for (done, interval) in valid_lanes.iter_mut().zip(intervals).take(E::LANES) {
+            *done = interval.is_some();
+        }
+        dispatch(Distribute {
+            converged_lanes: good,
+            lane_results: wide,
+            valid_lanes: &mut valid_lanes,
+            results: &mut *share.results,
+        });
+        let places = share.stages.chunks_exact_mut(steps).zip(share.has_stages.iter_mut());
+        for (lane, ((stages, warm), done)) in places.zip(valid_lanes).enumerate() {
+            if done {
+                group.copy_stages(lane, stages)?;
+                *warm = true;
+            }
+        }
+        statistics.groups += 1;
+        statistics.work.add(&group.statistics());
+        Ok(valid_lanes)
+    }
+}

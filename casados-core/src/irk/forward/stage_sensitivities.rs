@@ -1,0 +1,96 @@
+//! The rows of `D` that enter second derivatives: of curved variables at all stages, from the
+//! derivatives of a step.
+
+use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel_width, static_columns};
+use crate::linalg::{Arithmetic, Block, PanelRow};
+use crate::plan::Plan;
+use crate::scalar::Lanes;
+
+/// Whether all stages of a variable lie together: unless a panel is too large for the nearest
+/// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
+const fn are_stages_adjacent<E, const S: usize>(curved: usize, columns: usize) -> bool {
+    let panel = curved * S * panel_width::<E>(S, columns) * size_of::<E>();
+    panel <= L1_CACHE_BYTES / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
+}
+
+/// The same of a plan. Where kernels are not compiled for one model, variables of a stage do.
+pub(in crate::irk) const fn stages_adjacent<P: Plan, E, const S: usize>() -> bool {
+    match (P::KNOWN_STRUCTURE, static_columns::<P, E>()) {
+        (Some(structure), Some(columns)) => are_stages_adjacent::<E, S>(structure.curved.len(), columns),
+        _ => false,
+    }
+}
+
+/// Where rows of curved variables lie in a panel of `D`.
+#[derive(Clone, Copy)]
+pub(in crate::irk) struct StageRowLayout {
+    nonlinear_count: usize,
+    /// Whether all stages of a variable lie together.
+    stages_adjacent: bool,
+}
+
+impl StageRowLayout {
+    /// Those of a plan.
+    #[inline(always)]
+    pub fn for_plan<P: Plan, E, const S: usize>(plan: P) -> Self {
+        let curved = plan.structure().curved.len();
+        Self { nonlinear_count: curved, stages_adjacent: const { stages_adjacent::<P, E, S>() } }
+    }
+
+    /// The row of a curved variable at a stage.
+    #[inline(always)]
+    pub fn row_index<const S: usize>(self, variable: usize, stage: usize) -> usize {
+        if self.stages_adjacent { variable * S + stage } else { stage * self.nonlinear_count + variable }
+    }
+}
+
+/// What they are made by.
+pub(in crate::irk) struct StageRowWriter<P, E, D, const S: usize> {
+    pub plan: P,
+    /// `−hA`
+    pub minus_ha: Block<E, S>,
+    pub directions: D,
+}
+
+impl<P: Plan, E: Lanes, D: Directions<E>, const S: usize> StageRowWriter<P, E, D, S> {
+    /// Those of a panel, from the derivatives of its stages.
+    #[inline(always)]
+    pub fn write_panel<A: Arithmetic, const W: usize>(
+        &self,
+        v: &[[E; W]],
+        dy: &[PanelRow<E, S, W>],
+        d: &mut [[E; W]],
+        column: usize,
+    ) {
+        let (nx, nz) = (self.plan.nx(), self.plan.nz());
+        let rows = StageRowLayout::for_plan::<P, E, S>(self.plan);
+        for (c, &variable) in self.plan.structure().curved.iter().enumerate() {
+            let variable = variable as usize;
+            if (nx..2 * nx).contains(&variable) {
+                let (Some(dk), Some(start)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
+                for i in 0..S {
+                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) else { continue };
+                    let mut row = *start;
+                    for (column, dk) in self.minus_ha.iter().zip(dk) {
+                        A::subtract_row(&mut row, column[i], dk);
+                    }
+                    *d = row;
+                }
+            } else if variable < 2 * nx + nz {
+                let unknown = if variable < nx { variable } else { variable - nx };
+                let Some(unknown_rows) = dy.get(unknown) else { continue };
+                for (i, own) in unknown_rows.iter().enumerate() {
+                    if let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) {
+                        *d = *own;
+                    }
+                }
+            } else {
+                for i in 0..S {
+                    let Some(d) = d.get_mut(rows.row_index::<S>(c, i)) else { continue };
+                    *d = [E::from_f64(0.0); W];
+                    self.directions.add_scaled(variable - nx - nz, E::from_f64(1.0), column, d);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! A start at which the gradient of a violated constraint vanishes: its linearisation says nothing
+//! of where it holds, as that of `u₁² + u₂² = 1` at `u = 0`.
+
+use crate::linalg::dot;
+use crate::ocp::formulation::instance::{InitialState, Ocp};
+use crate::ocp::formulation::program::Program;
+use crate::qp::{Bounds, Places, Solution, StageDims, part};
+use crate::scalar::Real;
+
+/// The gradient vanishes where it changes the constraint by no more than this part of the
+/// violation, if a variable changes by its size or by one.
+const VANISHING_GRADIENT: f64 = 1e-8;
+/// The first variable changes by this part of its size, the second by half of that, and so on: the
+/// point lies on no axis and no diagonal.
+const RELATIVE_PERTURBATION: f64 = 0.1;
+
+/// Which variables are perturbed.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum PerturbedVariables {
+    Controls,
+    /// Those that are not given.
+    States,
+}
+
+impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Whether there is such a constraint at the iterate, where the QP was written.
+    pub(super) fn has_vanishing_gradient(&self) -> bool {
+        let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
+        Places::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
+            let (view, stage_variables) = (stage.arrays(), part(v, place.v, place.ld));
+            let Bounds { lower, upper, .. } = stage.g_bounds();
+            lower.iter().zip(upper).enumerate().any(|(i, (&lower, &upper))| {
+                let row = part(view.matrix, (place.next + i) * place.ld, place.ld);
+                let value = dot(row, stage_variables);
+                let violation = (lower - value).max(value - upper);
+                let changes = row.iter().zip(stage_variables).map(|(&g, &v)| g.abs() * v.abs().max(T::ONE));
+                let largest = changes.fold(T::ZERO, |largest, change| largest.max(change));
+                violation > T::ZERO && largest <= T::from_f64(VANISHING_GRADIENT) * violation
+            })
+        })
+    }
+
+    /// Moves variables of the iterate a little, inside of their bounds, by the same at all stages:
+    /// shared controls stay equal.
+    pub(super) fn perturb_variables(&mut self, which: PerturbedVariables) {
+        let fixed = self.initial_state == InitialState::Fixed;
+        let Self { qp, iterate, .. } = self;
+        for (k, stage) in qp.view().stages().enumerate() {
+            let Some(point) = iterate.stage_mut(k) else { return };
+            let (values, bounds) = match which {
+                PerturbedVariables::Controls => (point.u, stage.u_bounds()),
+                PerturbedVariables::States if k == 0 && fixed => continue,
+                PerturbedVariables::States => (point.x, stage.x_bounds()),
+            };
+            let limits = bounds.lower.iter().zip(bounds.upper);
+            for (i, (value, (&lower, &upper))) in values.iter_mut().zip(limits).enumerate() {
+                let size = T::from_f64(RELATIVE_PERTURBATION / (i + 1) as f64) * value.abs().max(T::ONE);
+                *value = if *value + size <= upper { *value + size } else { (*value - size).max(lower) };
+            }
+        }
+    }
+
+    /// Moves the iterate, where the QP was written, to points beside it until no such gradient
+    /// vanishes; whether it did. Otherwise the iterate is as it was, from `copy`.
+    ///
+    /// # Errors
+    /// That of the linearisation at the iterate.
+    pub(super) fn leave_degenerate_start<E>(
+        &mut self,
+        copy: &mut Solution<T, D, M>,
+        mut linearise: impl FnMut(&mut Self) -> Result<(), E>,
+    ) -> Result<bool, E> {
+        if !self.has_vanishing_gradient() {
+            return Ok(false);
+        }
+        copy.copy_from(&self.iterate);
+        for which in [PerturbedVariables::Controls, PerturbedVariables::States] {
+            self.perturb_variables(which);
+            self.equalise_shared_controls();
+            self.equalise_periodic_states();
+            if linearise(self).is_ok() && !self.has_vanishing_gradient() {
+                return Ok(true);
+            }
+        }
+        self.iterate.copy_from(copy);
+        linearise(self).map(|()| false)
+    }
+}

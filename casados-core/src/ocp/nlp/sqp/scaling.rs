@@ -1,0 +1,298 @@
+//! The QP in units: its variables, constraints and forces are near one for the solver, for what
+//! is added to its Hessian, and for penalties in place of its bounds.
+//!
+//! ```text
+//! v = D v̂        c = R ĉ        f = φ f̂        D, R, φ: units
+//! ```
+//!
+//! These units are powers of two: whatever is scaled and scaled back is what it was, bit by bit.
+
+use super::Sqp;
+use super::run_state::RunState;
+use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ProblemScaling, ScalingUnits, tolerance_factor};
+use crate::ocp::formulation::instance::Ocp;
+use crate::ocp::formulation::program::Program;
+use crate::ocp::nlp::elastic_mode::{self, Worst};
+use crate::qp::interior::at;
+use crate::qp::{
+    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, padded_len, part, part_mut,
+};
+use crate::scalar::Real;
+
+/// Units of single precision are no larger: squares of them are numbers.
+const MAX_SINGLE_PRECISION_UNIT: f64 = 8192.0;
+/// The bits of a number below its leading digit: without them it is a power of two.
+const MANTISSA_BITS: u64 = (1 << 52) - 1;
+
+/// How many numbers are units of rows.
+pub(super) const fn unit_memory_len<T>(dims: &[StageDims]) -> usize {
+    let (mut length, mut rest) = (0_usize, dims);
+    while let Some((first, others)) = rest.split_first() {
+        length = length.saturating_add(saturating_padded_len::<T>(first.nx.saturating_add(first.nu)));
+        length = length.saturating_add(saturating_padded_len::<T>(first.ng));
+        rest = others;
+    }
+    length
+}
+
+/// The length of a padded vector.
+const fn saturating_padded_len<T>(n: usize) -> usize {
+    if n > usize::MAX / 2 { usize::MAX } else { padded_len::<T>(n) }
+}
+
+/// The power of two that is not above a positive number.
+fn floor_power_of_two<T: Real>(unit: f64) -> f64 {
+    let unit = if T::EPSILON < 1e-10 {
+        unit
+    } else {
+        unit.clamp(1.0 / MAX_SINGLE_PRECISION_UNIT, MAX_SINGLE_PRECISION_UNIT)
+    };
+    f64::from_bits(unit.to_bits() & !MANTISSA_BITS)
+}
+
+/// Where numbers go.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum ScalingDirection {
+    /// Into units.
+    Scale,
+    /// Into those of the problem.
+    Unscale,
+}
+
+/// What numbers are divided by.
+#[derive(Clone, Copy)]
+pub(super) struct QpScaling<'a, T> {
+    units: ScalingUnits<'a, T>,
+    direction: ScalingDirection,
+    /// Whether it is what tolerances are multiplied by, and not the units themselves.
+    for_tolerances: bool,
+}
+
+impl<T: Real> QpScaling<'_, T> {
+    fn factor(&self, unit: f64) -> T {
+        let unit = if self.for_tolerances { floor_power_of_two::<T>(tolerance_factor(unit)) } else { unit };
+        T::from_f64(if self.direction == ScalingDirection::Scale { unit } else { 1.0 / unit })
+    }
+
+    fn objective_factor(&self) -> T {
+        self.factor(self.units.scaling.objective_unit)
+    }
+
+    /// Those of some rows.
+    fn row_factors(&self, begin: usize, count: usize) -> impl Iterator<Item = T> + Clone {
+        part(self.units.rows, begin, count).iter().map(|unit| self.factor(unit.to_f64()))
+    }
+
+    /// The data of a QP.
+    fn scale_qp<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(&self, qp: &mut Qp<T, D, M>) {
+        let force = self.objective_factor();
+        let mut row = 0;
+        for mut stage in qp.stages_mut() {
+            let Arrays { ld, next, rows, matrix, hessian, gradient, offset, limits, .. } = stage.arrays();
+            let row_units = self.row_factors(row, rows);
+            row += rows;
+            let next_units = self.row_factors(row, next).chain(row_units.clone().skip(ld));
+            for (column, to) in matrix.chunks_exact_mut(ld.max(1)).zip(next_units) {
+                column.iter_mut().zip(row_units.clone()).for_each(|(a, unit)| *a = *a * unit / to);
+            }
+            for (column, other) in hessian.chunks_exact_mut(ld.max(1)).zip(row_units.clone()) {
+                column.iter_mut().zip(row_units.clone()).for_each(|(h, unit)| *h = *h * unit * other / force);
+            }
+            gradient.iter_mut().zip(row_units.clone()).for_each(|(g, unit)| *g = *g * unit / force);
+            offset.iter_mut().zip(self.row_factors(row, next)).for_each(|(b, unit)| *b = *b / unit);
+            // Both bounds; for both of them the linear penalties, and the quadratic ones.
+            for (values, kind) in limits.chunks_exact_mut(rows.max(1)).zip([0, 0, 1, 2, 1, 2]) {
+                for (value, unit) in values.iter_mut().zip(row_units.clone()) {
+                    *value = match kind {
+                        0 => *value / unit,
+                        1 => *value * unit / force,
+                        _ => *value * unit * unit / force,
+                    };
+                }
+            }
+        }
+    }
+
+    /// A point with its multipliers.
+    fn scale_point(&self, SolutionView { dims, v, dynamics, lower, upper }: SolutionView<'_, T>) {
+        for place in Places::<T>::new(dims) {
+            let units = self.row_factors(place.row, place.n);
+            part_mut(v, place.v, place.n).iter_mut().zip(units).for_each(|(v, unit)| *v = *v / unit);
+        }
+        self.scale_multipliers(SolutionView { dims, v, dynamics, lower, upper });
+    }
+
+    /// The multipliers alone.
+    fn scale_multipliers(&self, SolutionView { dims, dynamics, lower, upper, .. }: SolutionView<'_, T>) {
+        let force = self.objective_factor();
+        for place in Places::<T>::new(dims) {
+            let behind = self.row_factors(place.row + place.rows, place.next);
+            let dynamics = part_mut(dynamics, place.dynamics, place.next);
+            dynamics.iter_mut().zip(behind).for_each(|(pi, unit)| *pi = *pi * unit / force);
+            for side in [&mut *lower, &mut *upper] {
+                let units = self.row_factors(place.row, place.rows);
+                let side = part_mut(side, place.row, place.rows);
+                side.iter_mut().zip(units).for_each(|(m, unit)| *m = *m * unit / force);
+            }
+        }
+    }
+}
+
+impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+    /// Finds the units at the iterate, where the QP is written.
+    pub(super) fn find_units<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut RunState<'_, T>,
+    ) {
+        let rows = self.workspace.as_mut().get_mut(saved_penalties_end(ocp)..).unwrap_or_default();
+        let ProblemScaling { objective_unit: force, .. } =
+            ocp.compute_units(rows, self.trial_point.view_mut().v);
+        let force = if (1.0 / NEAR_ONE_RATIO..=NEAR_ONE_RATIO).contains(&force) {
+            1.0
+        } else {
+            floor_power_of_two::<T>(force)
+        };
+        let mut least: f64 = 1.0;
+        for unit in &mut *rows {
+            let rounded = floor_power_of_two::<T>(unit.to_f64());
+            *unit = T::from_f64(rounded);
+            least = least.min(rounded);
+        }
+        let are_all_one = force == 1.0 && rows.iter().all(|&unit| unit == T::ONE);
+        state.scaling =
+            (!are_all_one).then_some(ProblemScaling { objective_unit: force, min_row_unit: least });
+        if !are_all_one {
+            // The last digits of residuals count in units.
+            self.qp_solver.require(self.options.tolerance / NEAR_ONE_RATIO);
+        }
+    }
+
+    /// Goes on with a smaller unit of forces, where that of the guess says little of the iterate.
+    pub(super) fn rescale_objective<P: Program<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &mut RunState<'_, T>,
+    ) -> bool {
+        let Some(sizes) =
+            state.scaling.as_mut().filter(|_| !(state.has_rescaled_objective || state.is_elastic))
+        else {
+            return false;
+        };
+        let rows = self.workspace.as_ref().get(saved_penalties_end(ocp)..).unwrap_or_default();
+        let scratch = self.trial_point.view_mut().v;
+        // QPs are solved to a hundredth.
+        let least = self.options.tolerance / NEAR_ONE_RATIO;
+        let Some(smaller) = ocp.reduced_objective_unit(rows, sizes.objective_unit, least, scratch) else {
+            return false;
+        };
+        sizes.objective_unit = floor_power_of_two::<T>(smaller);
+        state.has_rescaled_objective = true;
+        true
+    }
+
+    /// The QP, the iterate and the solution, into units or back.
+    pub(super) fn scale_qp_and_points<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &RunState<'_, T>,
+        way: ScalingDirection,
+    ) {
+        let Some(units) = scaling_units(self.workspace.as_ref(), ocp, state) else { return };
+        let scale = QpScaling { units, direction: way, for_tolerances: false };
+        scale.scale_qp(&mut ocp.qp);
+        scale.scale_point(ocp.iterate.view_mut());
+        scale.scale_point(self.qp_solution.view_mut());
+    }
+
+    /// The multipliers of the solution and the weights of violations, into units or back.
+    pub(super) fn scale_weights<P: Program<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        state: &RunState<'_, T>,
+        way: ScalingDirection,
+    ) {
+        let Some(units) = scaling_units(self.workspace.as_ref(), ocp, state) else { return };
+        let scale = QpScaling { units, direction: way, for_tolerances: false };
+        scale.scale_multipliers(self.qp_solution.view_mut());
+        scale.scale_multipliers(self.violation_weights.view_mut());
+    }
+
+    /// The largest residual in what tolerances are multiplied by.
+    pub(super) fn nlp_error<P: Program<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &RunState<'_, T>,
+        residuals: &Residuals,
+    ) -> f64 {
+        let Some(units) = scaling_units(self.workspace.as_ref(), ocp, state) else {
+            return residuals.largest();
+        };
+        let mut scale = QpScaling { units, direction: ScalingDirection::Scale, for_tolerances: true };
+        scale.scale_qp(&mut ocp.qp);
+        scale.scale_point(ocp.iterate.view_mut());
+        let (mut scaled_residuals, _) = ocp.residuals();
+        let rounding = ocp.gap_rounding_error();
+        for residual in [&mut scaled_residuals.dynamics, &mut scaled_residuals.inequalities] {
+            *residual = if *residual <= rounding { 0.0 } else { *residual };
+        }
+        scale.direction = ScalingDirection::Unscale;
+        scale.scale_qp(&mut ocp.qp);
+        scale.scale_point(ocp.iterate.view_mut());
+        scaled_residuals.largest()
+    }
+
+    /// A violation in units, in those of the problem.
+    pub(super) fn unscaled_violation<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, worst: Worst) -> Worst {
+        let rows = self.workspace.as_ref().get(saved_penalties_end(ocp)..).unwrap_or_default();
+        let places = Places::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
+        let unit = places.map_or(1.0, |place| {
+            let begin = match worst.field {
+                QpField::StateBounds => 0,
+                QpField::ControlBounds => place.nx,
+                _ => place.ld,
+            };
+            at(rows, (place.row + begin + worst.index) as u32).to_f64()
+        });
+        Worst { violation: worst.violation * unit, ..worst }
+    }
+}
+
+/// The units in the memory of a run, where they are not all one.
+fn scaling_units<'s, P, T, D, M>(
+    work: &'s [T],
+    ocp: &Ocp<P, T, D, M>,
+    state: &RunState<'_, T>,
+) -> Option<ScalingUnits<'s, T>>
+where
+    P: Program<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+{
+    let rows = work.get(saved_penalties_end(ocp)..).unwrap_or_default();
+    state.scaling.map(|sizes| ScalingUnits { scaling: sizes, rows })
+}
+
+/// The linear penalties that are remembered, in the memory of a run.
+pub(super) fn saved_penalties_mut<'s, P, T, D, M>(work: &'s mut [T], ocp: &Ocp<P, T, D, M>) -> &'s mut [T]
+where
+    P: Program<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+{
+    work.get_mut(ocp.ends()..saved_penalties_end(ocp)).unwrap_or_default()
+}
+
+/// Where penalties end in the memory of a run, and units begin.
+pub(super) fn saved_penalties_end<
+    P: Program<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+>(
+    ocp: &Ocp<P, T, D, M>,
+) -> usize {
+    ocp.ends() + elastic_mode::penalty_memory_len(ocp.qp.dims())
+}

@@ -1,0 +1,239 @@
+//! What goes from a phase to the whole and back: points with their multipliers, bounds, and QPs.
+//!
+//! ```text
+//! stage of a phase   (x | w, u)        of the whole   (x, w | u)        w₊ = w
+//! ```
+//!
+//! The order of variables is the same: what are controls `w` of a phase, shared by its stages, are
+//! states of the whole.
+
+use super::phase::PhaseSize;
+use crate::qp::element::set;
+use crate::qp::{
+    Arrays, Bounds, BoundsMut, HeapSolution, SolutionStage, SolutionStageMut, Stage, StageMut, copy_common,
+    part, part_mut,
+};
+use crate::scalar::Real;
+
+/// A point of the whole, at the stages of a phase, as one of the phase; `before` is the stage at
+/// which its start was decided, the result the one at its end.
+pub(super) fn load_phase<'s, T: Real>(
+    size: PhaseSize,
+    from: &mut impl Iterator<Item = SolutionStage<'s, T>>,
+    to: &mut HeapSolution<T>,
+    previous_stage: Option<SolutionStage<'s, T>>,
+) -> Option<SolutionStage<'s, T>> {
+    let (mut last, mut start_stage) = (None, previous_stage);
+    to.each_stage_mut(|to| {
+        let Some(from) = from.next() else { return };
+        load_phase_stage(size, &from, to, start_stage.take());
+        last = Some(from);
+    });
+    last
+}
+
+fn load_phase_stage<T: Real>(
+    size @ PhaseSize { nx, free, .. }: PhaseSize,
+    from: &SolutionStage<'_, T>,
+    to: SolutionStageMut<'_, T>,
+    previous_stage: Option<SolutionStage<'_, T>>,
+) {
+    for (x, u, to_x, to_u) in [
+        (from.x, from.u, to.x, &mut *to.u),
+        (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
+        (from.x_upper, from.u_upper, to.x_upper, &mut *to.u_upper),
+    ] {
+        let (x, w) = x.split_at_checked(nx).unwrap_or_default();
+        let (to_w, to_u) = to_u.split_at_mut_checked(free).unwrap_or_default();
+        copy_common(to_x, x);
+        copy_common(to_w, w);
+        copy_common(to_u, u);
+    }
+    copy_common(to.dynamics, from.dynamics);
+    copy_common(to.g_lower, from.g_lower);
+    copy_common(to.g_upper, from.g_upper);
+    // What is decided has its bounds where it is.
+    if let Some(before) = previous_stage {
+        for (from, x, u) in
+            [(before.u_lower, to.x_lower, to.u_lower), (before.u_upper, to.x_upper, to.u_upper)]
+        {
+            let (states, parameters) =
+                from.split_at_checked(size.free_start_states().len()).unwrap_or_default();
+            copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
+            copy_common(u, part(parameters, 0, free));
+        }
+    }
+}
+
+/// A stage of a phase as one of the whole; with the first stage of the next phase, where it ends.
+pub(super) fn store_phase_stage<T: Real>(
+    PhaseSize { free, .. }: PhaseSize,
+    from: &SolutionStage<'_, T>,
+    to: SolutionStageMut<'_, T>,
+    next: Option<(PhaseSize, SolutionStage<'_, T>)>,
+) {
+    for (x, u, to_x, to_u) in [
+        (from.x, from.u, to.x, &mut *to.u),
+        (from.x_lower, from.u_lower, to.x_lower, &mut *to.u_lower),
+        (from.x_upper, from.u_upper, to.x_upper, &mut *to.u_upper),
+    ] {
+        let (w, u) = u.split_at_checked(free).unwrap_or_default();
+        let (first, second) = to_x.split_at_mut_checked(x.len()).unwrap_or_default();
+        copy_common(first, x);
+        copy_common(second, w);
+        copy_common(to_u, u);
+    }
+    copy_common(to.dynamics, from.dynamics);
+    copy_common(to.g_lower, from.g_lower);
+    copy_common(to.g_upper, from.g_upper);
+    if let Some((size, next)) = next {
+        write_start_variables(size, &next, to.u, to.u_lower, to.u_upper);
+    }
+}
+
+/// What is decided where a phase begins, from its first stage, with the multipliers of its bounds.
+pub(super) fn write_start_variables<T: Real>(
+    size: PhaseSize,
+    first: &SolutionStage<'_, T>,
+    to: &mut [T],
+    lower: &mut [T],
+    upper: &mut [T],
+) {
+    for (to, x, u) in
+        [(to, first.x, first.u), (lower, first.x_lower, first.u_lower), (upper, first.x_upper, first.u_upper)]
+    {
+        gather_start_variables(size, x, u, to);
+    }
+}
+
+/// Of a vector over the first states and controls of a phase the elements that are decided where it
+/// begins: states that are free there, then free parameters.
+fn gather_start_variables<T: Real>(size: PhaseSize, x: &[T], u: &[T], to: &mut [T]) {
+    let (states, parameters) = to.split_at_mut_checked(size.free_start_states().len()).unwrap_or_default();
+    copy_common(states, x.get(size.free_start_states()).unwrap_or_default());
+    copy_common(parameters, part(u, 0, size.free));
+}
+
+/// Six vectors of bounds and penalties.
+fn bound_vectors<'a, T>(bounds: &Bounds<'a, T>) -> [&'a [T]; 6] {
+    let Bounds { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = *bounds;
+    [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
+}
+
+/// Six vectors of bounds and penalties.
+fn bound_vectors_mut<T>(bounds: BoundsMut<'_, T>) -> [&mut [T]; 6] {
+    let BoundsMut { lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic } = bounds;
+    [lower, upper, lower_linear, lower_quadratic, upper_linear, upper_quadratic]
+}
+
+/// Where in a horizon of phases a stage is, for its bounds.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum StagePosition {
+    /// The first stage of all: its states are given or decided.
+    FirstStage,
+    /// The first stage of another phase.
+    PhaseStart,
+    InteriorStage,
+}
+
+/// Bounds of a stage, without those of what is decided before it, and of integrals where these
+/// begin.
+pub(super) fn copy_stage_bounds<T: Real>(
+    PhaseSize { nx, free, model_states: own, .. }: PhaseSize,
+    from: &Stage<'_, T>,
+    to: &mut StageMut<'_, T>,
+    position: StagePosition,
+) {
+    let control_bounds = bound_vectors(&from.u_bounds());
+    let count = match position {
+        StagePosition::FirstStage => 0,
+        StagePosition::PhaseStart => own,
+        StagePosition::InteriorStage => nx,
+    };
+    for (to, (x, u)) in bound_vectors_mut(to.x_bounds_mut())
+        .into_iter()
+        .zip(bound_vectors(&from.x_bounds()).into_iter().zip(control_bounds))
+    {
+        copy_common(part_mut(to, 0, count), x);
+        if position == StagePosition::InteriorStage {
+            copy_common(to.get_mut(nx..).unwrap_or_default(), part(u, 0, free));
+        }
+    }
+    for (to, from) in bound_vectors_mut(to.u_bounds_mut()).into_iter().zip(control_bounds) {
+        copy_common(to, from.get(free..).unwrap_or_default());
+    }
+    for (to, from) in bound_vectors_mut(to.g_bounds_mut()).into_iter().zip(bound_vectors(&from.g_bounds())) {
+        copy_common(to, from);
+    }
+}
+
+/// Bounds of what is decided where a phase begins, from its first stage.
+pub(super) fn write_start_variable_bounds<T: Real>(
+    size: PhaseSize,
+    first: &Stage<'_, T>,
+    to: &mut StageMut<'_, T>,
+) {
+    let first_bounds = bound_vectors(&first.x_bounds()).into_iter().zip(bound_vectors(&first.u_bounds()));
+    for (to, (x, u)) in bound_vectors_mut(to.u_bounds_mut()).into_iter().zip(first_bounds) {
+        gather_start_variables(size, x, u, to);
+    }
+}
+
+/// Where a phase begins: what is decided, and zero of what is neither decided nor given.
+pub(super) fn write_start_state<T: Real>(size: PhaseSize, start_variables: &[T], start: &mut [T]) {
+    let (states, parameters) =
+        start_variables.split_at_checked(size.free_start_states().len()).unwrap_or_default();
+    let (x, w) = start.split_at_mut_checked(size.nx).unwrap_or_default();
+    x.get_mut(size.given_states..).unwrap_or_default().fill(T::ZERO);
+    copy_common(x.get_mut(size.free_start_states()).unwrap_or_default(), states);
+    copy_common(w, parameters);
+}
+
+/// The same as columns of the QP, where what is decided are the variables from `first` on.
+pub(super) fn write_start_columns<T: Real>(size: PhaseSize, first: usize, columns: &mut [T], ld: usize) {
+    for (j, state) in size.free_start_states().chain(size.nx..size.nx + size.free).enumerate() {
+        set(columns, state * ld + first + j, T::ONE);
+    }
+}
+
+/// The QP at a stage, without what leads to another phase.
+pub(super) fn copy_stage_qp<T: Real>(
+    PhaseSize { nx, free, .. }: PhaseSize,
+    from: &Stage<'_, T>,
+    to: &mut Arrays<'_, T>,
+) {
+    let (view, bounds) = (from.arrays(), from.g_bounds());
+    let Arrays { ld, next, rows, matrix, hessian, gradient, offset, limits, .. } = to;
+    let (ld, n) = (*ld, view.n);
+    let from_column = |list, j: usize| part(list, j * view.ld, n);
+    let copy = |to: &mut [T], j: usize, from: &[T]| {
+        let column = part_mut(to, j * ld, ld);
+        let (own, behind) = column.split_at_mut_checked(n).unwrap_or_default();
+        copy_common(own, from);
+        behind.fill(T::ZERO);
+    };
+    for j in 0..view.next {
+        copy(matrix, j, from_column(view.matrix, j));
+    }
+    if view.next > 0 {
+        for w in nx..nx + free {
+            part_mut(matrix, w * ld, ld).fill(T::ZERO);
+            set(matrix, w * ld + w, T::ONE);
+        }
+        let (own, behind) = offset.split_at_mut_checked(nx).unwrap_or_default();
+        copy_common(own, view.offset);
+        behind.fill(T::ZERO);
+    }
+    for row in 0..bounds.lower.len() {
+        copy(matrix, *next + row, from_column(view.matrix, view.next + row));
+    }
+    hessian.fill(T::ZERO);
+    gradient.fill(T::ZERO);
+    for j in 0..n {
+        copy(hessian, j, from_column(view.hessian, j));
+    }
+    copy_common(gradient, part(view.gradient, 0, n));
+    let (lower, rest) = limits.split_at_mut_checked(*rows).unwrap_or_default();
+    copy_common(part_mut(lower, ld, bounds.lower.len()), bounds.lower);
+    copy_common(part_mut(rest, ld, bounds.upper.len()), bounds.upper);
+}

@@ -1,0 +1,159 @@
+//! The first state where it is free, the multipliers `θ` of periodic states, and shared controls
+//! `w`: unknowns of one small system beside the recursion.
+//!
+//! ```text
+//! π₀ + E θ = 0        x₀ − x_N = 0        Σ_k ∂L/∂u_k[j] = 0
+//! ```
+//!
+//! Each unknown is one column of this system: a pass through the recursion where it is one, and all
+//! others are zero. It is symmetric, and inertia adds up (E. V. Haynsworth, Linear Algebra Appl. 1,
+//! 1968): the solution is a minimum where pivots of controls and of the border together have as
+//! many negative signs as there are periodic states.
+
+use super::kkt_direction::KktDirection;
+use crate::linalg::{axpy, dot};
+use crate::ocp::formulation::error::OcpError;
+use crate::qp::element::{add, get, set};
+use crate::qp::{QpView, marked_indices, part, part_mut, zeros};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+
+/// The unknowns `(x₀, θ, w)`, of which there may be none.
+#[derive(Clone, Debug, Default)]
+pub(super) struct BorderedSystem<T> {
+    nx: usize,
+    nu: usize,
+    /// How many elements of the first state there are: none where it is given.
+    free_initial_states: usize,
+    pub(super) periodic_states: Vec<usize>,
+    shared_controls: Vec<usize>,
+    /// Rows of `M` of shared controls, of every interval.
+    shared_control_rows: Vec<T>,
+    /// Factors of the system.
+    pub(super) factors: Vec<T>,
+    pub(super) pivot_exchanges: Vec<T>,
+}
+
+impl<T: Real> BorderedSystem<T> {
+    /// That of a problem, in memory of the last one where it is the same.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn prepare(
+        &mut self,
+        qp: QpView<'_, T>,
+        is_free: bool,
+        [nx, nu, n]: [usize; 3],
+    ) -> Result<(), OcpError> {
+        let free = if is_free { nx } else { 0 };
+        let is_unchanged = |old: &[usize], marks: &[T]| marked_indices(marks).eq(old.iter().copied());
+        if free == self.free_initial_states
+            && is_unchanged(&self.periodic_states, qp.periodic())
+            && is_unchanged(&self.shared_controls, qp.shared())
+        {
+            return Ok(());
+        }
+        (self.nx, self.nu, self.free_initial_states) = (nx, nu, free);
+        self.periodic_states = marked_indices(qp.periodic()).collect();
+        self.shared_controls = marked_indices(qp.shared()).collect();
+        self.shared_control_rows = zeros(n * self.shared_controls.len() * (nx + nu))?;
+        self.factors = zeros(self.unknown_count() * self.unknown_count())?;
+        self.pivot_exchanges = zeros(self.unknown_count())?;
+        Ok(())
+    }
+
+    /// How many unknowns there are.
+    pub fn unknown_count(&self) -> usize {
+        self.free_initial_states + self.periodic_states.len() + self.shared_controls.len()
+    }
+    pub fn condition_count(&self) -> usize {
+        self.periodic_states.len()
+    }
+    /// Whether the first state is found.
+    pub fn has_free_initial_state(&self) -> bool {
+        self.free_initial_states > 0
+    }
+
+    /// Takes the rows of shared controls out of `M`, so that these are not eliminated.
+    pub fn extract_shared_control_rows(&mut self, k: usize, m: &mut [T]) {
+        let (nx, size) = (self.nx, self.nx + self.nu);
+        let rows = part_mut(
+            &mut self.shared_control_rows,
+            k * self.shared_controls.len() * size,
+            self.shared_controls.len() * size,
+        );
+        let at = |i: usize, j: usize| i.min(j) * size + i.max(j);
+        for (row, &j) in rows.chunks_exact_mut(size.max(1)).zip(&self.shared_controls) {
+            for (i, element) in row.iter_mut().enumerate() {
+                *element = get(m, at(i, nx + j));
+            }
+        }
+        for &j in &self.shared_controls {
+            (0..size).for_each(|i| set(m, at(i, nx + j), if i == nx + j { T::ONE } else { T::ZERO }));
+        }
+    }
+
+    fn shared_control_rows(&self, k: usize) -> impl Iterator<Item = &[T]> {
+        let size = self.nx + self.nu;
+        part(
+            &self.shared_control_rows,
+            k * self.shared_controls.len() * size,
+            self.shared_controls.len() * size,
+        )
+        .chunks_exact(size.max(1))
+    }
+    /// Shared controls and where they are among the unknowns.
+    fn shared_control_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
+        let begin = self.free_initial_states + self.periodic_states.len();
+        self.shared_controls.iter().enumerate().map(move |(c, &j)| (begin + c, j))
+    }
+    /// Periodic states and where their multipliers are among the unknowns.
+    fn periodic_multiplier_unknowns(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.periodic_states.iter().enumerate().map(|(c, &i)| (self.free_initial_states + c, i))
+    }
+
+    /// The first state.
+    pub fn initial_state<'a>(&self, start: &'a [T], unknowns: &'a [T]) -> &'a [T] {
+        if self.has_free_initial_state() { unknowns } else { start }
+    }
+
+    /// Adds what shared controls do to a gradient, whose elements by them belong to their own
+    /// conditions.
+    pub fn add_shared_control_gradient(&self, k: usize, unknowns: &[T], q: &mut [T], residual: &mut [T]) {
+        for ((unknown, _), row) in self.shared_control_unknowns().zip(self.shared_control_rows(k)) {
+            axpy(get(unknowns, unknown), row, q);
+        }
+        for (condition, j) in self.shared_control_unknowns() {
+            add(residual, condition, get(q, self.nx + j));
+            set(q, self.nx + j, T::ZERO);
+        }
+    }
+
+    /// Adds what `θ` does to the gradient by the last state.
+    pub fn add_periodic_multipliers(&self, unknowns: &[T], q: &mut [T]) {
+        self.periodic_multiplier_unknowns().for_each(|(unknown, i)| add(q, i, -get(unknowns, unknown)));
+    }
+
+    /// Sets shared controls, after what the state and the other controls do to their conditions.
+    pub fn set_shared_controls(&self, k: usize, x: &[T], u: &mut [T], unknowns: &[T], residual: &mut [T]) {
+        for ((condition, _), row) in self.shared_control_unknowns().zip(self.shared_control_rows(k)) {
+            add(residual, condition, dot(part(row, 0, self.nx), x) + dot(part(row, self.nx, self.nu), u));
+        }
+        self.shared_control_unknowns().for_each(|(unknown, j)| set(u, j, get(unknowns, unknown)));
+    }
+
+    /// The conditions of the first state and of periodic ones, at the end of a pass. Multipliers of
+    /// the first state contain `θ` from here on.
+    pub fn evaluate_conditions(&self, n: usize, direction: &mut KktDirection<T>) {
+        for (condition, i) in self.periodic_multiplier_unknowns() {
+            let gap = get(direction.state(0), i) - get(direction.state(n), i);
+            set(&mut direction.border_residual, condition, gap);
+            let theta = get(&direction.border_unknowns, condition);
+            add(direction.multipliers_mut(0), i, theta);
+        }
+        for i in 0..self.free_initial_states {
+            let value = get(direction.multipliers(0), i);
+            set(&mut direction.border_residual, i, value);
+        }
+    }
+}

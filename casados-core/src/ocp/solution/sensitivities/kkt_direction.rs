@@ -1,0 +1,90 @@
+//! Solutions of the conditions of optimality by the factors of the recursion.
+
+use crate::ocp::formulation::error::OcpError;
+use crate::qp::element::{add, get, set};
+use crate::qp::{part, part_mut, zeros};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+
+/// A direction: changes of states and controls, and those of the multipliers of the dynamics.
+#[derive(Clone, Debug, Default)]
+pub(super) struct KktDirection<T> {
+    nx: usize,
+    nu: usize,
+    pub(super) x: Vec<T>,
+    pub(super) u: Vec<T>,
+    pub(super) pi: Vec<T>,
+    /// The first state, where it is given.
+    pub(super) initial_state: Vec<T>,
+    pub(super) work: Vec<T>,
+    /// The unknowns of the border, and what is left of its conditions.
+    pub border_unknowns: Vec<T>,
+    pub border_residual: Vec<T>,
+}
+
+impl<T: Real> KktDirection<T> {
+    pub fn new([nx, nu, _]: [usize; 3], n: usize) -> Result<Self, OcpError> {
+        Ok(Self {
+            nx,
+            nu,
+            x: zeros((n + 1) * nx)?,
+            u: zeros(n * nu)?,
+            pi: zeros((n + 1) * nx)?,
+            initial_state: zeros(nx)?,
+            work: zeros(2 * nx + nu)?,
+            border_unknowns: Vec::new(),
+            border_residual: Vec::new(),
+        })
+    }
+    pub fn state(&self, k: usize) -> &[T] {
+        part(&self.x, k * self.nx, self.nx)
+    }
+    pub fn control(&self, k: usize) -> &[T] {
+        part(&self.u, k * self.nu, self.nu)
+    }
+    /// With so many unknowns of the border, all zero.
+    pub fn reset(&mut self, border_count: usize) {
+        for values in [&mut self.border_unknowns, &mut self.border_residual] {
+            values.clear();
+            values.resize(border_count, T::ZERO);
+        }
+    }
+    /// Of what makes `x_k`; at the start of what makes it the first state, given or periodic.
+    pub fn multipliers(&self, k: usize) -> &[T] {
+        part(&self.pi, k * self.nx, self.nx)
+    }
+    pub fn multipliers_mut(&mut self, k: usize) -> &mut [T] {
+        part_mut(&mut self.pi, k * self.nx, self.nx)
+    }
+}
+
+/// What the conditions of optimality are solved for: a gradient `q_k` over `(x, u)`, and constants
+/// `e_k` of the dynamics.
+pub(super) trait RightHandSide<T> {
+    /// Writes `q_k`, which is zero before.
+    fn gradient(&self, k: usize, q: &mut [T]);
+    /// `e_k`; empty if there is none.
+    fn dynamics_constant(&self, k: usize) -> &[T];
+}
+
+/// `x = −M_uu⁻¹ b`
+pub(super) fn solve_controls<T: Real>(factors: &[T], b: &[T], x: &mut [T]) {
+    let nu = x.len();
+    let at = |i: usize, j: usize| j * nu + i;
+    for (x, &b) in x.iter_mut().zip(b) {
+        *x = -b;
+    }
+    for j in 0..nu {
+        for i in j + 1..nu {
+            let product = get(factors, at(i, j)) * get(x, j);
+            add(x, i, -product);
+        }
+    }
+    for j in (0..nu).rev() {
+        let mut value = get(x, j) / get(factors, at(j, j));
+        for i in j + 1..nu {
+            value = value - get(factors, at(i, j)) * get(x, i);
+        }
+        set(x, j, value);
+    }
+}
