@@ -42,7 +42,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let (mut residuals, penalties) = kkt::residuals(qp.view(), iterate, scratch);
-        if P::LIFTED {
+        if self.problem.is_lifted() {
             let [_, largest_stage_residual] = self.stage_residuals;
             residuals.dynamics = nan_max(residuals.dynamics, largest_stage_residual.to_f64());
         }

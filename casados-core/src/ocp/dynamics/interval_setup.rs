@@ -50,5 +50,5 @@ pub(in crate::ocp) fn each<M: Dae, T: Real, D>(
 /// # Errors
 /// [`OcpError::Integration`]
 pub(in crate::ocp) fn in_interval<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
-    result.map_err(|error| OcpError::Integration { interval, error })
+    result.map_err(|error| OcpError::Integration { interval, error, phase: None })
 }

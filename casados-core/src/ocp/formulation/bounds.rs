@@ -381,6 +381,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             QpField::R | QpField::S => (input(row), 0),
             _ => ("", 0),
         };
-        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value })
+        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value, phase: None })
     }
 }

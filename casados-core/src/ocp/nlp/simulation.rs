@@ -141,7 +141,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn guess_by_simulation(&mut self) -> Result<&mut Self, OcpError> {
-        if P::LIFTED {
+        if P::Dynamics::LIFTED {
             return Err(OcpError::NoIntegrator);
         }
         self.roll_out(|ocp, k, end| {

@@ -35,11 +35,12 @@ use crate::qp::{
     HeapSolution, Qp, Solution, SolutionStage, StageDims, copy_common, padded_len, try_reserve, zeros,
 };
 use crate::scalar::Real;
+use crate::structure::name_matches;
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
-use phase::{Phase, PhaseSize};
+use phase::{Phase, PhaseStart};
 use stage_conversion::StagePosition;
 
 /// Problems that follow one another, solved as one: other models, other horizons, other controls.
@@ -112,8 +113,12 @@ struct TrialPoint<T> {
 /// A phase, and what follows it.
 struct JoinedPhase<'a, T> {
     problem: &'a mut dyn Phase<T>,
+    begin: PhaseStart,
+    /// Names of the parameters that are those of the phase before.
+    shares: Vec<&'a str>,
     link: Option<Box<dyn Link<T> + 'a>>,
-    size: PhaseSize,
+    /// Where the phase behind it begins.
+    next: Option<PhaseStart>,
     /// The first of its stages among all.
     first: usize,
 }
@@ -146,6 +151,44 @@ impl<'a, T: Real> Phases<'a, T> {
         self
     }
 
+    /// A free parameter of the last phase, by name, is that of the same name of the phase before:
+    /// one value is found for both.
+    ///
+    /// # Example
+    /// A car is pushed and braked for a second each; from its speed in the end its mass follows.
+    /// ```
+    /// use casados::ocp::{Continuous, HeapIpm, Horizon, Phases, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// /// Speed and mass; 2 N, then −1 N.
+    /// #[ode]
+    /// fn push(_x: f64, p: f64) -> f64 { 2.0 / p }
+    /// #[ode]
+    /// fn brake(_x: f64, p: f64) -> f64 { -1.0 / p }
+    ///
+    /// let mut first = Problem::new(Irk::<Push, Gauss<1>>::new(Options::default())?)
+    ///     .on(Horizon::uniform(2, 0.5))?;
+    /// first.fix_initial_state(&[0.0])?.guess(&[1.0], &[])?.free("p", 0.1..=9.0, 1.0)?;
+    /// let mut second = Problem::new(Irk::<Brake, Gauss<1>>::new(Options::default())?)
+    ///     .on(Horizon::uniform(2, 0.5))?;
+    /// second.guess(&[1.0], &[])?.bound("x", 2.., 2.0, 2.0)?.free("p", 0.1..=9.0, 1.0)?;
+    ///
+    /// let mut drive = Phases::new(&mut first).then(Continuous, &mut second).share("p").join()?;
+    /// assert!(HeapIpm::new(&drive)?.solve(&mut drive)?.is_converged());
+    /// drop(drive);
+    /// let mass = second.solution()?.parameter("p")?[0];
+    /// assert!((mass - 0.5).abs() < 1e-7);
+    /// assert_eq!(first.solution()?.parameter("p")?[0], mass);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn share(mut self, name: &'a str) -> Self {
+        if let Some(last) = self.phases.last_mut() {
+            last.shares.push(name);
+        }
+        self
+    }
+
     /// One problem of all phases, whose iterate is the guess of each. Its stages are the start and
     /// those of the phases, one after the other.
     ///
@@ -153,22 +196,23 @@ impl<'a, T: Real> Phases<'a, T> {
     ///
     /// # Errors
     /// [`OcpError::LinkDimension`], [`OcpError::NotThere`], [`OcpError::DependsOnTime`] of a link;
-    /// [`OcpError::Phase`] of an initial state behind the first phase, of collocation, periodic
-    /// states and shared controls; [`OcpError::Missing`] and others of a phase that is not complete
-    /// ([`Ocp::check`]); [`OcpError::OutOfMemory`].
+    /// [`OcpError::Phase`] of an initial state behind the first phase, of periodic states, shared
+    /// controls and parameters that are not free in both phases;
+    /// [`OcpError::Missing`] and others of a phase that is not complete ([`Ocp::check`]);
+    /// [`OcpError::OutOfMemory`].
     pub fn join(mut self) -> Result<HeapOcp<Self, T>, OcpError> {
         self.check()?;
         let mut dims: Vec<StageDims> = Vec::new();
-        let mut start_variables: Vec<usize> =
-            self.phases.iter().map(|phase| phase.size.start_variable_count()).collect();
-        start_variables.push(0);
-        let mut decided = start_variables.into_iter();
+        let mut decided: Vec<usize> =
+            self.phases.iter().map(|phase| phase.begin.start_variable_count()).collect();
+        decided.push(0);
+        let mut decided = decided.into_iter();
         dims.push(StageDims::new(0, decided.next().unwrap_or(0), 0));
         for (phase, decided) in self.phases.iter_mut().zip(decided) {
             phase.first = dims.len();
             let phase_dims = phase.problem.qp().dims();
             try_reserve(&mut dims, phase_dims.len())?;
-            let (nx, free) = (phase.size.nx, phase.size.free);
+            let (nx, free) = (phase.begin.size.nx, phase.begin.size.free);
             dims.extend(phase_dims.iter().map(|stage| StageDims::new(nx + free, stage.nu - free, stage.ng)));
             if let Some(last) = dims.last_mut() {
                 last.nu = decided;
@@ -205,33 +249,34 @@ impl<'a, T: Real> Phases<'a, T> {
             if let Some(what) = phase.problem.unsupported_feature(index == 0) {
                 return Err(OcpError::Phase { phase: index, model: phase.problem.names().model, what });
             }
-            phase.problem.check()?;
-            phase.size = phase.problem.size();
-            phase.size.given_states =
-                if index == 0 { phase.size.given_states } else { phase.size.model_states };
+            phase.problem.check().map_err(|error| error.in_phase(index))?;
+            let mut size = phase.problem.size();
+            size.given_states = if index == 0 { size.given_states } else { size.model_states };
+            phase.begin = PhaseStart { size, shared: vec![None; size.free] };
         }
         self.initial_state = self.given_initial_state()?;
-        for (phase, next) in self.phases.iter().zip(self.phases.iter().skip(1)) {
-            if let Some(link) = &phase.link {
-                link.check(phase.problem.link_dims(next.size.model_states))?;
+        let mut before: Option<&mut JoinedPhase<'_, T>> = None;
+        for (index, phase) in self.phases.iter_mut().enumerate() {
+            phase.share_parameters(before.as_deref(), index)?;
+            if let Some(before) = &mut before {
+                if let Some(link) = &before.link {
+                    link.check(before.problem.link_dims(phase.begin.size.model_states))?;
+                }
+                before.next = Some(phase.begin.clone());
             }
+            before = Some(phase);
         }
         Ok(())
     }
 
     /// The first state of all, as far as it is given.
     fn given_initial_state(&self) -> Result<Vec<T>, OcpError> {
-        let Some(JoinedPhase { problem, size, .. }) = self.phases.first() else { return Ok(Vec::new()) };
-        let mut start = zeros(size.given_states)?;
+        let Some(JoinedPhase { problem, begin, .. }) = self.phases.first() else { return Ok(Vec::new()) };
+        let mut start = zeros(begin.size.given_states)?;
         if let Some(first) = problem.qp().stage(0) {
             copy_common(&mut start, first.x_bounds().lower);
         }
         Ok(start)
-    }
-
-    /// How large the phase behind each one is.
-    fn next_sizes(&self) -> Vec<Option<PhaseSize>> {
-        self.phases.iter().skip(1).map(|next| Some(next.size)).chain([None]).collect()
     }
 
     /// The phase of a stage of the whole; none of the start.
@@ -245,12 +290,12 @@ impl<'a, T: Real> Phases<'a, T> {
         let (mut lower, mut upper) = given.split_at_mut(given.len() / 2);
         let mut stages = qp.stages_mut();
         let mut previous_stage = stages.next();
-        for (index, JoinedPhase { problem, size, .. }) in self.phases.iter_mut().enumerate() {
+        for (index, JoinedPhase { problem, begin, .. }) in self.phases.iter_mut().enumerate() {
             for (k, from) in problem.qp().stages().enumerate() {
                 if k == 0
                     && let Some(mut previous) = previous_stage.take()
                 {
-                    stage_conversion::write_start_variable_bounds(*size, &from, &mut previous);
+                    stage_conversion::write_start_variable_bounds(begin, &from, &mut previous);
                 }
                 let Some(mut to) = stages.next() else { return };
                 let position = match (index, k) {
@@ -258,7 +303,7 @@ impl<'a, T: Real> Phases<'a, T> {
                     (_, 0) => StagePosition::PhaseStart,
                     _ => StagePosition::InteriorStage,
                 };
-                stage_conversion::copy_stage_bounds(*size, &from, &mut to, position);
+                stage_conversion::copy_stage_bounds(begin, &from, &mut to, position);
                 previous_stage = Some(to);
             }
             for (to, from) in [&mut lower, &mut upper].into_iter().zip(problem.given_constraint_bounds()) {
@@ -272,18 +317,18 @@ impl<'a, T: Real> Phases<'a, T> {
     /// The iterates of all phases as that of the whole.
     fn store_iterates(&self, to: &mut HeapSolution<T>) {
         let first_stages =
-            || self.phases.iter().map(|phase| (phase.size, phase.problem.iterate().stages().next()));
+            || self.phases.iter().map(|phase| (&phase.begin, phase.problem.iterate().stages().next()));
         let nexts = first_stages().skip(1).map(Some).chain([None]);
         let mut stages = self.phases.iter().zip(nexts).flat_map(|(phase, next)| {
-            let next = next.and_then(|(size, first)| Some((size, first?)));
-            let last = phase.size.intervals;
+            let next = next.and_then(|(begin, first)| Some((begin, first?)));
+            let size = phase.begin.size;
             let stages = phase.problem.iterate().stages().enumerate();
-            stages.map(move |(k, stage)| (phase.size, stage, next.filter(|_| k == last)))
+            stages.map(move |(k, stage)| (size, stage, next.filter(|_| k == size.intervals)))
         });
-        let mut start = first_stages().next().and_then(|(size, first)| Some((size, first?)));
+        let mut start = first_stages().next().and_then(|(begin, first)| Some((begin, first?)));
         to.each_stage_mut(|to| {
-            if let Some((size, first)) = start.take() {
-                stage_conversion::write_start_variables(size, &first, to.u, to.u_lower, to.u_upper);
+            if let Some((begin, first)) = start.take() {
+                stage_conversion::write_start_variables(begin, &first, to.u, to.u_lower, to.u_upper);
             } else if let Some((size, from, next)) = stages.next() {
                 stage_conversion::store_phase_stage(size, &from, to, next);
             }
@@ -293,8 +338,8 @@ impl<'a, T: Real> Phases<'a, T> {
     /// The part of each phase in a point of the whole, as its iterate.
     fn load<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
         let mut before = stages.next();
-        for JoinedPhase { problem, size, .. } in &mut self.phases {
-            before = stage_conversion::load_phase(*size, &mut stages, problem.iterate_mut(), before);
+        for JoinedPhase { problem, begin, .. } in &mut self.phases {
+            before = stage_conversion::load_phase(begin, &mut stages, problem.iterate_mut(), before);
         }
     }
 }
@@ -304,8 +349,38 @@ impl<'a, T: Real> JoinedPhase<'a, T> {
     where
         P: Formulation<T, Dynamics: SecondOrder<T>> + 'a,
     {
-        let size = Phase::<T>::size(problem);
-        Self { problem, link: None, size, first: 0 }
+        let begin = PhaseStart { size: Phase::<T>::size(problem), shared: Vec::new() };
+        Self { problem, begin, shares: Vec::new(), link: None, next: None, first: 0 }
+    }
+
+    /// Which of its free parameters are those of the phase before.
+    ///
+    /// # Errors
+    /// [`OcpError::Phase`]
+    fn share_parameters(&mut self, before: Option<&Self>, phase: usize) -> Result<(), OcpError> {
+        let names = self.problem.names();
+        for name in &self.shares {
+            let mut is_found = false;
+            let meant = names.p.iter().enumerate().filter(|(_, label)| name_matches(name, label));
+            for (parameter, label) in meant {
+                let own = self.problem.found(parameter);
+                let other = before.and_then(|before| {
+                    let of_before = before.problem.names().p;
+                    before.problem.found(of_before.iter().position(|other| other == label)?)
+                });
+                if let (Some(own), Some(other)) = (own, other)
+                    && let Some(shared) = self.begin.shared.get_mut(own)
+                {
+                    (*shared, is_found) = (Some(other), true);
+                }
+            }
+            if !is_found {
+                let what =
+                    "a shared parameter that is not free in it and in the phase before: `free` of both";
+                return Err(OcpError::Phase { phase, model: names.model, what });
+            }
+        }
+        Ok(())
     }
 }
 

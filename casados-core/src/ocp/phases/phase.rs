@@ -2,7 +2,7 @@
 
 use super::link::{PhaseDims, PhaseEnd};
 use crate::ocp::formulation::error::{ConstraintName, OcpError};
-use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder};
+use crate::ocp::formulation::functions::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
@@ -14,6 +14,7 @@ use crate::qp::{
 };
 use crate::scalar::Real;
 use crate::shape::Shape;
+use alloc::vec::Vec;
 use core::ops::Range;
 
 /// The Hessian that a solver takes.
@@ -44,10 +45,26 @@ impl PhaseSize {
     pub fn free_start_states(&self) -> Range<usize> {
         self.given_states..self.model_states + self.linear_controls
     }
+}
 
-    /// How much is decided there: these states, then the parameters.
+/// Where a phase begins: these states are decided there, then the parameters that are not those of
+/// the phase before.
+#[derive(Clone, Debug)]
+pub(super) struct PhaseStart {
+    pub size: PhaseSize,
+    /// For each free parameter, which one of the phase before it is, if it is shared.
+    pub shared: Vec<Option<usize>>,
+}
+
+impl PhaseStart {
+    /// The parameters that are decided there.
+    pub fn parameters(&self) -> impl Iterator<Item = usize> {
+        self.shared.iter().enumerate().filter(|(_, shared)| shared.is_none()).map(|(w, _)| w)
+    }
+
+    /// How much is decided there.
     pub fn start_variable_count(&self) -> usize {
-        self.free_start_states().len() + self.free
+        self.size.free_start_states().len() + self.parameters().count()
     }
 }
 
@@ -55,6 +72,8 @@ impl PhaseSize {
 pub(super) trait Phase<T: Real> {
     fn size(&self) -> PhaseSize;
     fn names(&self) -> Names;
+    /// Which of the free parameters a parameter of the model is.
+    fn found(&self, parameter: usize) -> Option<usize>;
     /// What a link at its end is to fit that leads to so many states.
     fn link_dims(&self, begins: usize) -> PhaseDims;
     /// What a phase cannot be, of the first one or of another; then its start is free.
@@ -67,7 +86,14 @@ pub(super) trait Phase<T: Real> {
     fn given_constraint_bounds(&mut self) -> [&[T]; 2];
     /// Writes the QP at the iterate; the objective.
     fn linearise(&mut self, kind: Kind) -> Result<T, OcpError>;
-    fn evaluate(&mut self, trial_point: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
+    fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError>;
+    /// Whether stages of its intervals are variables.
+    fn is_lifted(&self) -> bool;
+    /// How far they go where intervals are evaluated next, and what was left of their equations.
+    fn stages(&mut self, step_length: Option<T>) -> [T; 2];
+    fn initialise_stages(&mut self) -> Result<(), OcpError>;
+    fn expand_stage_steps(&mut self, step: &HeapSolution<T>) -> Result<(), OcpError>;
+    fn apply_stage_action(&mut self, action: StageAction<T>);
     /// The end at this point of the last stage.
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
@@ -105,6 +131,9 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn names(&self) -> Names {
         <P::Dynamics as Dynamics<T>>::NAMES
     }
+    fn found(&self, parameter: usize) -> Option<usize> {
+        self.free.view().index_of(parameter)
+    }
     fn link_dims(&self, begins: usize) -> PhaseDims {
         PhaseDims {
             ending_dims: [P::Shape::NX, P::Shape::NU, P::Shape::NP, P::Shape::NZ],
@@ -116,9 +145,6 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     }
     fn unsupported_feature(&mut self, is_first: bool) -> Option<&'static str> {
         let free = self.free.count();
-        if P::Dynamics::LIFTED {
-            return Some("collocation, whose stages are variables: take an integrator");
-        }
         if marked_indices(self.qp.view().periodic()).next().is_some() {
             return Some("periodic states: a phase begins where the one before it ends");
         }
@@ -164,6 +190,22 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     }
     fn evaluate(&mut self, at: &HeapSolution<T>, ends: &mut [T]) -> Result<T, OcpError> {
         self.evaluate(at, ends)
+    }
+    fn is_lifted(&self) -> bool {
+        P::Dynamics::LIFTED
+    }
+    fn stages(&mut self, step_length: Option<T>) -> [T; 2] {
+        self.step_length = step_length;
+        self.stage_residuals
+    }
+    fn initialise_stages(&mut self) -> Result<(), OcpError> {
+        <P as Program<T>>::initialise_stages(self)
+    }
+    fn expand_stage_steps(&mut self, step: &HeapSolution<T>) -> Result<(), OcpError> {
+        <P as Program<T>>::expand_stage_steps(self, step)
+    }
+    fn apply_stage_action(&mut self, action: StageAction<T>) {
+        Program::apply_stage_action(&mut self.problem, action);
     }
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T> {
         let (stage, np, data) = (self.intervals(), P::Shape::NP, self.data.as_slice());

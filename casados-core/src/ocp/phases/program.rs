@@ -1,12 +1,12 @@
 //! What solvers ask of phases: each answers for its stages, and links for what is between them.
 
 use super::link::{Link, PhaseEnd};
-use super::phase::{Kind, PhaseSize};
+use super::phase::{Kind, Phase, PhaseSize, PhaseStart};
 use super::{JoinedPhase, Phases, TrialPoint, stage_conversion};
 use crate::linalg::dot;
 use crate::ocp::assembly::convexify::convexify;
 use crate::ocp::formulation::error::{ConstraintName, OcpError, Part};
-use crate::ocp::formulation::functions::dynamics::{Nodes, Sink};
+use crate::ocp::formulation::functions::dynamics::{Nodes, Sink, StageAction, add_stage_residuals};
 use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::curvature::Convexification;
@@ -17,7 +17,6 @@ use crate::qp::{
     copy_common, part, part_mut, take_mut,
 };
 use crate::scalar::Real;
-use alloc::vec::Vec;
 use core::ops::Range;
 
 /// What the curvature of [`Phases`] is of: of the dynamics of each phase.
@@ -66,6 +65,30 @@ macro_rules! programs {
         impl Program<$number> for Phases<'_, $number> {
             type Dynamics = PhaseDynamics;
 
+            fn is_lifted(&self) -> bool {
+                self.phases.iter().any(|phase| phase.problem.is_lifted())
+            }
+
+            fn initialise_stages<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+            ) -> Result<(), OcpError> {
+                ocp.problem.load(ocp.iterate.stages());
+                ocp.problem.each_phase(|phase, _| phase.initialise_stages())
+            }
+
+            fn expand_stage_steps<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
+                ocp: &mut Ocp<Self, $number, D, M>,
+                step: &Solution<$number, D, M>,
+            ) -> Result<(), OcpError> {
+                ocp.problem.load(ocp.iterate.stages());
+                ocp.problem.load_trials(step.stages());
+                ocp.problem.each_phase(|phase, trial| phase.expand_stage_steps(&trial.point))
+            }
+
+            fn apply_stage_action(&mut self, action: StageAction<$number>) {
+                self.phases.iter_mut().for_each(|phase| phase.problem.apply_stage_action(action));
+            }
+
             fn linearise<C, D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
                 ocp: &mut Ocp<Self, $number, D, M>,
                 curvature: C,
@@ -88,7 +111,11 @@ macro_rules! programs {
                 ends: &mut [$number],
             ) -> Result<$number, OcpError> {
                 let length = intervals_end(ocp.qp.dims());
-                ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())
+                ocp.problem.stages(ocp.step_length);
+                let objective =
+                    ocp.problem.evaluate(at, ends.split_at_mut_checked(length).unwrap_or_default())?;
+                ocp.stage_residuals = ocp.problem.stages(ocp.step_length);
+                Ok(objective)
             }
 
             fn split<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
@@ -102,7 +129,7 @@ macro_rules! programs {
             }
 
             fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {
-                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.size.intervals + 1);
+                let phases = self.phases.iter().map(|phase| phase.first..phase.first + phase.begin.size.intervals + 1);
                 core::iter::once(0..1).chain(phases)
             }
 
@@ -118,13 +145,16 @@ macro_rules! programs {
                 ocp: &Ocp<Self, $number, D, M>,
                 error: &QpError,
             ) -> Option<OcpError> {
-                ocp.problem.phases.iter().find_map(|phase| phase.problem.derivative(error)).or_else(|| {
+                let of_phase = |(index, phase): (usize, &JoinedPhase<'_, $number>)| {
+                    Some(phase.problem.derivative(error)?.in_phase(index))
+                };
+                ocp.problem.phases.iter().enumerate().find_map(of_phase).or_else(|| {
                     // What no phase has is of a link.
                     let Err(QpError::InvalidValue { stage, value, .. }) = check(ocp.qp.view()) else { return None };
-                    let (_, phase) = ocp.problem.at(stage)?;
+                    let (index, phase) = ocp.problem.at(stage)?;
                     let function = phase.link.as_ref()?.name();
                     let stage = stage - phase.first;
-                    Some(OcpError::NonFiniteFunction { function, stage, output: 0, value })
+                    Some(OcpError::NonFiniteFunction { function, stage, output: 0, value, phase: None }.in_phase(index))
                 })
             }
 
@@ -132,7 +162,8 @@ macro_rules! programs {
                 ocp: &mut Ocp<Self, $number, D, M>,
                 asks: bool,
             ) -> (bool, Option<(ConstraintName, f64)>) {
-                let Ocp { problem, iterate, .. } = ocp;
+                let Ocp { problem, iterate, step_length, .. } = ocp;
+                problem.stages(*step_length);
                 problem.load(iterate.stages());
                 let (mut is_convex, mut worst) = (true, None);
                 for (index, phase) in problem.phases.iter_mut().enumerate() {
@@ -158,11 +189,13 @@ fn write<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     kind: Kind,
 ) -> Result<(), OcpError> {
     ocp.problem.load(ocp.iterate.stages());
+    ocp.problem.stages(ocp.step_length);
     let mut objective = T::ZERO;
-    for phase in &mut ocp.problem.phases {
-        objective = objective + phase.problem.linearise(kind)?;
+    for (index, phase) in ocp.problem.phases.iter_mut().enumerate() {
+        objective = objective + phase.problem.linearise(kind).map_err(|error| error.in_phase(index))?;
     }
     ocp.objective = objective;
+    ocp.stage_residuals = ocp.problem.stages(ocp.step_length);
     let Ocp { problem, qp, iterate, data, .. } = ocp;
     let rows = 2 * qp.dims().iter().map(|stage| stage.ng).sum::<usize>();
     let scratch = data.as_mut().get_mut(rows..).unwrap_or_default();
@@ -185,16 +218,16 @@ impl<T: Real> JoinedPhase<'_, T> {
     /// Where the next phase begins: what the link makes of the end, and what is decided there.
     fn write_start(
         &mut self,
-        next: PhaseSize,
         trial: &TrialPoint<T>,
         last_stage: &SolutionStage<'_, T>,
-        start: &mut [T],
+        starts: &mut &mut [T],
     ) -> Result<(), OcpError> {
-        let (Some(link), Some(last)) = (&mut self.link, trial.point.stages().next_back()) else {
-            return Ok(());
-        };
-        link.value(self.problem.phase_end(last), part_mut(start, 0, next.given_states))?;
-        stage_conversion::write_start_state(next, last_stage.u, start);
+        let (Some(next), Some(link)) = (&self.next, &mut self.link) else { return Ok(()) };
+        let start = take_mut(starts, next.size.nx + next.size.free);
+        let Some(last) = trial.point.stages().next_back() else { return Ok(()) };
+        link.value(self.problem.phase_end(last), part_mut(start, 0, next.size.given_states))?;
+        let previous_stage = last_stage.x.get(self.begin.size.nx..).unwrap_or_default();
+        stage_conversion::write_start_state(next, last_stage.u, previous_stage, start);
         Ok(())
     }
 }
@@ -204,15 +237,15 @@ impl<T: Real> JoinedPhase<'_, T> {
 fn write_link_to_qp<T: Real>(
     link: &mut dyn Link<T>,
     end: PhaseEnd<'_, T>,
-    [size, next]: [PhaseSize; 2],
+    (size, begin): (PhaseSize, &PhaseStart),
     arrays: &mut Arrays<'_, T>,
     (v, pi): (&[T], &[T]),
     scratch: &mut [T],
     Kind { exact, convexification }: Kind,
 ) -> Result<(), OcpError> {
-    let Arrays { n, ld, next: next_state_count, matrix, hessian, gradient, offset, .. } = arrays;
-    let (n, ld) = (*n, *ld);
-    let columns = part_mut(matrix, 0, *next_state_count * ld);
+    let Arrays { n, ld, next: states, matrix, hessian, gradient, offset, .. } = arrays;
+    let (n, ld, next) = (*n, *ld, begin.size);
+    let columns = part_mut(matrix, 0, *states * ld);
     columns.fill(T::ZERO);
     offset.fill(T::ZERO);
     link.linearise(end, part_mut(offset, 0, next.given_states), (&mut *columns, ld))?;
@@ -220,7 +253,7 @@ fn write_link_to_qp<T: Real>(
         *offset = *offset - dot(column, v);
     }
     let variable_count = size.nx + size.free;
-    stage_conversion::write_start_columns(next, variable_count, columns, ld);
+    stage_conversion::write_start_columns(begin, [size.nx, variable_count], columns, ld);
     if exact {
         // The gradient of what is quadratic is `∇f − H v`: with another `H`.
         add_symmetric(gradient, hessian, ld, v, n);
@@ -236,6 +269,34 @@ fn write_link_to_qp<T: Real>(
 }
 
 impl<T: Real> Phases<'_, T> {
+    /// How far stages that are variables go where intervals are evaluated next, and what was left
+    /// of their equations: the sum, and the largest.
+    fn stages(&mut self, step_length: Option<T>) -> [T; 2] {
+        let stages = self.phases.iter_mut().map(|phase| phase.problem.stages(step_length));
+        stages.fold([T::ZERO; 2], add_stage_residuals)
+    }
+
+    /// The part of each phase in a vector over the last_stage, as a point that is tried.
+    fn load_trials<'s>(&mut self, mut stages: impl Iterator<Item = SolutionStage<'s, T>>) {
+        let mut previous_stage = stages.next();
+        for (phase, trial) in self.phases.iter().zip(&mut self.trial_points) {
+            previous_stage =
+                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+        }
+    }
+
+    /// # Errors
+    /// The first of a phase, with its number.
+    fn each_phase(
+        &mut self,
+        mut run: impl FnMut(&mut dyn Phase<T>, &TrialPoint<T>) -> Result<(), OcpError>,
+    ) -> Result<(), OcpError> {
+        for (index, (phase, trial)) in self.phases.iter_mut().zip(&self.trial_points).enumerate() {
+            run(phase.problem, trial).map_err(|error| error.in_phase(index))?;
+        }
+        Ok(())
+    }
+
     /// The objective at some point; in `ends` the ends of all intervals, and constraints.
     fn evaluate<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         &mut self,
@@ -243,22 +304,21 @@ impl<T: Real> Phases<'_, T> {
         (mut ends, mut values): (&mut [T], &mut [T]),
     ) -> Result<T, OcpError> {
         let (mut objective, mut stages) = (T::ZERO, trial_point.stages());
-        let mut next_sizes: Vec<_> = self.phases.iter().map(|phase| phase.size).collect();
-        let Phases { phases, trial_points: trials, initial_state: start } = self;
-        let mut nexts = next_sizes.drain(..);
+        let Phases { phases, trial_points, initial_state } = self;
         let mut previous_stage = stages.next();
-        if let (Some(size), Some(start_variables)) = (nexts.next(), previous_stage) {
-            let first = take_mut(&mut ends, size.nx + size.free);
-            copy_common(first, start);
-            stage_conversion::write_start_state(size, start_variables.u, first);
+        if let (Some(JoinedPhase { begin, .. }), Some(start_variables)) = (phases.first(), previous_stage) {
+            let first = take_mut(&mut ends, begin.size.nx + begin.size.free);
+            copy_common(first, initial_state);
+            stage_conversion::write_start_state(begin, start_variables.u, &[], first);
         }
-        for (phase, trial) in phases.iter_mut().zip(trials) {
+        for (index, (phase, trial)) in phases.iter_mut().zip(trial_points).enumerate() {
             let last =
-                stage_conversion::load_phase(phase.size, &mut stages, &mut trial.point, previous_stage);
-            objective = objective + phase.problem.evaluate(&trial.point, &mut trial.ends)?;
-            write_ends(phase.size, trial, &mut ends, &mut values);
-            if let (Some(next), Some(last)) = (nexts.next(), last) {
-                phase.write_start(next, trial, &last, take_mut(&mut ends, next.nx + next.free))?;
+                stage_conversion::load_phase(&phase.begin, &mut stages, &mut trial.point, previous_stage);
+            let cost = phase.problem.evaluate(&trial.point, &mut trial.ends);
+            objective = objective + cost.map_err(|error| error.in_phase(index))?;
+            write_ends(phase.begin.size, trial, &mut ends, &mut values);
+            if let Some(last) = &last {
+                phase.write_start(trial, last, &mut ends).map_err(|error| error.in_phase(index))?;
             }
             previous_stage = last;
         }
@@ -275,35 +335,28 @@ impl<T: Real> Phases<'_, T> {
     ) -> Result<(), OcpError> {
         let ((v, _), mut begin) = (iterate.variables_and_costates(), 0);
         let (mut stages, mut points) = (qp.stages_mut(), iterate.stages());
-        let next_sizes = self.next_sizes();
         if let (Some(mut to), Some(point), Some(first)) = (stages.next(), points.next(), self.phases.first())
         {
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = to.arrays();
             [&mut *matrix, hessian, gradient, &mut *offset].into_iter().for_each(|list| list.fill(T::ZERO));
             copy_common(offset, &self.initial_state);
-            stage_conversion::write_start_columns(first.size, point.x.len(), matrix, ld);
+            stage_conversion::write_start_columns(&first.begin, [0, point.x.len()], matrix, ld);
             begin += ld;
         }
-        for (JoinedPhase { problem, link, size, .. }, next) in self.phases.iter_mut().zip(next_sizes) {
-            for (from, stage_point) in problem.qp().stages().zip(problem.iterate().stages()) {
+        for (index, JoinedPhase { problem, link, begin: phase, next, .. }) in
+            self.phases.iter_mut().enumerate()
+        {
+            for (from, at) in problem.qp().stages().zip(problem.iterate().stages()) {
                 let (Some(mut to), Some(point)) = (stages.next(), points.next()) else { return Ok(()) };
                 let mut arrays = to.arrays();
-                stage_conversion::copy_stage_qp(*size, &from, &mut arrays);
+                stage_conversion::copy_stage_qp(phase.size, &from, &mut arrays);
                 let v = part(v, begin, arrays.ld);
                 begin += arrays.ld;
-                // The last stage of a phase leads nowhere in its own QP.
-                if let (Some(next), Some(link), true) = (next, &mut *link, stage_point.dynamics.is_empty()) {
-                    let (end, sizes, point_and_costates) =
-                        (problem.phase_end(stage_point), [*size, next], (v, point.dynamics));
-                    write_link_to_qp(
-                        link.as_mut(),
-                        end,
-                        sizes,
-                        &mut arrays,
-                        point_and_costates,
-                        scratch,
-                        kind,
-                    )?;
+                // The last stage of a phase leads nowhere in its variable_count QP.
+                if let (Some(next), Some(link), true) = (&*next, &mut *link, at.dynamics.is_empty()) {
+                    let (end, sizes, at) = (problem.phase_end(at), (phase.size, next), (v, point.dynamics));
+                    write_link_to_qp(link.as_mut(), end, sizes, &mut arrays, at, scratch, kind)
+                        .map_err(|error| error.in_phase(index))?;
                 }
             }
         }
@@ -316,17 +369,19 @@ impl<T: Real> Phases<'_, T> {
         let find_name = || {
             let found = self.at(stage);
             let has_start_variables =
-                found.is_none_or(|(_, phase)| stage == phase.first + phase.size.intervals);
+                found.is_none_or(|(_, phase)| stage == phase.first + phase.begin.size.intervals);
             let (number, place) = if has_start_variables && field == QpField::ControlBounds {
                 let number = found.map_or(0, |(number, _)| number + 1);
-                let PhaseSize { given_states: given, .. } = self.phases.get(number)?.size;
-                let states = self.phases.get(number)?.size.free_start_states().len();
-                let state = (QpField::StateBounds, 0, given + index);
-                let parameter = index.checked_sub(states);
+                let begin = &self.phases.get(number)?.begin;
+                let states = begin.size.free_start_states().len();
+                let state = (QpField::StateBounds, 0, begin.size.given_states + index);
+                let parameter = index
+                    .checked_sub(states)
+                    .and_then(|start_variables| begin.parameters().nth(start_variables));
                 (number, parameter.map_or(state, |w| (QpField::ControlBounds, 0, w)))
             } else {
                 let (number, phase) = found?;
-                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.size);
+                let (k, PhaseSize { nx, free, .. }) = (stage - phase.first, phase.begin.size);
                 let place = match field {
                     QpField::StateBounds if index >= nx => (QpField::ControlBounds, k, index - nx),
                     QpField::ControlBounds => (field, k, index + free),

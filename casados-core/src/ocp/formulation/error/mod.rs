@@ -164,6 +164,8 @@ pub enum OcpError {
         output: usize,
         /// The value.
         value: f64,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
     /// A derivative is not finite where everything has a value: there is no QP.
     NonFiniteDerivative {
@@ -181,6 +183,8 @@ pub enum OcpError {
         by: &'static str,
         /// The value.
         value: f64,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
     /// A derivative of the solution is not finite: numbers of the problem are too far from one.
     NonFiniteSensitivity {
@@ -199,6 +203,8 @@ pub enum OcpError {
         interval: usize,
         /// Why.
         error: Error,
+        /// Which of the [phases](crate::ocp::Phases), from 0 on, if there are several.
+        phase: Option<u32>,
     },
     /// The simulation of a guess ends in an interval
     /// ([`Ocp::guess_by_simulation`](crate::ocp::Ocp::guess_by_simulation)).
@@ -316,6 +322,20 @@ pub enum OcpError {
     },
 }
 
+impl OcpError {
+    /// As an error of this phase.
+    #[cfg(feature = "alloc")]
+    pub(in crate::ocp) fn in_phase(mut self, index: usize) -> Self {
+        if let Self::Integration { phase, .. }
+        | Self::NonFiniteFunction { phase, .. }
+        | Self::NonFiniteDerivative { phase, .. } = &mut self
+        {
+            *phase = u32::try_from(index).ok();
+        }
+        self
+    }
+}
+
 impl From<QpError> for OcpError {
     fn from(error: QpError) -> Self {
         match error {
@@ -338,7 +358,9 @@ impl From<Error> for OcpError {
 impl From<BatchError> for OcpError {
     fn from(error: BatchError) -> Self {
         match error {
-            BatchError::Intervals { first, error, .. } => Self::Integration { interval: first, error },
+            BatchError::Intervals { first, error, .. } => {
+                Self::Integration { interval: first, error, phase: None }
+            }
             BatchError::Integrator(error) => error.into(),
             BatchError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
             error @ BatchError::Length { .. } => Self::Batch(error),

@@ -45,9 +45,13 @@ pub(in crate::ocp) fn check_finite_outputs<F: Function, T: Real>(
 ) -> Result<(), OcpError> {
     match crate::finite::find_non_finite(y.as_ref()) {
         None => Ok(()),
-        Some((output, value)) => {
-            Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
-        }
+        Some((output, value)) => Err(OcpError::NonFiniteFunction {
+            function: F::STRUCTURE.name,
+            stage,
+            output,
+            value,
+            phase: None,
+        }),
     }
 }
 
@@ -64,7 +68,7 @@ pub(in crate::ocp) fn check_finite_value<F: Function, T: Real>(
         return Ok(value);
     }
     let (output, value) = crate::finite::find_non_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
-    Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+    Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value, phase: None })
 }
 
 /// What is there where a function is evaluated.

@@ -39,7 +39,9 @@ pub trait Program<T: Real>: Sized {
     type Dynamics;
     /// Whether stages of intervals are variables.
     #[doc(hidden)]
-    const LIFTED: bool = false;
+    fn is_lifted(&self) -> bool {
+        false
+    }
 
     /// Writes the QP at the iterate, and its objective.
     #[doc(hidden)]

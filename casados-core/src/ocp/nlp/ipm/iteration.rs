@@ -3,7 +3,8 @@
 use super::barrier;
 use super::kkt::barrier_function;
 use super::kkt::newton::{
-    costates_after_step, evaluate_residuals, kkt_view, kkt_view_of_new_qp, refine_step, resolve,
+    costates_after_step, evaluate_residuals, kkt_view, kkt_view_of_new_qp, left_after_step, refine_step,
+    resolve,
 };
 use super::kkt::scaling::{ScaledResiduals, scaled_residuals};
 use super::line_search::{AcceptedStep, FilterModel, LineSearch, LineSearchOutcome, max_step_to_boundary};
@@ -92,6 +93,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let (plain_objective, [_, of_stages]) =
             (ocp.objective.to_f64(), ocp.stage_residuals.map(|left| left.to_f64()));
+        let of_stages = if ocp.problem.is_lifted() { of_stages } else { 0.0 };
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
@@ -100,21 +102,18 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.store(&mut view);
         let objective =
             if state.dimensions.in_restoration { plain_objective } else { plain_objective + penalties };
-        if P::LIFTED {
-            residuals.dynamics = nan_max(residuals.dynamics, of_stages);
-        }
+        residuals.dynamics = nan_max(residuals.dynamics, of_stages);
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
                 barrier::barrier_residuals(&iterate.sides, self.options.final_mu);
         }
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
-        let stage_residual = if P::LIFTED { of_stages } else { 0.0 };
         let units = state.dimensions.units(work.units);
         let ScaledResiduals {
             barrier_residuals: barrier,
             nlp_error: error,
             error_without_complementarity: others,
-        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, stage_residual);
+        } = scaled_residuals(&residuals, &iterate, view.dynamics, units, of_stages);
         state.update_mu(&iterate, (&barrier.0, barrier.1), &self.options);
         state.update_nlp_error(error, others, &self.options);
         state.largest_gap = barrier.0.dynamics;
@@ -160,7 +159,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.mu,
             dimensions.units(workspace.units),
         );
-        if P::LIFTED {
+        if ocp.problem.is_lifted() {
             // The QP has the ends of intervals where the next step would lead to.
             let mut line_search = LineSearch {
                 dimensions: &dimensions,
@@ -197,7 +196,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let reference_violation = state.initial_violation.max(1.0);
         let noise = T::from_f64(10.0 * T::EPSILON);
         let sizes = iterate.v.iter().zip(&*work.units).map(|(v, &unit)| T::ONE + (*v / unit).abs());
-        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64();
+        let (equation_residual, of_equations) = left_after_step(&iterate, work.units);
+        let rounding = (noise * sizes.fold(T::ZERO, |sum, size| sum + size)).to_f64() + of_equations;
         let expected = FilterModel {
             current: here,
             slope: barrier_function::barrier_slope(&iterate, state.mu, work.scratch)
@@ -208,6 +208,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             mu: state.mu,
             delta_w: state.delta_w,
             rounding_violation: rounding,
+            equation_residual,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.dimensions.scaling.objective_unit);
         let (primal, dual) = predictor::step_lengths(&iterate.sides, tau);

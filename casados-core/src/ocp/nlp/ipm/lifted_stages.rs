@@ -16,7 +16,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub(super) fn initialise_stages(&mut self, warm: bool) -> Result<(), OcpError> {
-        if !P::LIFTED {
+        if !self.problem.is_lifted() {
             return Ok(());
         }
         self.step_length = Some(T::ZERO);
@@ -44,7 +44,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         ocp: &mut Ocp<P, T, D, M>,
         state: &RunState<'_>,
     ) -> Result<(), OcpError> {
-        if !P::LIFTED {
+        if !ocp.problem.is_lifted() {
             return Ok(());
         }
         let iterate =

@@ -37,6 +37,8 @@ pub(super) struct FilterModel {
     pub delta_w: f64,
     /// Violations up to this one are rounding errors.
     pub rounding_violation: f64,
+    /// What full steps leave of equations, as a fraction of their values; zero without equations.
+    pub equation_residual: f64,
 }
 
 impl FilterModel {
@@ -60,9 +62,10 @@ impl FilterModel {
         (ALPHA_MIN_FRAC * smallest_ratio).max(1e-14)
     }
 
-    /// Whether neither the violation nor the barrier function changes by more than rounding errors:
-    /// the step changes multipliers.
+    /// Whether neither the violation nor the barrier function changes by more than rounding errors
+    /// and what full steps leave of equations: the step changes multipliers.
     fn changes_only_rounding(&self, trial_pair: &FilterPair, noise: f64) -> bool {
+        let noise = noise + self.equation_residual * self.current.objective.abs();
         self.current.violation <= self.rounding_violation
             && trial_pair.violation <= self.rounding_violation
             && (trial_pair.objective - self.current.objective).abs() <= noise
@@ -156,8 +159,8 @@ where
                 return Ok(LineSearchOutcome::Step(AcceptedStep { alpha, corrected: false }));
             }
             // Corrections know nothing of stages.
-            let violation_grows =
-                !P::LIFTED && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
+            let violation_grows = !ocp.problem.is_lifted()
+                && trial_pair.is_some_and(|there| there.violation >= model.current.violation);
             if alpha == max_alpha
                 && violation_grows
                 && let Some(alpha) = self.second_order_correction(ocp, filter, model, tau)?
@@ -187,7 +190,7 @@ where
         let objective = if self.dimensions.in_restoration { 0.0 } else { objective };
         ocp.step_length = Some(T::ZERO);
         let mut gaps = ocp.gap_sum_at(self.trial_point, self.workspace.interval_ends, self.workspace.units);
-        if P::LIFTED {
+        if ocp.problem.is_lifted() {
             gaps += ocp.stage_residuals[0].to_f64();
         }
         let mut iterate =

@@ -103,7 +103,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.trial_point.copy_from(&self.violation_weights);
         self.trial_point.multipliers_mut().fill(T::ZERO);
         let ends = self.workspace.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
-        if P::LIFTED || !ocp.simulate_guess(&mut self.trial_point, ends, start) {
+        if ocp.problem.is_lifted() || !ocp.simulate_guess(&mut self.trial_point, ends, start) {
             return None;
         }
         if ocp.linearise(self.curvature).is_err() {

@@ -208,11 +208,28 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
     Ok(())
 }
 
+/// What is residual of an equation after a full step, as a part of its value and unit.
+fn left_of_equations<T: Real>() -> f64 {
+    Scalar::powf(T::EPSILON, 2.0 / 3.0)
+}
+
+/// Residuals that full steps leave in equations: as a fraction of the values, and the sum in units; zero where
+/// there are none.
+pub(in crate::ocp::nlp::ipm) fn left_after_step<T: Real>(
+    iterate: &Iterate<'_, T>,
+    units: &[T],
+) -> (f64, f64) {
+    let rows = &*iterate.sides.equations;
+    let residual = if rows.is_empty() { 0.0 } else { left_of_equations::<T>() };
+    let scaling = rows.iter().map(|&row| 1.0 + (at(iterate.v, row) / at(units, row)).abs().to_f64());
+    (residual, residual * scaling.sum::<f64>())
+}
+
 /// The largest residual of an equation after the full step, in units; zero if none is more than
 /// rounding.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
     let inequalities = &iterate.sides;
-    let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
+    let rounding = left_of_equations::<T>();
     let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
     let lacks = residuals.map(|(&row, &residual)| {
         let unit = at(units, row).to_f64();

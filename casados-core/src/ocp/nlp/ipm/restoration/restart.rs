@@ -32,7 +32,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     {
         let stalls = final_status.is_none() && state.stalled_iterations == RESTART_AFTER;
         let failed = matches!(final_status, Some(Status::Infeasible { .. } | Status::NoProgress));
-        if !(failed || stalls) || !self.options.restart || state.second_attempt || P::LIFTED {
+        if !(failed || stalls) || !self.options.restart || state.second_attempt || ocp.problem.is_lifted() {
             return false;
         }
         let work = Workspace::new(ocp.ends(), &state.max_dimensions, self.workspace.as_mut());

@@ -119,7 +119,7 @@ where
             .row_values_at(self.trial_point, self.workspace.interval_ends, self.workspace.row_values)
             .unwrap_or(f64::NAN);
         let mut gaps = ocp.gap_sum_at(self.trial_point, self.workspace.interval_ends, self.workspace.units);
-        if P::LIFTED {
+        if ocp.problem.is_lifted() {
             gaps += ocp.stage_residuals[0].to_f64();
         } else if gaps > self.violation_limit(ocp, alpha, tolerance) {
             // States that follow from the controls.
