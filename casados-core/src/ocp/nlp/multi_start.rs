@@ -1,4 +1,4 @@
-//! Solutions from several guesses.
+//! Multi-start: solutions from several guesses.
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::HeapOcp;

@@ -76,8 +76,9 @@ pub struct Iteration {
     pub step: f64,
     /// QP iterations; zero for an interior point, printed as `-`.
     pub qp_iterations: usize,
-    /// The regularisation of the Hessian: the inertia correction of
-    /// [`Convexification::Reduced`](crate::ocp::Convexification), or damping.
+    /// The regularisation of the Hessian: the inertia correction
+    /// ([`Convexification::Reduced`](crate::ocp::Convexification); `δ_w` of an interior point), or
+    /// damping.
     pub regularisation: f64,
     /// Whether hard bounds have penalties: elastic mode or restoration phase.
     pub elastic: bool,

@@ -280,7 +280,7 @@ impl fmt::Display for Outcome {
 }
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Completes the outcome of a run.
+    /// Adds convexity and the largest violation to the outcome of a run.
     pub(in crate::ocp) fn complete_outcome(&mut self, outcome: &mut Outcome) {
         let needs_violation = !outcome.is_solved() && !outcome.status.names_constraint();
         let (is_convex, violated) = P::complete(self, needs_violation);

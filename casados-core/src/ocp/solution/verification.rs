@@ -61,9 +61,9 @@ pub struct Verification<T = f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Defect<T = f64> {
-    /// The state.
+    /// The name of the state.
     pub state: &'static str,
-    /// The interval.
+    /// The index of the interval.
     pub interval: usize,
     /// The end state of the integrator with error control minus the state of the next node.
     pub amount: T,
@@ -76,11 +76,11 @@ pub struct Defect<T = f64> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct InnerViolation<T = f64> {
-    /// The state, or the output of a path constraint.
+    /// The name of the state, or of the output of a path constraint.
     pub name: String,
-    /// The interval.
+    /// The index of the interval.
     pub interval: usize,
-    /// The time.
+    /// The time of the largest violation.
     pub time: T,
     /// The violated side.
     pub side: Side,

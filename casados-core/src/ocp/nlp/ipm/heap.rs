@@ -1,4 +1,4 @@
-//! The interior point with memory on the heap.
+//! The interior-point method with memory on the heap.
 
 use super::Ipm;
 use super::IpmOptions;
@@ -10,7 +10,7 @@ use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
-/// A nonlinear interior point with memory on the heap.
+/// A nonlinear interior-point method with memory on the heap.
 ///
 /// Created by `HeapIpm::new(&ocp)?`; [`Ipm`] has the methods, and an example.
 ///

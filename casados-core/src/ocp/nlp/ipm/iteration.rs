@@ -366,7 +366,7 @@ where
         let mut direction = match direction {
             Ok(direction) => direction,
             Err(error @ QpError::NotConvex { .. }) => {
-                // A derivative that is not finite is another error.
+                // A non-finite derivative ends the run with an error.
                 ocp.qp_failure_status(error)?;
                 return Ok(self.recover_from_failed_step(ocp, state));
             }

@@ -1,4 +1,4 @@
-//! The interior point in given memory.
+//! The interior-point method in given memory.
 
 use super::Ipm;
 use super::IpmOptions;

@@ -1,4 +1,4 @@
-//! A nonlinear interior point on the structure of optimal control.
+//! Nonlinear interior-point method with the structure of optimal control.
 //!
 //! ```text
 //! min  f(v) − μ Σ log s        c(v) = 0,  σ (g(v) − bound) = s        μ → 0
@@ -48,7 +48,7 @@ use crate::qp::Solution;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// A nonlinear interior point for an [`Ocp`](crate::ocp::Ocp), with exact Hessians.
+/// A nonlinear interior-point method for an [`Ocp`](crate::ocp::Ocp), with exact Hessians.
 ///
 /// ```text
 /// min  f(v) − μ Σ log s        x_{k+1} = φ(x_k, u_k),  σ (g(v) − bound) = s,  x₀[i] = x_N[i] where asked

@@ -1,4 +1,4 @@
-//! Options of the interior point.
+//! Options of the interior-point method.
 
 use super::barrier::Barrier;
 use crate::ocp::assembly::units::tolerance_factor;
@@ -27,8 +27,8 @@ pub struct IpmOptions {
     /// of the unit, for units below one by the unit. Default 1e-8, in single precision 1e-3.
     pub tolerance: f64,
     /// A run ends as acceptable after `acceptable_iterations` iterations with residuals up to this,
-    /// or if no further step is possible and the residuals of the best iterate are at most this.
-    /// Default 1e-6, in single precision 1e-2.
+    /// or if it ends without progress or at the maximum number of iterations and the residuals of
+    /// the best iterate are at most this. Default 1e-6, in single precision 1e-2.
     pub acceptable_tolerance: f64,
     /// See [`acceptable_tolerance`](Self::acceptable_tolerance); zero means one. Default 15.
     pub acceptable_iterations: usize,
@@ -133,7 +133,7 @@ impl IpmOptions {
             let allowed = "from 0 to `start_mu`";
             return Err(OcpError::InvalidOption { name: "final_mu", value: last, allowed });
         }
-        // Two bounds push from both sides.
+        // Two bounds push the point from opposite sides.
         for (name, value) in [("bound_push", self.bound_push), ("warm_push", self.warm_push)] {
             if !(value > 0.0 && value <= 0.5) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 0.5" });

@@ -211,7 +211,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// [`OcpError::OutOfMemory`].
     ///
     /// # Example
-    /// Of two parameters only the product is seen.
+    /// Only the product of two parameters is identifiable.
     /// ```
     /// use casados::ocp::{GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;

@@ -39,7 +39,7 @@ use alloc::vec::Vec;
 /// [`smoothing`]: SolutionFactors::smoothing
 ///
 /// # Example
-/// The distance of a mass is a parameter: what does it change of the cost?
+/// Derivatives of the optimal cost with respect to the target of a mass, a parameter:
 /// ```
 /// use casados::ocp::{Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SolutionFactors};
 /// use casados::prelude::*;

@@ -34,7 +34,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// The errors of [`Ocp::linearise`].
     ///
     /// # Example
-    /// A fall from rest: half of the way in time is a quarter of the way.
+    /// A fall from rest covers a quarter of the distance in half of the time:
     /// ```
     /// use casados::ocp::{Horizon, Problem};
     /// use casados::prelude::*;

@@ -95,8 +95,6 @@ impl<T: Real> Trajectory<T> {
 
     /// The last time: the end of the horizon, which may have been
     /// [optimised](crate::ocp::Horizon::free).
-    ///
-    /// [Horizon::free]: crate::ocp::Horizon::free
     #[must_use]
     pub fn end_time(&self) -> T {
         self.times.last().copied().unwrap_or(T::ZERO)

@@ -32,7 +32,7 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Violation<'a, T = f64> {
-    /// The state, control or output of a constraint.
+    /// The name of the state, control or output of a constraint.
     pub name: &'a str,
     /// The index of the time; for a solution the stage.
     pub stage: usize,
