@@ -1,7 +1,7 @@
 //! Constraints at points inside intervals, in the QP.
 //!
-//! Functions at a point depend on `(x_j, w, u, z_j)`, and through the preceding pieces on `(x, w,
-//! u)`, with `M = ∂(x_j, w, u, z_j)/∂(x, w, u)`:
+//! Functions at a point depend on `(x_j, w, u, z_j)`, and through the preceding pieces on
+//! `(x, w, u)`, with `M = ∂(x_j, w, u, z_j)/∂(x, w, u)`:
 //!
 //! ```text
 //! ∇g = Mᵀ ∇g_j        ∇² = Mᵀ ∇²(μᵀg_j) M, and what pieces add

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Second derivatives are computed backward over the pieces. With the multipliers `λ_j` of the end
-//! of a piece, and the contributions of constraints at its start, `f_j = ∂(μᵀg_j)/∂x` and `ν_j =
-//! ∂(μᵀg_j)/∂z`:
+//! of a piece, and the contributions of constraints at its start, `f_j = ∂(μᵀg_j)/∂x` and
+//! `ν_j = ∂(μᵀg_j)/∂z`:
 //!
 //! ```text
 //! H += M_jᵀ ∇²(λ_{j+1}ᵀφ_j + ν_jᵀζ_j) M_j        λ_j = (∂φ_j/∂x)ᵀ λ_{j+1} + (∂ζ_j/∂x)ᵀ ν_j + f_j

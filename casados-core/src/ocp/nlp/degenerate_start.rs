@@ -10,8 +10,8 @@ use crate::scalar::Real;
 /// A gradient counts as vanishing if the change of each variable by its size, or by one, changes
 /// the constraint by at most this fraction of the violation.
 const VANISHING_GRADIENT: f64 = 1e-8;
-/// The relative perturbation of the first variable; variable `i` (from zero) is perturbed by `1 /
-/// (i + 1)` of it, so that the point lies on no axis and no diagonal.
+/// The relative perturbation of the first variable; variable `i` (from zero) is perturbed by
+/// `1 / (i + 1)` of it, so that the point lies on no axis and no diagonal.
 const RELATIVE_PERTURBATION: f64 = 0.1;
 
 /// The variables that are perturbed.

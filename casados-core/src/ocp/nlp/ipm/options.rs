@@ -21,8 +21,8 @@ use crate::scalar::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
     /// The run converges when all four [`Residuals`](crate::qp::Residuals) are at most this.
-    /// Stationarity is divided by `s_d`, complementarity by `s_c`: `max(1, mean |multiplier| /
-    /// 100)` of all multipliers, and of those of bounds, in their units
+    /// Stationarity is divided by `s_d`, complementarity by `s_c`:
+    /// `max(1, mean |multiplier| / 100)` of all multipliers, and of those of bounds, in their units
     /// ([`scaling`](Self::scaling)). For units above 100 the tolerance is multiplied by a hundredth
     /// of the unit, for units below one by the unit. Default 1e-8, in single precision 1e-3.
     pub tolerance: f64,

@@ -30,8 +30,8 @@ pub(super) fn step_lengths<T: Real>(inequalities: &Inequalities<'_, T>, tau: f64
     if needs_equal_step_lengths(inequalities) { (primal.min(dual), primal.min(dual)) } else { (primal, dual) }
 }
 
-/// Whether primal and dual step lengths must be equal: quadratic penalties couple them by `λ + ν =
-/// linear + quadratic e`.
+/// Whether primal and dual step lengths must be equal: quadratic penalties couple them by
+/// `λ + ν = linear + quadratic e`.
 pub(super) fn needs_equal_step_lengths<T: Real>(inequalities: &Inequalities<'_, T>) -> bool {
     inequalities.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }

@@ -81,8 +81,8 @@ pub(in crate::ocp::nlp) struct RunState<'c, T> {
     pub number_type: PhantomData<T>,
 }
 
-/// Steps up to this length increase the damping: by the factor `DAMPING_INCREASE`, or to `κ
-/// (α^DAMPING_EXPONENT − 1)` for the step length `α` and the curvature `κ` along the step.
+/// Steps up to this length increase the damping: by the factor `DAMPING_INCREASE`, or to
+/// `κ (α^DAMPING_EXPONENT − 1)` for the step length `α` and the curvature `κ` along the step.
 const SHORT_STEP: f64 = 1.0 / 16.0;
 const DAMPING_INCREASE: f64 = 4.0;
 /// The difference between the numbers of short and of full steps at which the filter replaces the

@@ -70,8 +70,8 @@ impl<T: Real> BoundStiffness<T> {
         }
     }
 
-    /// `−dλ/dd` of `s λ = μ` with `s = d + e`, where the violation `e` has a barrier, too: `e
-    /// (linear + quadratic e − λ) = μ`. Hard bounds have no `e`.
+    /// `−dλ/dd` of `s λ = μ` with `s = d + e`, where the violation `e` has a barrier, too:
+    /// `e (linear + quadratic e − λ) = μ`. Hard bounds have no `e`.
     fn smoothed_stiffness(&self, distance: T, multiplier: T, linear: T, quadratic: T) -> T {
         let (mut slack, mut inverse_penalty_stiffness) = (distance, T::ZERO);
         if linear.is_finite() {

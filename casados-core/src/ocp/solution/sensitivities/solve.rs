@@ -132,8 +132,8 @@ pub(super) fn solve_seed<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[
 /// Solves for given first state, multipliers `θ` of periodic states and shared controls `w`, and
 /// computes the residuals of the conditions of the bordered system.
 ///
-/// With `t = s_{k+1} + P_{k+1} e_k`, backward `q += [A B]ᵀ t + M_{·w} w`, `κ = −M_uu⁻¹ q_u`, `s_k =
-/// q_x + Kᵀ q_u`; then forward `u = K x + κ`, `x₊ = A x + B u + e`, `π = P x + s`.
+/// With `t = s_{k+1} + P_{k+1} e_k`, backward `q += [A B]ᵀ t + M_{·w} w`, `κ = −M_uu⁻¹ q_u`,
+/// `s_k = q_x + Kᵀ q_u`; then forward `u = K x + κ`, `x₊ = A x + B u + e`, `π = P x + s`.
 pub(super) fn sweep<T: Real, R: RightHandSide<T>>(
     factors: &SolutionFactors<T>,
     right_hand_side: &R,

@@ -4,8 +4,8 @@ use super::{Series, Trajectory};
 use crate::scalar::Real;
 use core::fmt;
 
-/// A trajectory as comma-separated values, for printing or writing: `std::fs::write("solution.csv",
-/// solution.csv().to_string())`.
+/// A trajectory as comma-separated values, for printing or writing:
+/// `std::fs::write("solution.csv", solution.csv().to_string())`.
 ///
 /// ```
 /// # use casados::ocp::*;
