@@ -1,4 +1,4 @@
-//! What a problem is: functions, bounds, a horizon, and the memory of all of it.
+//! The formulation of a problem: functions, bounds, horizon, and their memory.
 //!
 //! | | |
 //! | --- | --- |
