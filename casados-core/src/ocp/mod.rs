@@ -68,9 +68,10 @@
 //! need not be integrable.
 //!
 //! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
-//! (`ocp.shared("u.duration")?`). Parameters of the model may be free (`ocp.free("p.mass",
-//! 0.1..=5.0, 1.0)?`), end times too ([`Horizon::free`]), and [`Boundary`] constrains any function
-//! `r(x₀, x_N, p)`. `Ocp::verify` estimates the error of a solution between its nodes.
+//! (`ocp.shared("u.duration")?`). Parameters of the model may be free
+//! (`ocp.free("p.mass", 0.1..=5.0, 1.0)?`), end times too ([`Horizon::free`]), and [`Boundary`]
+//! constrains any function `r(x₀, x_N, p)`. `Ocp::verify` estimates the error of a solution between
+//! its nodes.
 //!
 //! No heap is required: `problem.on_horizon(horizon, &DIMS, &mut memory)` uses memory whose length
 //! is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory are

@@ -105,8 +105,8 @@ fn symmetric<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
     x.iter().enumerate().map(|(j, x)| lower(j) * x.to_f64()).sum()
 }
 
-/// Returns the gradient of the Lagrangian by a state, and the term of the state in `½ vᵀ H v + hᵀ
-/// v`.
+/// Returns the gradient of the Lagrangian by a state, and the term of the state in
+/// `½ vᵀ H v + hᵀ v`.
 fn state_gradient_and_cost<T: Real>(
     data: &Stage<'_, T>,
     point: &SolutionStage<'_, T>,

@@ -2,9 +2,9 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `real_time` | real-time iterations of many plants |
-//! | `derivatives` | adjoints, gradients of values and forward derivatives of all |
-//! | `gradients` | what adjoints and gradients of values are |
+//! | `real_time` | real-time iterations for many plants |
+//! | `derivatives` | adjoint derivatives, gradients of optimal values, forward derivatives |
+//! | `gradients` | the memory of adjoint derivatives and gradients |
 
 mod derivatives;
 mod gradients;

@@ -28,8 +28,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::InvalidArrivalWeight`].
     ///
     /// # Example
-    /// The prior mean is 0 with the weight 1, the measurement 3 with the weight 2: `x + 2 (x − 3) =
-    /// 0`.
+    /// The prior mean is 0 with the weight 1, the measurement 3 with the weight 2:
+    /// `x + 2 (x − 3) = 0`.
     /// ```
     /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
     /// use casados::prelude::*;
@@ -95,8 +95,8 @@ pub(in crate::ocp) fn arrival_cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>
     T::from_f64(0.5) * quadratic_form
 }
 
-/// Adds the arrival cost to a QP in absolute variables: `W` to the Hessian, and to the gradient `W
-/// (x − x̄)` at the given state, or `−W x̄` without one.
+/// Adds the arrival cost to a QP in absolute variables: `W` to the Hessian, and to the gradient
+/// `W (x − x̄)` at the given state, or `−W x̄` without one.
 pub(in crate::ocp) fn add_to_qp<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     arrival: &[T],
     state: &[T],

@@ -2,13 +2,13 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `functions/` | the traits of costs, constraints and dynamics, and costs and constraints |
-//! | `problem`, `horizon` | a problem without numbers, and the times of its nodes |
-//! | `instance/` | a problem on a horizon, with memory, and points inside of its intervals |
-//! | `free`, `declare` | parameters and end times that are found, and how a problem gets them and points inside of intervals |
-//! | `bounds`, `limit`, `soften`, `coupling`, `arrival` | its bounds, couplings and arrival cost |
-//! | `names`, `labels`, `check`, `error` | refusals by name |
-//! | `print` | a problem as mathematics |
+//! | `functions/` | traits of dynamics, costs and constraints; costs and constraints |
+//! | `problem`, `horizon` | the functions of a problem, and the times of its nodes |
+//! | `instance/` | a problem on a horizon, with memory, and points inside its intervals |
+//! | `free_parameters`, `free_parameters_and_points` | free parameters and end times; adding them and points inside intervals |
+//! | `bounds`, `variable_bounds`, `soften`, `coupling`, `arrival` | bounds, couplings and arrival cost |
+//! | `names`, `labels`, `check`, `error` | errors by name |
+//! | `print` | a problem as formulas |
 
 pub(in crate::ocp) mod arrival;
 pub(in crate::ocp) mod bounds;

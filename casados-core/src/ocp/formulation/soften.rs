@@ -18,8 +18,8 @@ use core::ops::RangeBounds;
 const BOTH_SIDES: &[Side] = &[Side::Lower, Side::Upper];
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes bounds of states, controls or constraints soft: a violation `e` costs `linear · e + ½
-    /// quadratic · e²`. An infinite linear penalty makes them hard again.
+    /// Makes bounds of states, controls or constraints soft: a violation `e` costs
+    /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
     ///
     /// A name denotes variables as in [`Ocp::bound`], or constraints: their function, or one of its
     /// outputs, `Corner[2]`. Path constraints exist at all stages but the last, terminal

@@ -10,10 +10,10 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `link` | what connects two phases |
-//! | `phase` | a phase, whatever its problem is |
-//! | `transfer` | points, bounds and QPs go from a phase to the whole and back |
-//! | `program` | what solvers ask |
+//! | `link` | the map from the end of a phase to the start of the next |
+//! | `phase` | a phase, independent of the type of its problem |
+//! | `stage_conversion` | conversion of points, bounds and QPs between phases and the joined problem |
+//! | `program` | the interface to solvers |
 
 mod link;
 mod phase;

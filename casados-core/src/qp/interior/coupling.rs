@@ -140,8 +140,8 @@ impl<'a, T: Real> Coupling<'a, T> {
         }
     }
 
-    /// Takes the fraction `alpha` of the step of the multipliers; residuals are reduced by `1 −
-    /// alpha`.
+    /// Takes the fraction `alpha` of the step of the multipliers; residuals are multiplied by
+    /// `1 − alpha`.
     pub fn take_step(&mut self, alpha: T) {
         add_scaled(self.theta, alpha, self.step);
         scale_vector(self.residual, T::ONE - alpha);

@@ -2,9 +2,9 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `group` | as many problems as there are lanes, and their equations for given sets |
-//! | `sets` | which bounds are active, and what is left of the conditions |
-//! | `transfer` | problems into lanes, and solutions back |
+//! | `group` | a problem in each lane, and the solution for given active sets |
+//! | `sets` | active sets, and residuals of the optimality conditions |
+//! | `transfer` | transfer of problems into lanes, and of solutions back |
 //! | `cells` | products of matrices of registers |
 //!
 //! The method is Newton's for `min(s, λ) = 0`, as in [`interior::active`](super::interior) (M.

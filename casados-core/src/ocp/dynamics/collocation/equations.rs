@@ -41,8 +41,8 @@ impl<'a, M: Dae, T: Real, const S: usize> StageEquations<'a, M, T, S> {
         Self { coefficients, x, v, h: interval.h / T::from_whole(steps), t: interval.t }
     }
 
-    /// Returns the end of the interval by the stages `y + α Δy`, and the sum and the maximum of `|h
-    /// f|` at these stages.
+    /// Returns the end of the interval by the stages `y + α Δy`, and the sum and the maximum of
+    /// `|h f|` at these stages.
     pub fn end_and_residuals(
         mut self,
         stages: &[ArrayK<M, [T; S]>],

@@ -11,8 +11,9 @@
 //! its derivatives, and `[I; D]ᵀ ∇²(μᵀG) [I; D]` with the adjoint `μ` for its Hessian. The gradient
 //! term of `a`, `Dᵀ ∇²(μᵀG) a`, is the change of `πᵀ dE/dw` from `y` to `y + a`, to first order.
 //!
-//! Solvers that support stages as variables update them with the step length of the iterate, `y + α
-//! Δy`, and add `h G` to the violation. For other solvers the stages are `y + a + D (w − w̄)`.
+//! Solvers that support stages as variables update them with the step length of the iterate,
+//! `y + α Δy`, and add `h G` to the violation. For other solvers the stages are
+//! `y + a + D (w − w̄)`.
 //!
 //! R. Quirynen, S. Gros, B. Houska, M. Diehl, "Lifted collocation integrators for direct optimal
 //! control in ACADO toolkit", Math. Program. Comput. 9 (2017).

@@ -81,8 +81,8 @@ pub struct InvalidConstant {
     pub allowed: &'static str,
 }
 
-/// The Huber function with a weight for each residual: `½ w r²` if `|r| ≤ δ`, otherwise `w δ (|r| −
-/// ½ δ)`. The gradient of outliers is bounded.
+/// The Huber function with a weight for each residual: `½ w r²` if `|r| ≤ δ`, otherwise
+/// `w δ (|r| − ½ δ)`. The gradient of outliers is bounded.
 ///
 /// P. J. Huber, "Robust estimation of a location parameter", Ann. Math. Statist. 35 (1964).
 ///
@@ -103,8 +103,8 @@ pub struct Huber<T, const NY: usize> {
     pub delta: [T; NY],
 }
 
-/// The pseudo-Huber function, a smooth form of [`Huber`] with second derivatives everywhere: `w δ²
-/// (√(1 + (r/δ)²) − 1)`.
+/// The pseudo-Huber function, a smooth form of [`Huber`] with second derivatives everywhere:
+/// `w δ² (√(1 + (r/δ)²) − 1)`.
 ///
 /// ```
 /// use casados::ocp::{Convex, PseudoHuber};
@@ -200,8 +200,8 @@ impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
 /// programming and generalized Gauss-Newton methods", ESAIM: Proc. Surv. 71 (2021).
 ///
 /// # Example
-/// For the data 0, 0.2, 0.4 and 10 the outlier contributes only `δ = 1` to the gradient: `3 x = 0.6
-/// + 1`.
+/// For the data 0, 0.2, 0.4 and 10 the outlier contributes only `δ = 1` to the gradient:
+/// `3 x = 0.6 + 1`.
 /// ```
 /// use casados::ocp::{ConvexCost, HeapSqp, Horizon, Huber, Map, Problem};
 /// use casados::prelude::*;

@@ -121,8 +121,8 @@ fn apply_weights<F: Function, T: Real>(
     }
 }
 
-/// Subtracts `φ′`, or for a direction `d` `φ″ J d`, times a factor: the negative derivative of `φ(y
-/// − r)` by `r`.
+/// Subtracts `φ′`, or for a direction `d` `φ″ J d`, times a factor: the negative derivative of
+/// `φ(y − r)` by `r`.
 pub(in crate::ocp) fn subtract_reference_derivatives<F: Function, T: Real>(
     (second, first): (&MatrixYY<F, T>, &ArrayY<F, T>),
     (jacobian, direction): (&F::Jacobian<T>, Option<&ArrayV<F, T>>),
@@ -239,8 +239,8 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
     }
 }
 
-/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; relative to a point `v` the gradient is `Jᵀ
-/// W (y − r) − JᵀWJ v = JᵀW (y − r − J v)`.
+/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; relative to a point `v` the gradient is
+/// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)`.
 pub(in crate::ocp) struct GaussNewtonTerms<'a, 'b, F: Function, T: Plain> {
     pub weights: &'a MatrixYY<F, T>,
     /// `y − r`

@@ -250,8 +250,8 @@ impl<T: Real> ParameterDerivatives<'_, T> {
             }
         });
     }
-    /// Adds the Gauss-Newton part of the derivatives by parameters of the gradient of `factor
-    /// φ(y)`, where `mu = ∇φ` and `outer = ∇²φ`.
+    /// Adds the Gauss-Newton part of the derivatives by parameters of the gradient of
+    /// `factor φ(y)`, where `mu = ∇φ` and `outer = ∇²φ`.
     pub(in crate::ocp) fn gauss_newton<F: Function>(
         &mut self,
         jacobian: &F::Jacobian<T>,

@@ -99,8 +99,8 @@ const fn data_lens<P: Formulation<T>, T: Real>(layout: Layout) -> [usize; 10] {
     ]
 }
 
-/// Returns the length of two matrices and a vector over `(x, w, u)`, or of a gradient over `(x, w,
-/// u, z)`.
+/// Returns the length of two matrices and a vector over `(x, w, u)`, or of a gradient over
+/// `(x, w, u, z)`.
 const fn scratch_len<T>(n: usize, nz: usize) -> usize {
     let (matrices, gradient) = ((2 * n + 1) * padded_len::<T>(n), n + nz);
     if matrices < gradient { gradient } else { matrices }
