@@ -5,8 +5,10 @@
 //! | `functions/` | traits of dynamics, costs and constraints; costs and constraints |
 //! | `problem`, `horizon` | the functions of a problem, and the times of its nodes |
 //! | `instance/` | a problem on a horizon, with memory, and points inside its intervals |
-//! | `free_parameters`, `free_parameters_and_points` | free parameters and end times; adding them and points inside intervals |
-//! | `bounds`, `variable_bounds`, `soften`, `coupling`, `arrival` | bounds, couplings and arrival cost |
+//! | `free_parameters` | free parameters and end times |
+//! | `free_parameters_and_points` | adding free parameters, and points inside intervals |
+//! | `bounds`, `variable_bounds`, `soften` | bounds and penalties |
+//! | `coupling`, `arrival` | couplings and arrival cost |
 //! | `names`, `labels`, `check`, `error` | errors by name |
 //! | `print` | a problem as formulas |
 

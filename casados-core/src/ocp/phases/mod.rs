@@ -12,7 +12,7 @@
 //! | --- | --- |
 //! | `link` | the map from the end of a phase to the start of the next |
 //! | `phase` | a phase, independent of the type of its problem |
-//! | `stage_conversion` | conversion of points, bounds and QPs between phases and the joined problem |
+//! | `stage_conversion` | points, bounds and QPs of phases and of the joined problem |
 //! | `program` | the interface to solvers |
 
 mod link;
