@@ -1,8 +1,8 @@
 //! What integrates with steps of variable size. Nobody outside can name it.
 
 use super::replay::{AcceptedStep, DynStepDifferentiator, StepDifferentiator};
-use super::step::{After, Run, Span};
-use super::tape::Entry;
+use super::step::{AfterStep, Run, Span};
+use super::tape::TapeEntry;
 use crate::error::Error;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX};
 use crate::result::{Dense, Forward};
@@ -10,18 +10,18 @@ use crate::scalar::Real;
 use core::marker::PhantomData;
 
 /// What a method remembers. Nobody outside can name it.
-pub trait Kind<M: Dae, T: Real>: 'static {
+pub trait MethodState<M: Dae, T: Real>: 'static {
     /// Its memory.
     type State: Default + Send + Sync;
 }
 
 /// What integrates with steps of variable size, for the models that it can.
-pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
+pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
     /// Whether `z` at the end of a step is that of a stage; else it is found from the
     /// equations.
     const ENDS_ON_STAGE: bool;
     /// What takes its steps again.
-    type Replays: StepDifferentiator<M, T>;
+    type Differentiator: StepDifferentiator<M, T>;
     /// Integrates an interval; `after` is called after each accepted step.
     ///
     /// # Errors
@@ -31,7 +31,7 @@ pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
         run: &mut Run<'_, M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
-        after: After<'_, M, T>,
+        after: AfterStep<'_, M, T>,
     ) -> Result<(), Error>;
     /// The solution inside a step, from its numbers; `inputs` are variables of the model, of
     /// which `u` and `p` count.
@@ -41,13 +41,13 @@ pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
     fn interpolate(
         state: &mut Self::State,
         inputs: &[T],
-        entry: &Entry<T>,
+        entry: &TapeEntry<T>,
         numbers: (&[T], &[T]),
         t: T,
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error>;
     /// What takes a step again.
-    fn replays(state: &mut Self::State) -> &mut Self::Replays;
+    fn replays(state: &mut Self::State) -> &mut Self::Differentiator;
 }
 
 /// The steps of a method again, for derivatives that take part in the choice of its steps.

@@ -36,7 +36,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::StepSizeUnderflow`], with what does not settle.
     pub(super) fn check_convergence(
         &self,
-        stages: &dyn Stages<M, T>,
+        stages: &dyn StageSolver<M, T>,
         state: &StepState<T>,
         span: Span<T>,
     ) -> Result<(), Error> {

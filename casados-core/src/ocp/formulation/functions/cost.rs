@@ -83,7 +83,7 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// The errors of `show`.
     #[doc(hidden)]
-    fn terms(&self, show: Show<'_>) -> fmt::Result;
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result;
 
     /// Visits the structural entries of the exact Hessian over `(x, u, z)`; returns false if these
     /// are unknown.
@@ -146,7 +146,7 @@ pub trait Cost<S: Shape, T: Real> {
 }
 
 /// Receives the terms of an objective.
-pub type Show<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
+pub type TermWriter<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
 
 /// The stage, the factor and the kind of Hessian.
 #[derive(Clone, Copy, Debug)]
@@ -167,7 +167,7 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     fn check(&self, _: AvailableVariables) -> Result<(), OcpError> {
         Ok(())
     }
-    fn terms(&self, _: Show<'_>) -> fmt::Result {
+    fn terms(&self, _: TermWriter<'_>) -> fmt::Result {
         Ok(())
     }
     fn visit_sparsity(&self, _: EntryVisitor<'_>) -> bool {
@@ -210,7 +210,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         self.0.check_weights()?;
         self.1.check_weights()
     }
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         self.0.terms(show)?;
         self.1.terms(show)
     }
@@ -320,7 +320,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T>
         there.check::<F>()
     }
 
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("{}", F::STRUCTURE.name))
     }
 

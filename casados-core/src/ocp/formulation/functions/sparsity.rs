@@ -19,7 +19,7 @@ pub type EntryVisitor<'a> = &'a mut dyn FnMut(DerivativeEntry);
 
 /// The functions that determine the sparsity of `φ`.
 #[derive(Clone, Copy, Debug)]
-pub enum Origin {
+pub enum DynamicsStructure {
     /// Unknown.
     Unknown,
     /// The equations of a model: the patterns of their first and second derivatives.

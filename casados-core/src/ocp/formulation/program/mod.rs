@@ -68,7 +68,7 @@ pub trait Program<T: Real>: Sized {
     #[doc(hidden)]
     fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Parts<'_, T, D, M>;
+    ) -> ProgramParts<'_, T, D, M>;
 
     /// Returns ranges of stages with equal variables; `stages` is the number of all stages.
     #[doc(hidden)]
@@ -126,7 +126,7 @@ pub trait Program<T: Real>: Sized {
 /// The parts of a problem that every program has.
 #[doc(hidden)]
 #[derive(Debug)]
-pub struct Parts<'a, T, D, M> {
+pub struct ProgramParts<'a, T, D, M> {
     pub(in crate::ocp) qp: &'a mut Qp<T, D, M>,
     pub(in crate::ocp) iterate: &'a Solution<T, D, M>,
     /// Lower and upper bounds of the constraints of all stages, as the user gave them.
