@@ -226,7 +226,7 @@ pub enum OcpError {
     /// A separate batch was given slices of different lengths.
     #[cfg(feature = "alloc")]
     Batch(BatchError),
-    /// There are no consistent initial states.
+    /// No consistent initial states were found.
     Inconsistent(Inconsistent),
     /// States are periodic or controls shared: feedback gains are not defined.
     /// [`Ocp::differentiate`](crate::ocp::Ocp::differentiate) has `du/dx₀`.
