@@ -311,7 +311,7 @@ pub enum Refusal {
     NotConverged,
     /// The Newton matrix was singular.
     Singular,
-    /// `∂f/∂z` becomes singular at the end of the last step: two solutions of the algebraic
+    /// `∂f/∂(ẋ, z)` becomes singular at the end of the last step: two solutions of the algebraic
     /// equations meet and end there (fold).
     SingularAlgebraic {
         /// The algebraic state along which the matrix becomes singular.

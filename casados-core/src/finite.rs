@@ -119,8 +119,8 @@ pub(crate) fn find_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     first_non_finite(values)
 }
 
-/// Returns the first non-finite element. Inlined without an operating system, where code size
-/// matters more.
+/// Returns the first non-finite element. Inlined without an operating system, so that the optimiser
+/// sees the range of the index.
 #[cfg_attr(feature = "std", cold, inline(never))]
 #[cfg_attr(not(feature = "std"), inline(always))]
 fn first_non_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {

@@ -61,8 +61,8 @@ pub trait Integrator {
     fn set_time(&mut self, t: Self::Number) -> Result<(), Error>;
     /// Discards the warm start, if the integrator has one.
     fn reset(&mut self);
-    /// Returns the statistics of the last call; those of an adaptive integrator include rejected
-    /// steps.
+    /// Returns the statistics of the last call; for an adaptive integrator those of the step
+    /// selection.
     fn statistics(&self) -> Statistics;
 
     /// [`solve`](Self::solve) with an optional integrand.

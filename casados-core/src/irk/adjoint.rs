@@ -121,7 +121,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointSweep<M, E, S, C> 
 impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointSweep<M, T, S, C> {
     /// Computes `λ_n` from `λ_{n+1}` over a linearised step, with an optional integrand. If the
     /// stored factors are too inaccurate, copies the stored linearisation to the workspace,
-    /// factorises it with full pivoting, and sets `stored_linearization` to `None`.
+    /// factorises the whole matrix with pivoting, and sets `stored_linearization` to `None`.
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.

@@ -23,8 +23,8 @@
 //! controls, the derivatives by all of them are returned besides those of the solution.
 
 mod integral;
-// Fields of type `T` in the output of the derive of `Zeroable`.
 mod chained_integrands;
+// The derive of `Zeroable` repeats the bounds of `T`.
 #[allow(clippy::multiple_bound_locations)]
 mod least_squares;
 mod memory;

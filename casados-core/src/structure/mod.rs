@@ -108,8 +108,8 @@ pub struct Structure {
     /// Read where results are written.
     pub column_of_direction: &'static [u32],
     /// Nonlinear variables: those in the pattern of the Hessian, except `diagonal_controls`,
-    /// ascending. Only their rows of `D_i` enter second derivatives. Read by second derivatives:
-    /// their stage sensitivities.
+    /// ascending. Only their rows of `D_i` enter second derivatives.
+    /// Read by second derivatives: their stage sensitivities.
     pub curved: &'static [u32],
     /// The terms of the symmetric matrix whose lower triangle is `hessian`, by [`symmetric`].
     /// Read by the product of the Hessian with stage sensitivities.

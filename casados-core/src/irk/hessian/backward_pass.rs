@@ -62,8 +62,8 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting>
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
-    /// Whether the factors of every step are computed in its tape entry: each step has its own, and
-    /// Newton's method does not leave the factors at the solution.
+    /// Whether the factors of every step are computed in its tape entry: each step has different
+    /// factors, and Newton's method does not leave those at the solution.
     #[cfg(feature = "alloc")]
     pub(crate) const FACTORS_ON_TAPE: bool = {
         let structure = &M::STRUCTURE;

@@ -1,4 +1,4 @@
-//! Dense fallback: Newton's method with full pivoting of the whole matrix and checks of every
+//! Dense fallback: Newton's method with partial pivoting of the whole matrix and checks of every
 //! value. The Jacobian is updated in every iteration; a [frozen](Jacobian::Frozen) one as soon as
 //! increments do not halve. It is used without a planned elimination order, and after the planned
 //! elimination has failed: then it either converges or returns the error.
@@ -117,7 +117,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
         }
     }
 
-    /// Factorises the stored Jacobian with full pivoting of the whole matrix.
+    /// Factorises the stored Jacobian with partial pivoting of the whole matrix.
     ///
     /// # Errors
     /// [`Error::Singular`]

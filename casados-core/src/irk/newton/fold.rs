@@ -44,7 +44,7 @@ impl PivotAnalysis {
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// Explains the error of a step whose iteration led from `start` to `y`: returns the algebraic
+    /// Returns the error of a step whose iteration led from `start` to `y`, with the algebraic
     /// state along which `∂f/∂(ẋ, z)` becomes singular in between, if there is one.
     #[cold]
     pub(in crate::irk) fn explain_fold(

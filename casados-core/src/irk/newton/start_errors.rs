@@ -15,8 +15,8 @@ use crate::shape::Shape;
 const TRIAL_VALUES: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
-    /// Explains the error of the first step, as [`explain_with_start`](Self::explain_with_start);
-    /// after a warm start returns it unchanged.
+    /// Returns the error of the first step as [`explain_with_start`](Self::explain_with_start)
+    /// does; after a warm start it is unchanged.
     pub(in crate::irk) fn explain_start(&mut self, error: Error, guess: &InitialGuess<'_, M, T, S>) -> Error {
         let given = self.start_values;
         match guess {

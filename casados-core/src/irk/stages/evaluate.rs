@@ -86,10 +86,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> StageWorkspace<M, E, S, F> {
         self.replicate_jacobian();
     }
 
-    /// Evaluates one Jacobian for all stages, and the residual at each stage. Without SIMD lanes of
-    /// intervals the stages are evaluated together and keep their Jacobians, of which the mean is
-    /// taken later; with lanes it is the Jacobian at the midpoint of the stages. `residual` is
-    /// whether the residual is known.
+    /// Evaluates one Jacobian for all stages, and the residual at each stage. With one lane the
+    /// Jacobians of all stages are evaluated, in one SIMD register if possible, and averaged in the
+    /// factorisation. With several lanes the Jacobian at the midpoint of the stages is evaluated.
+    /// `residual` is whether the residual is known.
     pub(crate) fn evaluate_midpoint_jacobian(
         &mut self,
         coefficients: &Coefficients<E, S>,

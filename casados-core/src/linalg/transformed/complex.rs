@@ -7,7 +7,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 /// `⌊N/2⌋` complex numbers, and a real one if `N` is odd: the numbers of an elimination of several
 /// systems with one pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-#[repr(transparent)] // All parts beside each other, so that they may be one register.
+#[repr(transparent)] // Adjacent parts, so that they may be one register.
 pub struct Complex<T, const N: usize> {
     /// Real parts, then imaginary parts, then the real number.
     pub parts: [T; N],
@@ -113,7 +113,7 @@ impl<T: Lanes, const N: usize> Mul for Complex<T, N> {
 impl<T: Lanes, const N: usize> Div for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
-    #[allow(clippy::suspicious_arithmetic_impl)] // There is no other quotient.
+    #[allow(clippy::suspicious_arithmetic_impl)] // The only definition of a quotient.
     fn div(self, other: Self) -> Self {
         self * other.reciprocal()
     }
