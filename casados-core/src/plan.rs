@@ -268,7 +268,7 @@ impl DerivedFacts {
             non_kinematic_range: non_kinematic_range(structure),
             fill_terms: structure.elimination.fill(),
             nonlinear_before: [count_before(structure.curved, nx), count_before(structure.curved, 2 * nx)],
-            has_direct_rates: has_direct_rates(structure),
+            has_direct_rates: has_ordered_derivatives(structure),
         }
     }
 }
@@ -295,7 +295,7 @@ const fn non_kinematic_range(structure: &Structure) -> (usize, usize) {
 }
 
 /// See [`DerivedFacts::has_direct_rates`].
-pub const fn has_direct_rates(structure: &Structure) -> bool {
+pub const fn has_ordered_derivatives(structure: &Structure) -> bool {
     let (count, pattern) = (structure.blocks[1], &structure.jacobian);
     let mut entry = 0;
     while entry < count {

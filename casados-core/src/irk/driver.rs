@@ -235,7 +235,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Driver<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn explain_with_start(&mut self, error: Error, y: &[T]) -> Error {
         let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
-        W::nominal(&mut self.workspace).map_or(error, |work| work.explain_with_start(error, &start))
+        W::nominal(&mut self.workspace).map_or(error, |work| work.add_start_value(error, &start))
     }
 
     /// Sets the stages of every step as a warm start.

@@ -158,7 +158,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
             }
             Err(error) => {
                 if n == 0 {
-                    return Err(self.explain_start(error, guess));
+                    return Err(self.explain_first_step(error, guess));
                 }
                 #[cfg(feature = "alloc")]
                 let error = self.explain_fold(error, coefficients, (n, x), &initial_y, y);

@@ -210,7 +210,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
             let c = minus_c.and_then(|minus_c| minus_c.first()).map_or(T::ONE, |&minus_c| -minus_c);
             for (stage, &value) in values.iter().enumerate() {
                 let (r, column, value) = (place.slot, place.column, c * value);
-                match place.order {
+                match place.ha_power {
                     0 => dense.add(r, column, stage, value),
                     1 => dense.add_row(r, column, stage, h * value, &a[stage]),
                     _ => dense.add_row(r, column, stage, h * h * value, &square[stage]),
@@ -233,7 +233,7 @@ pub struct DenseEntry {
     /// The unknown.
     pub column: usize,
     /// Power of `hA` that the entry is multiplied by.
-    pub order: u32,
+    pub ha_power: u32,
 }
 
 /// Visits the entries of `f_ẋ`, `f_x` and `f_z`, except those in equations of kinematic states;
@@ -252,9 +252,9 @@ pub fn for_each_dense_entry<M: Dae, V: Copy>(
         let (column, order) =
             (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
         match kinematic::<M>(column) {
-            None => visit(DenseEntry { slot, column, order }, values, None),
+            None => visit(DenseEntry { slot, column, ha_power: order }, values, None),
             Some(of) if (of.velocity as usize) < 2 * nx => {
-                let place = DenseEntry { slot, column: of.velocity as usize - nx, order: order + 1 };
+                let place = DenseEntry { slot, column: of.velocity as usize - nx, ha_power: order + 1 };
                 visit(place, values, jacobian.get(of.entry as usize));
             }
             Some(_) => {}

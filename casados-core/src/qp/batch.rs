@@ -116,9 +116,7 @@ impl<T: Real> BatchInteriorPoint<T> {
         let size_of = |instance: &QpInstance<T>| lanes::size(instance, &options).filter(|_| together);
         // A thread takes a multiple of the lanes of a register, or, without lanes, one problem.
         let portion = match instances.first().and_then(size_of) {
-            Some(_) => {
-                count.div_ceil(threads.max(1)).next_multiple_of(CHUNK_GRANULARITY).min(MAX_GRANULES_PER_CHUNK)
-            }
+            Some(_) => count.div_ceil(threads.max(1)).next_multiple_of(CHUNK_GRANULARITY).min(MAX_CHUNK_SIZE),
             None => 1,
         };
         let workers = self.workers.get_mut(..threads).unwrap_or_default();
@@ -142,7 +140,7 @@ impl<T: Real> BatchInteriorPoint<T> {
 /// The number of problems that a thread takes at a time is a multiple of `CHUNK_GRANULARITY`, which
 /// fills whole registers, and at most `MAX_GRANULES_PER_CHUNK`.
 const CHUNK_GRANULARITY: usize = 16;
-const MAX_GRANULES_PER_CHUNK: usize = 64;
+const MAX_CHUNK_SIZE: usize = 64;
 
 impl<T: Real> Worker<T> {
     /// Solves problems; consecutive problems of equal dimensions are solved together.
@@ -156,9 +154,9 @@ impl<T: Real> Worker<T> {
         let Self { solver, together } = self;
         while let Some(first) = instances.first() {
             let size = size_of(first);
-            let alike = instances.iter().take_while(|instance| size_of(instance) == size).count();
-            let own = take_mut(&mut instances, alike);
-            let statuses = take_mut(&mut statuses, alike);
+            let equal_sized = instances.iter().take_while(|instance| size_of(instance) == size).count();
+            let own = take_mut(&mut instances, equal_sized);
+            let statuses = take_mut(&mut statuses, equal_sized);
             let solved = match size {
                 Some(size) => lanes::solve(together, size, (own, statuses), (&solver.options, start)).is_ok(),
                 None => false,
@@ -171,7 +169,7 @@ impl<T: Real> Worker<T> {
             if solved {
                 together.unsolved_indices().for_each(alone);
             } else {
-                (0..alike).for_each(&mut alone);
+                (0..equal_sized).for_each(&mut alone);
             }
         }
     }

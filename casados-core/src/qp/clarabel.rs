@@ -2,12 +2,12 @@
 
 use super::check::check;
 use super::error::{QpError, QpField, Side};
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, QpStart};
 pub use super::sparse::SecondOrderCone;
-use super::sparse::{Origin, Sparse, Triplets};
+use super::sparse::{RowOrigin, Sparse, Triplets};
 use super::statistics::{QpStatistics, Residuals};
 use alloc::vec::Vec;
 use clarabel::algebra::CscMatrix;
@@ -53,7 +53,7 @@ pub struct Clarabel {
     /// Constraints in addition to those of the QP. They are checked by each solve.
     pub cones: Vec<SecondOrderCone>,
     /// The residual that the caller requires; infinite by default.
-    needed: f64,
+    required_residual: f64,
     previous: Option<PreviousSolver>,
 }
 
@@ -88,7 +88,7 @@ impl Clarabel {
             tol_feas: 1e-9,
             ..DefaultSettings::default()
         };
-        Self { settings, cones: Vec::new(), needed: f64::INFINITY, previous: None }
+        Self { settings, cones: Vec::new(), required_residual: f64::INFINITY, previous: None }
     }
 
     /// # Errors
@@ -126,17 +126,17 @@ impl Clarabel {
 
     /// Returns the settings with the required tolerances. The tolerances of the settings become the
     /// reduced ones, which are accepted if the required ones are not reached.
-    fn refined(&self) -> DefaultSettings<f64> {
+    fn settings_with_required_tolerance(&self) -> DefaultSettings<f64> {
         let mut settings = self.settings.clone();
-        let asked = (TOLERANCE_FRACTION * self.needed).max(MIN_TOLERANCE);
-        if asked < f64::INFINITY {
+        let required = (TOLERANCE_FRACTION * self.required_residual).max(MIN_TOLERANCE);
+        if required < f64::INFINITY {
             let s = &mut settings;
             for (tolerance, reduced) in [
                 (&mut s.tol_gap_abs, &mut s.reduced_tol_gap_abs),
                 (&mut s.tol_gap_rel, &mut s.reduced_tol_gap_rel),
                 (&mut s.tol_feas, &mut s.reduced_tol_feas),
             ] {
-                (*reduced, *tolerance) = (*tolerance, tolerance.min(asked));
+                (*reduced, *tolerance) = (*tolerance, tolerance.min(required));
             }
         }
         settings
@@ -195,7 +195,7 @@ impl Clarabel {
                 && equal(&previous.k, &k)
                 && (previous.k.m, &previous.cones) == (k.m, &cones)
         };
-        let settings = self.refined();
+        let settings = self.settings_with_required_tolerance();
         // Clarabel rejects updates of some settings; then a new solver is created.
         let updated = self.previous.as_mut().filter(|previous| same(previous)).is_some_and(|previous| {
             previous.solver.update_settings(settings.clone()).is_ok()
@@ -238,7 +238,7 @@ fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
 
 impl QpSolver<f64> for Clarabel {
     fn require(&mut self, tolerance: f64) {
-        self.needed = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
+        self.required_residual = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
     }
 
     fn solve_until(
@@ -252,12 +252,12 @@ impl QpSolver<f64> for Clarabel {
         solution.check_dimensions(qp)?;
         self.check_settings()?;
         self.check_cones(qp)?;
-        let is_refined = self.needed.is_finite();
+        let is_refined = self.required_residual.is_finite();
         let (solver, sparse) = self.prepare(Sparse::new(qp, &self.cones))?;
         solver.solve();
         let found = &solver.solution;
         let SolutionView { v, dynamics, lower, upper, .. } = solution;
-        for (place, &column) in Places::<f64>::new(qp.dims()).zip(&sparse.columns) {
+        for (place, &column) in StageOffsetsIter::<f64>::new(qp.dims()).zip(&sparse.columns) {
             let from = found.x.get(column..column + place.n).unwrap_or_default();
             for (v, &x) in v.get_mut(place.v..).unwrap_or_default().iter_mut().zip(from) {
                 *v = x;
@@ -267,12 +267,12 @@ impl QpSolver<f64> for Clarabel {
         upper.fill(0.0);
         for (origin, &z) in sparse.origins.iter().zip(&found.z) {
             let (to, index, z) = match *origin {
-                Origin::Dynamics(i) => (&mut *dynamics, i, z),
-                Origin::Equation(i) if z >= 0.0 => (&mut *upper, i, z),
-                Origin::Equation(i) => (&mut *lower, i, -z),
-                Origin::Lower(i) | Origin::Cone(i) => (&mut *lower, i, z),
-                Origin::Upper(i) => (&mut *upper, i, z),
-                Origin::Sign | Origin::Coupling => continue,
+                RowOrigin::Dynamics(i) => (&mut *dynamics, i, z),
+                RowOrigin::Equation(i) if z >= 0.0 => (&mut *upper, i, z),
+                RowOrigin::Equation(i) => (&mut *lower, i, -z),
+                RowOrigin::Lower(i) | RowOrigin::Cone(i) => (&mut *lower, i, z),
+                RowOrigin::Upper(i) => (&mut *upper, i, z),
+                RowOrigin::Sign | RowOrigin::Coupling => continue,
             };
             if let Some(to) = to.get_mut(index) {
                 *to = z;
@@ -314,18 +314,19 @@ fn infeasibility_error(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpErr
     let mut largest = (0.0, 0, Side::Lower);
     for (origin, z) in sparse.origins.iter().zip(z) {
         let (row, side) = match *origin {
-            Origin::Equation(row) if *z > 0.0 => (row, Side::Upper),
-            Origin::Equation(row) | Origin::Lower(row) | Origin::Cone(row) => (row, Side::Lower),
-            Origin::Upper(row) => (row, Side::Upper),
-            Origin::Dynamics(_) | Origin::Sign | Origin::Coupling => continue,
+            RowOrigin::Equation(row) if *z > 0.0 => (row, Side::Upper),
+            RowOrigin::Equation(row) | RowOrigin::Lower(row) | RowOrigin::Cone(row) => (row, Side::Lower),
+            RowOrigin::Upper(row) => (row, Side::Upper),
+            RowOrigin::Dynamics(_) | RowOrigin::Sign | RowOrigin::Coupling => continue,
         };
         if z.abs() > largest.0 {
             largest = (z.abs(), row, side);
         }
     }
     let (_, row, side) = largest;
-    let place =
-        Places::<f64>::new(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
+    let place = StageOffsetsIter::<f64>::new(qp.dims())
+        .find(|p| (p.row..p.row + p.rows).contains(&row))
+        .unwrap_or_default();
     let (field, index) = place.field_of_row(row - place.row);
     QpError::Infeasible { field, stage: place.stage, index, side, violation }
 }

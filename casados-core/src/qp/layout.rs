@@ -158,7 +158,7 @@ pub(crate) const fn first_nx(dims: &[StageDims]) -> usize {
 
 /// An iterator over the offsets of all stages, forwards or backwards.
 #[derive(Clone, Debug)]
-pub(crate) struct Places<'a, T> {
+pub(crate) struct StageOffsetsIter<'a, T> {
     dims: &'a [StageDims],
     /// The number of stages taken from the front.
     taken: usize,
@@ -170,7 +170,7 @@ pub(crate) struct Places<'a, T> {
     back: Option<StageOffsets>,
 }
 
-impl<'a, T> Places<'a, T> {
+impl<'a, T> StageOffsetsIter<'a, T> {
     /// The offsets of stages with elements of type `T`.
     pub fn new(dims: &'a [StageDims]) -> Self {
         Self { dims, taken: 0, next: 0, number: PhantomData, front: StageOffsets::default(), back: None }
@@ -181,7 +181,7 @@ impl<'a, T> Places<'a, T> {
     }
 }
 
-impl<T> Iterator for Places<'_, T> {
+impl<T> Iterator for StageOffsetsIter<'_, T> {
     type Item = StageOffsets;
 
     // Inlined with `std`, where the optimiser drops unused offsets; firmware saves code size.
@@ -190,16 +190,16 @@ impl<T> Iterator for Places<'_, T> {
     fn next(&mut self) -> Option<StageOffsets> {
         let (&first, rest) = self.dims.split_first()?;
         let next = rest.first().map_or(self.next, |dims| dims.nx);
-        let place = StageOffsets::new::<T>(self.taken, first, next).placed_after(&self.front);
-        (self.dims, self.front, self.taken) = (rest, place, self.taken + 1);
-        Some(place)
+        let offsets = StageOffsets::new::<T>(self.taken, first, next).placed_after(&self.front);
+        (self.dims, self.front, self.taken) = (rest, offsets, self.taken + 1);
+        Some(offsets)
     }
     fn size_hint(&self) -> (usize, Option<usize>) {
         (self.dims.len(), Some(self.dims.len()))
     }
 }
 
-impl<T> DoubleEndedIterator for Places<'_, T> {
+impl<T> DoubleEndedIterator for StageOffsetsIter<'_, T> {
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline)]
     fn next_back(&mut self) -> Option<StageOffsets> {
@@ -208,14 +208,14 @@ impl<T> DoubleEndedIterator for Places<'_, T> {
             Some(back) => back,
             None => place_after_stages::<T>(self.front, self.taken, self.dims),
         };
-        let place = StageOffsets::new::<T>(self.taken + rest.len(), last, self.next).placed_before(&back);
-        (self.dims, self.back, self.next) = (rest, Some(place), last.nx);
-        Some(place)
+        let offsets = StageOffsets::new::<T>(self.taken + rest.len(), last, self.next).placed_before(&back);
+        (self.dims, self.back, self.next) = (rest, Some(offsets), last.nx);
+        Some(offsets)
     }
 }
 
-impl<T> ExactSizeIterator for Places<'_, T> {}
-impl<T> FusedIterator for Places<'_, T> {}
+impl<T> ExactSizeIterator for StageOffsetsIter<'_, T> {}
+impl<T> FusedIterator for StageOffsetsIter<'_, T> {}
 
 /// Returns the offsets after the last stage: the lengths of the arrays of the horizon.
 pub(crate) const fn end<T>(dims: &[StageDims]) -> StageOffsets {
@@ -309,16 +309,17 @@ mod tests {
     fn backwards_is_forwards_reversed() {
         let dims = [(3, 2, 0), (9, 1, 4), (2, 12, 1), (5, 0, 2)].map(|(x, u, g)| StageDims::new(x, u, g));
         let parts = |p: StageOffsets| [p.stage, p.n, p.next, p.data, p.v, p.dynamics, p.row, p.factor];
-        let forwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).map(parts).collect();
-        let mut backwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).rev().map(parts).collect();
+        let forwards: alloc::vec::Vec<_> = StageOffsetsIter::<f32>::new(&dims).map(parts).collect();
+        let mut backwards: alloc::vec::Vec<_> =
+            StageOffsetsIter::<f32>::new(&dims).rev().map(parts).collect();
         backwards.reverse();
         assert_eq!(forwards, backwards);
         // With a known end, and from both ends.
         let mut known: alloc::vec::Vec<_> =
-            Places::<f32>::with_known_end(&dims, end::<f32>(&dims)).rev().map(parts).collect();
+            StageOffsetsIter::<f32>::with_known_end(&dims, end::<f32>(&dims)).rev().map(parts).collect();
         known.reverse();
         assert_eq!(forwards, known);
-        let mut places = Places::<f32>::new(&dims).map(parts);
+        let mut places = StageOffsetsIter::<f32>::new(&dims).map(parts);
         let ends = [places.next(), places.next_back(), places.next(), places.next_back()];
         assert_eq!(ends.map(Option::unwrap), [0, 3, 1, 2].map(|stage| forwards[stage]));
         assert_eq!(forwards.iter().map(|p| p[2]).collect::<alloc::vec::Vec<_>>(), [9, 2, 5, 0]);

@@ -114,7 +114,7 @@ pub(crate) use coupling::{is_marked, marked_indices};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{Places, copy_common, padded_len, part, part_mut, take_mut};
+pub(crate) use layout::{StageOffsetsIter, copy_common, padded_len, part, part_mut, take_mut};
 #[cfg(feature = "alloc")]
 pub(crate) use memory::{try_reserve, try_resize, zeros};
 #[cfg(feature = "alloc")]

@@ -1,7 +1,9 @@
 //! The data of a QP.
 
 use super::error::{QpError, QpField};
-use super::layout::{Places, StageDims, copy_common, end, exceeds_memory, part, part_mut, take_mut};
+use super::layout::{
+    StageDims, StageOffsetsIter, copy_common, end, exceeds_memory, part, part_mut, take_mut,
+};
 use super::stage::{ConstraintVector, Stage, StageMut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -98,7 +100,7 @@ impl<'a, T: Real> QpView<'a, T> {
     /// Returns all stages in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = Stage<'a, T>> + ExactSizeIterator + use<'a, T> {
         let data = self.data;
-        Places::<T>::new(self.dims)
+        StageOffsetsIter::<T>::new(self.dims)
             .map(move |place| Stage { place, data: part(data, place.data, place.data_len()) })
     }
 }
@@ -162,7 +164,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     }
     /// Returns a mutable stage.
     pub fn stage_mut(&mut self, stage: usize) -> Option<StageMut<'_, T>> {
-        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
+        let place = StageOffsetsIter::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(StageMut { place, data: part_mut(self.memory.as_mut(), place.data, place.data_len()) })
     }
     /// Returns all mutable stages in order.
@@ -207,7 +209,8 @@ pub(super) fn stages_mut<'a, T: Real>(
     dims: &'a [StageDims],
     mut data: &'a mut [T],
 ) -> impl Iterator<Item = StageMut<'a, T>> {
-    Places::<T>::new(dims).map(move |place| StageMut { place, data: take_mut(&mut data, place.data_len()) })
+    StageOffsetsIter::<T>::new(dims)
+        .map(move |place| StageMut { place, data: take_mut(&mut data, place.data_len()) })
 }
 
 /// Resets data to zero, without bounds.

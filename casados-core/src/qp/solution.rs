@@ -6,7 +6,7 @@ pub use stage::{SolutionStage, SolutionStageMut};
 
 use super::error::{QpError, QpField};
 use super::layout::{
-    Places, StageDims, StageOffsets, end, exceeds_memory, move_to_front, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, end, exceeds_memory, move_to_front, part, part_mut, take_mut,
 };
 use super::problem::QpView;
 use crate::scalar::Real;
@@ -139,7 +139,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
         let (v, dynamics) = self.variables_and_costates();
         let begin = v.len() + dynamics.len();
         let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
-        Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
+        StageOffsetsIter::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
             x: part(v, p.v, p.nx),
             u: part(v, p.v + p.nx, p.nu),
             dynamics: part(dynamics, p.dynamics, p.next),
@@ -234,14 +234,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     }
     /// Returns a mutable stage.
     pub fn stage_mut(&mut self, stage: usize) -> Option<SolutionStageMut<'_, T>> {
-        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
+        let place = StageOffsetsIter::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(self.view_mut().into_stage(place))
     }
     /// Calls a function for all mutable stages in order.
     #[cfg(feature = "alloc")]
     pub(crate) fn each_stage_mut(&mut self, mut write: impl FnMut(SolutionStageMut<'_, T>)) {
         let mut view = self.view_mut();
-        for place in Places::<T>::new(view.dims) {
+        for place in StageOffsetsIter::<T>::new(view.dims) {
             write(view.reborrow().into_stage(place));
         }
     }
@@ -253,7 +253,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     /// last stages are unchanged. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {
         let SolutionView { dims, v, dynamics, lower, upper } = self.view_mut();
-        let places = Places::<T>::new(dims);
+        let places = StageOffsetsIter::<T>::new(dims);
         for (here, there) in places.clone().zip(places.skip(1)) {
             if (here.nx, here.nu, here.ng) == (there.nx, there.nu, there.ng) {
                 move_to_front(v, there.v, here.v, there.ld);

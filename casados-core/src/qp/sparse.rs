@@ -3,14 +3,14 @@
 
 use super::bounds::Bounds;
 use super::coupling::marked_indices;
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::problem::QpView;
 use super::stage::Stage;
 use alloc::vec::Vec;
 
 /// The origin of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Origin {
+pub enum RowOrigin {
     /// A row of the dynamics, by its index in the multipliers of the dynamics.
     Dynamics(usize),
     /// Two equal bounds, by their index in vectors over constraints.
@@ -88,7 +88,7 @@ pub struct Sparse {
     pub k: Triplets,
     pub b: Vec<f64>,
     /// The origins of the rows.
-    pub origins: Vec<Origin>,
+    pub origins: Vec<RowOrigin>,
     /// The first column of the variables `v` of each stage.
     pub columns: Vec<usize>,
     /// The number of equations.
@@ -146,13 +146,13 @@ impl Sparse {
         for (stage, &column) in qp.stages().zip(&sparse.columns) {
             cost(&mut sparse.p, &mut sparse.q, &stage, column);
         }
-        for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
+        for (k, (stage, place)) in qp.stages().zip(StageOffsetsIter::<f64>::new(qp.dims())).enumerate() {
             let (Some(&here), next) = (sparse.columns.get(k), sparse.columns.get(k + 1).copied()) else {
                 break;
             };
             for i in 0..place.next {
                 let row = sparse.row(
-                    Origin::Dynamics(place.dynamics + i),
+                    RowOrigin::Dynamics(place.dynamics + i),
                     -stage.offset().get(i).copied().unwrap_or(0.0),
                 );
                 for j in 0..place.nx {
@@ -167,7 +167,7 @@ impl Sparse {
         sparse.add_coupling_rows(qp);
         // Equations precede inequalities, and inequalities cones.
         for pass in 0..2 {
-            for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
+            for (k, (stage, place)) in qp.stages().zip(StageOffsetsIter::<f64>::new(qp.dims())).enumerate() {
                 let Some(&column) = sparse.columns.get(k) else { break };
                 let kinds = [stage.x_bounds(), stage.u_bounds(), stage.g_bounds()];
                 for (index, (bounds, i)) in
@@ -199,10 +199,10 @@ impl Sparse {
             let (Some(stage), Some(&column)) = (qp.stage(cone.stage), sparse.columns.get(cone.stage)) else {
                 continue;
             };
-            let Some(place) = Places::<f64>::new(qp.dims()).nth(cone.stage) else { continue };
+            let Some(place) = StageOffsetsIter::<f64>::new(qp.dims()).nth(cone.stage) else { continue };
             for general in cone.first..cone.first + cone.count {
                 let lower = stage.g_bounds().lower.get(general).copied().unwrap_or(0.0);
-                let row = sparse.row(Origin::Cone(place.row + place.ld + general), -lower);
+                let row = sparse.row(RowOrigin::Cone(place.row + place.ld + general), -lower);
                 ConstraintRow { stage: &stage, column, index: place.n + general }.add(
                     &mut sparse.k,
                     row,
@@ -218,7 +218,7 @@ impl Sparse {
     fn add_coupling_rows(&mut self, qp: QpView<'_, f64>) {
         let columns = self.columns.clone();
         let mut equal = |first: usize, other: usize| {
-            let row = self.row(Origin::Coupling, 0.0);
+            let row = self.row(RowOrigin::Coupling, 0.0);
             self.k.add(row, first, 1.0);
             self.k.add(row, other, -1.0);
         };
@@ -232,7 +232,7 @@ impl Sparse {
         }
     }
 
-    fn row(&mut self, origin: Origin, b: f64) -> usize {
+    fn row(&mut self, origin: RowOrigin, b: f64) -> usize {
         self.origins.push(origin);
         self.b.push(b);
         self.b.len() - 1
@@ -244,7 +244,7 @@ impl Sparse {
         let hard = lower.1.is_infinite() && upper.1.is_infinite();
         if hard && lower.0 == upper.0 {
             if equations {
-                let k = self.row(Origin::Equation(row), lower.0);
+                let k = self.row(RowOrigin::Equation(row), lower.0);
                 line.add(&mut self.k, k, 1.0);
             }
             return;
@@ -253,7 +253,7 @@ impl Sparse {
             return;
         }
         for (sign, &(bound, linear, quadratic), origin) in
-            [(-1.0, lower, Origin::Lower(row)), (1.0, upper, Origin::Upper(row))]
+            [(-1.0, lower, RowOrigin::Lower(row)), (1.0, upper, RowOrigin::Upper(row))]
         {
             if bound.is_infinite() || (linear == 0.0 && quadratic == 0.0) {
                 continue;
@@ -266,7 +266,7 @@ impl Sparse {
                 self.q.push(linear);
                 self.p.add(violation, violation, quadratic);
                 self.k.add(k, violation, -1.0);
-                let k = self.row(Origin::Sign, 0.0);
+                let k = self.row(RowOrigin::Sign, 0.0);
                 self.k.add(k, violation, -1.0);
             }
         }

@@ -1,7 +1,7 @@
 //! Violations of bounds at a point.
 
 use super::error::{QpError, QpField, Side};
-use super::layout::{Places, StageOffsets, part};
+use super::layout::{StageOffsets, StageOffsetsIter, part};
 use super::problem::QpView;
 use super::stage::ConstraintVector;
 use crate::scalar::Real;
@@ -32,7 +32,7 @@ pub(crate) fn largest_violation<T: Real>(
     mut penalties: impl FnMut(&StageOffsets, usize) -> [T; 2],
 ) -> (Option<Violation>, f64) {
     let (mut worst, mut most, mut sum): (Option<Violation>, f64, f64) = (None, 0.0, 0.0);
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let v = part(v, place.v, place.ld);
         for row in (0..place.n).chain(place.ld..place.ld + place.ng) {

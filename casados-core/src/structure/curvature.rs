@@ -30,7 +30,7 @@ pub struct DiagonalControl {
 }
 
 /// Maximal number of rows with alternating terms; in firmware memory is scarcer than time.
-pub const MOST_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
+pub const MAX_INTERLEAVED_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
 
 /// Returns all `N` terms of the product with the symmetric matrix whose lower triangle has this
 /// pattern, for the `C` variables `curved`; entries of other variables are omitted. Terms are in
@@ -84,8 +84,8 @@ const fn interleave_rows<const C: usize, const N: usize>(by_row: &[Term; N], end
     const MAX_LOOKAHEAD_ROWS: usize = 8;
     let (mut terms, mut place, mut done, mut row) = (*by_row, 0, [false; C], 0);
     while row < C {
-        let (mut rows, mut count, mut other) = ([row; MOST_ROWS], 0, row);
-        while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MOST_ROWS && !done[row] {
+        let (mut rows, mut count, mut other) = ([row; MAX_INTERLEAVED_ROWS], 0, row);
+        while other < C && other < row + MAX_LOOKAHEAD_ROWS && count < MAX_INTERLEAVED_ROWS && !done[row] {
             if !done[other] && have_same_columns(by_row, row_range(ends, row), row_range(ends, other)) {
                 rows[count] = other;
                 count += 1;
@@ -234,7 +234,7 @@ mod tests {
             Pattern { rows: &[0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 4], columns: &[0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 4] };
         let terms = symmetric::<5, 17>(&hessian, &[0, 1, 2, 3, 4]);
         let row_of = |first: usize| terms[first..].iter().map(|term| term.row);
-        if MOST_ROWS == 1 {
+        if MAX_INTERLEAVED_ROWS == 1 {
             assert!(row_of(0).is_sorted());
             return;
         }

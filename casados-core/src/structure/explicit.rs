@@ -19,17 +19,17 @@ impl Structure {
             return false;
         }
         // Bit set of the derivatives that have occurred.
-        let mut met = [0_u64; MAX_STATE_WORDS];
+        let mut seen = [0_u64; MAX_STATE_WORDS];
         let mut row = 0;
         while row < nx {
             let column = columns[row] as usize;
             let (word, bit) = (column / 64, 1_u64 << (column % 64));
-            let first = if word < MAX_STATE_WORDS { met[word] & bit == 0 } else { column == row };
+            let first = if word < MAX_STATE_WORDS { seen[word] & bit == 0 } else { column == row };
             if rows[row] as usize != row || !self.constant[row] || !first {
                 return false;
             }
             if word < MAX_STATE_WORDS {
-                met[word] |= bit;
+                seen[word] |= bit;
             }
             row += 1;
         }

@@ -10,7 +10,7 @@ mod units;
 
 pub use cost::Cost;
 pub use curvature::{
-    DiagonalControl, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric,
+    DiagonalControl, MAX_INTERLEAVED_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric,
 };
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 pub use reduction::Reduction;

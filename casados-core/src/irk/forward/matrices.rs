@@ -27,7 +27,7 @@ impl<'a, M: Plan, T: Lanes> DerivativeMatrices<'a, M, T> {
 
     /// Returns the matrix of element `index` of `w`, and its column in that matrix.
     #[inline(always)]
-    fn locate_direction(plan: M, index: usize) -> (usize, usize) {
+    fn matrix_and_column(plan: M, index: usize) -> (usize, usize) {
         let (nx, nu) = (plan.nx(), plan.nu());
         if index < nx {
             (0, index)
@@ -42,7 +42,7 @@ impl<'a, M: Plan, T: Lanes> DerivativeMatrices<'a, M, T> {
     pub fn fill_inactive_columns(&mut self) {
         for (index, &column) in self.plan.structure().column_of_direction.iter().enumerate() {
             if column == NO_COLUMN {
-                let ((part, column), rows) = (Self::locate_direction(self.plan, index), self.rows);
+                let ((part, column), rows) = (Self::matrix_and_column(self.plan, index), self.rows);
                 let matrix = self.matrices.get_mut(part);
                 let column = matrix.and_then(|matrix| matrix.get_mut(column * rows..(column + 1) * rows));
                 let column = column.unwrap_or_default();
@@ -64,7 +64,7 @@ impl<M: Plan, T: Lanes> DerivativeOutput<T> for DerivativeMatrices<'_, M, T> {
         let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
         let directions = self.plan.structure().directions.get(column..).unwrap_or_default();
         for (to, &direction) in columns.iter_mut().zip(directions) {
-            let (part, own) = Self::locate_direction(self.plan, direction as usize);
+            let (part, own) = Self::matrix_and_column(self.plan, direction as usize);
             let Some((next, rest)) = rest.get_mut(part) else { continue };
             let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
             (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
@@ -76,7 +76,7 @@ impl<M: Plan, T: Lanes> DerivativeOutput<T> for DerivativeMatrices<'_, M, T> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn next_columns<const W: usize>(&self, column: usize) -> &[T] {
         let Some(&first) = self.plan.structure().directions.get(column + W) else { return &[] };
-        let (part, own) = Self::locate_direction(self.plan, first as usize);
+        let (part, own) = Self::matrix_and_column(self.plan, first as usize);
         let from = self.matrices.get(part).and_then(|matrix| matrix.get(own * self.rows..));
         let from = from.unwrap_or_default();
         from.get(..W * self.rows).unwrap_or(from)

@@ -27,7 +27,7 @@ use crate::linalg::{
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
-use crate::plan::{Plan, PlanOf, has_direct_rates};
+use crate::plan::{Plan, PlanOf, has_ordered_derivatives};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 
@@ -42,7 +42,7 @@ pub(in crate::irk) const fn is_cheaper<M: Dae, E, const S: usize>() -> bool {
     // Each product of a solve is one multiplication with one addition.
     let solve = structure.elimination_cost(S as u64).1 as usize / 2;
     let blocks = &structure.blocks;
-    let of_x = if has_direct_rates(structure) { blocks[1] } else { blocks[2] - blocks[1] };
+    let of_x = if has_ordered_derivatives(structure) { blocks[1] } else { blocks[2] - blocks[1] };
     let entries = S * (of_x + blocks[5] - blocks[3]);
     let right = S * (structure.x.len() + S * structure.curved.len());
     let products = structure.curved.len() * S * structure.directions.len() / 2;

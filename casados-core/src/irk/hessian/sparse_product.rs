@@ -7,7 +7,7 @@ use crate::linalg::Arithmetic;
 use crate::model::Term;
 use crate::plan::Plan;
 use crate::scalar::Lanes;
-use crate::structure::MOST_ROWS;
+use crate::structure::MAX_INTERLEAVED_ROWS;
 
 /// Computes `G = −H D` at all stages in the panel that begins with `column`; `G` has the row layout
 /// of the panel.
@@ -63,8 +63,8 @@ pub(in crate::irk) fn multiply<
     while let Some(first) = terms.first() {
         let product = SparseProduct { entries, d: &of_d, stage };
         terms = match first.rows {
-            3 if const { MOST_ROWS >= 3 } => product.multiply_rows::<A, 3>(curved, terms, g),
-            2 if const { MOST_ROWS >= 2 } => product.multiply_rows::<A, 2>(curved, terms, g),
+            3 if const { MAX_INTERLEAVED_ROWS >= 3 } => product.multiply_rows::<A, 3>(curved, terms, g),
+            2 if const { MAX_INTERLEAVED_ROWS >= 2 } => product.multiply_rows::<A, 2>(curved, terms, g),
             _ => product.multiply_row::<A, 1>(curved, terms, g, 0),
         };
     }

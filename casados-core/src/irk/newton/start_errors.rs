@@ -17,16 +17,18 @@ const TRIAL_VALUES: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
 impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Returns the error of the first step as [`explain_with_start`](Self::explain_with_start)
     /// does; after a warm start it is unchanged.
-    pub(in crate::irk) fn explain_start(&mut self, error: Error, guess: &InitialGuess<'_, M, T, S>) -> Error {
+    pub(in crate::irk) fn explain_first_step(
+        &mut self,
+        error: Error,
+        guess: &InitialGuess<'_, M, T, S>,
+    ) -> Error {
         let given = self.start_values;
         match guess {
-            InitialGuess::Nominal => {
-                self.explain_with_start(error, &|unknown| M::START.get(unknown).copied())
-            }
+            InitialGuess::Nominal => self.add_start_value(error, &|unknown| M::START.get(unknown).copied()),
             InitialGuess::Given => {
-                self.explain_with_start(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+                self.add_start_value(error, &|unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
             }
-            InitialGuess::Zero => self.explain_with_start(error, &|_| None),
+            InitialGuess::Zero => self.add_start_value(error, &|_| None),
             InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
         }
     }
@@ -34,7 +36,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> StageWorkspace<M, T, S, F> {
     /// Adds to the error the algebraic state that caused it, and its start value (zero without
     /// one). Errors of models without algebraic states are returned unchanged.
     #[cold]
-    pub(in crate::irk) fn explain_with_start(
+    pub(in crate::irk) fn add_start_value(
         &mut self,
         error: Error,
         start: &dyn Fn(usize) -> Option<f64>,

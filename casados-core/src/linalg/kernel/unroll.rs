@@ -17,7 +17,7 @@ mod unrolled;
 const MAY_UNROLL: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
 /// Maximal number of chunks, and of pivots, in an unrolled loop.
-const MAX_LINES: usize = 48;
+const MAX_UNROLLED_PIVOTS: usize = 48;
 
 /// Maximal number of rows in an unrolled loop.
 const MAX_UNROLLED_ROWS: usize = 384;
@@ -246,7 +246,10 @@ const fn is_unrolled_plan<A: Arithmetic, M: Plan>(updates: bool, instructions: u
     let max_instructions =
         if few { SHORT_BODY_FACTOR * MAX_UNROLLED_INSTRUCTIONS } else { MAX_UNROLLED_INSTRUCTIONS };
     let count = if updates { plan.updates.len() } else { plan.slots.len() };
-    MAY_UNROLL && A::UNROLLED && plan.pivots.len() <= MAX_LINES && count * instructions <= max_instructions
+    MAY_UNROLL
+        && A::UNROLLED
+        && plan.pivots.len() <= MAX_UNROLLED_PIVOTS
+        && count * instructions <= max_instructions
 }
 
 /// Number of blocks that a pivot updates.

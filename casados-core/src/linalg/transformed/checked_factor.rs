@@ -93,7 +93,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
             for_each_dense_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
                 let (r, c, value) =
                     (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
-                let (re, im) = match place.order {
+                let (re, im) = match place.ha_power {
                     0 => (T::ONE, T::ZERO),
                     1 => scale.get(l),
                     _ => square.get(l),
@@ -205,7 +205,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         for_each_dense_entry::<M, _>(self.jacobian.as_ref(), |place, &value, minus_c| {
             let value = minus_c.map_or(value, |&minus_c| -(minus_c * value));
             let [[unknown]] = solution[place.column];
-            let unknown = match place.order {
+            let unknown = match place.ha_power {
                 0 => unknown,
                 1 => self.h_mu * unknown,
                 _ => square * unknown,

@@ -9,7 +9,9 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
 use crate::qp::element::set;
 use crate::qp::interior::{at, is_initial_state_fixed};
-use crate::qp::{Bounds, Places, QpView, StageDims, add_symmetric, copy_common, is_marked, part, part_mut};
+use crate::qp::{
+    Bounds, QpView, StageDims, StageOffsetsIter, add_symmetric, copy_common, is_marked, part, part_mut,
+};
 use crate::scalar::Real;
 use core::ops::Range as Stages;
 
@@ -32,7 +34,7 @@ pub(in crate::ocp) struct ProblemScaling {
     /// The unit of the objective and of multipliers.
     pub objective_unit: f64,
     /// The smallest unit of a row, at most one.
-    pub min_row_unit: f64,
+    pub tolerance: f64,
 }
 
 /// The units of a problem.
@@ -113,7 +115,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         }
         let force = compute_objective_unit(qp, v, rows, scratch);
         let least = rows.iter().filter(|&&unit| unit > T::ZERO).fold(T::ONE, |m, &unit| m.min(unit));
-        ProblemScaling { objective_unit: force, min_row_unit: least.to_f64() }
+        ProblemScaling { objective_unit: force, tolerance: least.to_f64() }
     }
 
     /// Returns a smaller objective unit if objective and gradient at the iterate are below a
@@ -178,7 +180,7 @@ fn set_variable_unit<T: Real>(
     let mut range = MagnitudeRange::EMPTY;
     let mut guess = T::ZERO;
     let variable_places =
-        || Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
+        || StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage) && i < place.n);
     let stages_of_places = qp.stages().skip(stages.start);
     for (place, stage) in variable_places().zip(stages_of_places) {
         guess = guess.max(at(v, (place.v + i) as u32).abs());
@@ -207,7 +209,7 @@ fn set_row_unit<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>
     let mut range = MagnitudeRange::EMPTY;
     let (mut largest_gradient, mut bound_distance) = (T::ZERO, T::ZERO);
     for (place, stage) in
-        Places::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
+        StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()).filter(|(p, _)| stages.contains(&p.stage))
     {
         let view = stage.arrays();
         let column = part(view.matrix, (place.next + i) * place.ld, place.ld);
@@ -229,7 +231,7 @@ fn set_row_unit<T: Real>(qp: QpView<'_, T>, v: &[T], (stages, i): (Stages<usize>
     range.add(largest_gradient);
     range.add(bound_distance);
     let unit = range.unit_unless_near_one();
-    for place in Places::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
+    for place in StageOffsetsIter::<T>::new(qp.dims).filter(|place| stages.contains(&place.stage)) {
         set(units, place.row + place.ld + i, unit);
     }
 }
@@ -247,7 +249,7 @@ fn compute_objective_unit<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scrat
 /// Returns the largest gradient and its largest change, with units of rows.
 fn largest_gradient_and_change<T: Real>(qp: QpView<'_, T>, v: &[T], rows: &[T], scratch: &mut [T]) -> [T; 2] {
     let ([mut largest_gradient, mut largest_change], fixed) = ([T::ZERO; 2], is_initial_state_fixed(qp));
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
         let view = stage.arrays();
         let (v, gradient) = (part(v, place.v, place.ld), part_mut(scratch, 0, place.ld));
         copy_common(gradient, part(view.gradient, 0, place.ld));

@@ -38,11 +38,11 @@ pub(in crate::ocp) struct FreeParameters {
 
 impl FreeParameters {
     /// No free parameters, behind this number of copies of elements of the first state.
-    pub fn with_initial_state_copies(starts: usize) -> Self {
-        let _ = starts;
+    pub fn with_initial_state_copies(initial_state_copies: usize) -> Self {
+        let _ = initial_state_copies;
         Self {
             #[cfg(feature = "alloc")]
-            initial_state_copies: starts,
+            initial_state_copies,
             ..Self::default()
         }
     }

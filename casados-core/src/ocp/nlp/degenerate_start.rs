@@ -4,7 +4,7 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::instance::{InitialState, Ocp};
 use crate::ocp::formulation::program::Program;
-use crate::qp::{Bounds, Places, Solution, StageDims, part};
+use crate::qp::{Bounds, Solution, StageDims, StageOffsetsIter, part};
 use crate::scalar::Real;
 
 /// A gradient counts as vanishing if the change of each variable by its size, or by one, changes
@@ -27,7 +27,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// written there.
     pub(super) fn has_vanishing_gradient(&self) -> bool {
         let (qp, (v, _)) = (self.qp.view(), self.iterate.variables_and_costates());
-        Places::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
+        StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()).any(|(place, stage)| {
             let (view, stage_variables) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();
             lower.iter().zip(upper).enumerate().any(|(i, (&lower, &upper))| {

@@ -11,7 +11,7 @@ use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::degenerate_start::PerturbedVariables;
-use crate::qp::{Places, Solution, StageDims, copy_common, padded_len, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, copy_common, padded_len, part_mut};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -82,7 +82,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
             }
             let mut sweep_displacement = 0.0;
             let (v, mut remaining_ends) = (point.view_mut().v, &*ends);
-            for place in Places::<T>::new(self.qp().dims).skip(1) {
+            for place in StageOffsetsIter::<T>::new(self.qp().dims).skip(1) {
                 let (ends, next) = remaining_ends.split_at_checked(place.nx).unwrap_or_default();
                 remaining_ends = next;
                 for (i, (x, &end)) in part_mut(v, place.v, place.nx).iter_mut().zip(ends).enumerate() {

@@ -74,7 +74,7 @@ pub(super) trait Phase<T: Real> {
     fn phase_end<'s>(&'s self, at: SolutionStage<'s, T>) -> PhaseEnd<'s, T>;
     fn name(&self, place: (QpField, usize, usize), side: Side) -> ConstraintName;
     fn derivative(&self, error: &QpError) -> Option<OcpError>;
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>);
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>);
 }
 
 impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
@@ -184,7 +184,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
     fn derivative(&self, error: &QpError) -> Option<OcpError> {
         self.non_finite_derivative(error)
     }
-    fn complete(&mut self, asks: bool) -> (bool, Option<(ConstraintName, f64)>) {
-        self.convexity_and_violation(asks)
+    fn complete(&mut self, needs_violation: bool) -> (bool, Option<(ConstraintName, f64)>) {
+        self.convexity_and_violation(needs_violation)
     }
 }

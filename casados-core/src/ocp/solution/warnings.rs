@@ -6,7 +6,7 @@ use crate::ocp::formulation::instance::{HeapOcp, InitialState};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::FirstOrder;
 use crate::qp::element::get;
-use crate::qp::{Bounds, Places, QpField, Side, part};
+use crate::qp::{Bounds, QpField, Side, StageOffsetsIter, part};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -165,7 +165,7 @@ impl<P: Formulation<T>, T: Real> HeapOcp<P, T> {
     /// Warns about each constraint, at its first stage.
     fn warn_vanishing_gradients(&self, found: &mut Vec<Warning>) {
         let (qp, (v, _)) = (self.qp(), self.iterate().variables_and_costates());
-        for (place, stage) in Places::<T>::new(qp.dims()).zip(qp.stages()) {
+        for (place, stage) in StageOffsetsIter::<T>::new(qp.dims()).zip(qp.stages()) {
             let (view, here) = (stage.arrays(), part(v, place.v, place.ld));
             let Bounds { lower, upper, .. } = stage.g_bounds();
             for (i, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {

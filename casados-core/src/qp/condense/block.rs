@@ -1,9 +1,11 @@
 //! The condensed problem, by a recursion over the stages of a block.
 
-use super::plan::{Kind, Origin, blocks, row_bounds_and_penalties};
+use super::plan::{CondensedRow, Kind, blocks, row_bounds_and_penalties};
 use crate::qp::element::{get, set};
 use crate::qp::interior::{Columns, PADDING_COLUMNS, Part, Source, product, subtract};
-use crate::qp::layout::{Places, StageDims, StageOffsets, copy_common, padded_len, part, part_mut, take_mut};
+use crate::qp::layout::{
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut, take_mut,
+};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::{Packed, Real, Registers};
@@ -67,19 +69,19 @@ impl<'a, T: Real> Work<'a, T> {
 pub struct Condense<'a, T> {
     pub qp: QpView<'a, T>,
     pub block: usize,
-    pub rows: &'a [Origin],
+    pub rows: &'a [CondensedRow],
     pub work: Work<'a, T>,
     pub dims: &'a [StageDims],
     pub target: &'a mut [T],
     /// Workspace for the origins of the rows of `Z`.
-    pub origins: &'a mut Vec<Origin>,
+    pub origins: &'a mut Vec<CondensedRow>,
 }
 
 impl<T: Real> Registers<T> for Condense<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(mut self) {
         let mut rows = self.rows;
-        let targets = Places::<T>::new(self.dims);
+        let targets = StageOffsetsIter::<T>::new(self.dims);
         for (block, to) in blocks(self.qp.dims.len(), self.block).zip(targets) {
             let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
             rows = others;
@@ -91,13 +93,18 @@ impl<T: Real> Registers<T> for Condense<'_, T> {
 impl<T: Real> Condense<'_, T> {
     /// Condenses a block.
     #[inline(always)]
-    fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &StageOffsets, rows: &[Origin]) {
+    fn block<E: Packed<T>>(
+        &mut self,
+        block: core::ops::Range<usize>,
+        to: &StageOffsets,
+        rows: &[CondensedRow],
+    ) {
         let Self { qp, work, target, origins, .. } = self;
         let target = part_mut(target, to.data, to.data_len());
         part_mut(target, 0, to.matrix()).fill(T::ZERO);
         origins.clear();
         let mut controls = 0;
-        let stages = Places::<T>::new(qp.dims).skip(block.start).take(block.len());
+        let stages = StageOffsetsIter::<T>::new(qp.dims).skip(block.start).take(block.len());
         for (count, place) in stages.rev().enumerate() {
             let stage = Stage { place, data: part(qp.data, place.data, place.data_len()), controls };
             work.propagate_stage::<E>(&stage, origins, count == 0);
@@ -129,7 +136,7 @@ impl<T: Real> Work<'_, T> {
     fn propagate_stage<E: Packed<T>>(
         &mut self,
         stage: &Stage<'_, T>,
-        origins: &mut Vec<Origin>,
+        origins: &mut Vec<CondensedRow>,
         first: bool,
     ) {
         let Self { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = self;
@@ -148,7 +155,7 @@ impl<T: Real> Work<'_, T> {
         if first {
             // The state at the end of the block is `A x + B u + b`, and has no cost here.
             for i in 0..next {
-                origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
+                origins.push(CondensedRow { kind: Kind::State, stage: stage + 1, index: i });
                 for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
                     set(z_next, j * ld_z + i, element);
                 }
@@ -176,7 +183,13 @@ impl<T: Real> Work<'_, T> {
 
     /// Writes the columns of rows, `R` and bounds of the controls of a stage.
     #[inline(always)]
-    fn write_controls(&self, stage: &Stage<'_, T>, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+    fn write_controls(
+        &self,
+        stage: &Stage<'_, T>,
+        to: &StageOffsets,
+        origins: &[CondensedRow],
+        target: &mut [T],
+    ) {
         let StageOffsets { nx, nu, ld, .. } = stage.place;
         for i in 0..nu {
             let (here, column) =
@@ -202,11 +215,11 @@ impl<T: Real> Work<'_, T> {
 
     /// Appends rows to `Z`: mixed derivatives with respect to the controls of a stage.
     #[inline(always)]
-    fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
+    fn add_control_rows(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<CondensedRow>) {
         let StageOffsets { nx, nu, ld, stage: number, .. } = stage.place;
         for i in 0..nu {
             let row = origins.len();
-            origins.push(Origin { kind: Kind::Control, stage: number, index: stage.controls + i });
+            origins.push(CondensedRow { kind: Kind::Control, stage: number, index: stage.controls + i });
             for j in 0..nx {
                 set(self.z_next, j * self.ld_z + row, get(self.m, j * ld + nx + i));
             }
@@ -220,15 +233,15 @@ impl<T: Real> Work<'_, T> {
     fn add_constraint_rows(
         &mut self,
         stage: &Stage<'_, T>,
-        rows: &[Origin],
+        rows: &[CondensedRow],
         to: &StageOffsets,
-        origins: &mut Vec<Origin>,
+        origins: &mut Vec<CondensedRow>,
         target: &mut [T],
     ) {
         let StageOffsets { nx, n, ld, next, stage: number, .. } = stage.place;
         for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == number) {
             let row = origins.len();
-            origins.push(Origin { index, ..*origin });
+            origins.push(CondensedRow { index, ..*origin });
             let general = origin.index.checked_sub(ld);
             for j in 0..n {
                 let element = match general {
@@ -280,7 +293,7 @@ impl<T: Real> Work<'_, T> {
         &self,
         stage: &Stage<'_, T>,
         to: &StageOffsets,
-        origins: &[Origin],
+        origins: &[CondensedRow],
         target: &mut [T],
     ) {
         let StageOffsets { nx, ld, .. } = stage.place;
@@ -306,7 +319,7 @@ impl<T: Real> Work<'_, T> {
 
     /// Subtracts the constants of the rows of a block from their bounds.
     #[inline(always)]
-    fn write_bound_offsets(&self, to: &StageOffsets, origins: &[Origin], target: &mut [T]) {
+    fn write_bound_offsets(&self, to: &StageOffsets, origins: &[CondensedRow], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
             let constant = get(self.constant, row);
             match origin.kind {
@@ -325,7 +338,7 @@ impl<T: Real> Work<'_, T> {
 }
 
 /// Returns the index of the element of a row of `Z` for a variable of the condensed stage.
-fn row_element_index(to: &StageOffsets, origin: &Origin, variable: usize) -> usize {
+fn row_element_index(to: &StageOffsets, origin: &CondensedRow, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,

@@ -17,7 +17,7 @@ mod expand;
 mod plan;
 
 use super::error::QpError;
-use super::layout::{Places, StageDims, padded_len, part};
+use super::layout::{StageDims, StageOffsetsIter, padded_len, part};
 use super::memory::{try_reserve, try_resize};
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
@@ -27,7 +27,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use block::{Condense, MaxDimensions, Work};
 use expand::{Expand, copy, stage_cost_and_product};
-use plan::{Kind, Origin, blocks, expand_error, is_bounded, row_bounds_and_penalties};
+use plan::{CondensedRow, Kind, blocks, expand_error, is_bounded, row_bounds_and_penalties};
 
 /// Condenses problems in blocks of intervals, and solves them by another solver.
 ///
@@ -66,9 +66,9 @@ pub struct Condensing<T, S> {
     /// The dimensions of the previous call.
     old: Vec<StageDims>,
     /// The origins of general constraints.
-    rows: Vec<Origin>,
+    rows: Vec<CondensedRow>,
     /// The origins of the rows of `Z`.
-    origins: Vec<Origin>,
+    origins: Vec<CondensedRow>,
     work: Vec<T>,
 }
 
@@ -92,7 +92,7 @@ impl<T: Real, S> Condensing<T, S> {
         // Reserves the maximum, so that later calls need no more.
         try_reserve(&mut self.dims, qp.dims.len())?;
         try_reserve(&mut self.rows, qp.dims.iter().map(|d| d.nx + d.ng).sum())?;
-        let mut places = Places::<T>::new(qp.dims);
+        let mut places = StageOffsetsIter::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
             for stage in block.clone() {
@@ -106,7 +106,7 @@ impl<T: Real, S> Condensing<T, S> {
                 for index in inner.chain(place.ld..place.ld + place.ng) {
                     if index >= place.ld || is_bounded(row_bounds_and_penalties(data, &place, index)) {
                         condensed.ng += 1;
-                        self.rows.push(Origin { kind: Kind::Constraint, stage, index });
+                        self.rows.push(CondensedRow { kind: Kind::Constraint, stage, index });
                     }
                 }
             }
@@ -149,11 +149,11 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         else {
             return Err(QpError::OutOfMemory { bytes: 0 });
         };
-        let places = Places::<T>::new(qp.dims);
+        let places = StageOffsetsIter::<T>::new(qp.dims);
         let largest = MaxDimensions {
             n: places.clone().map(|p| p.n).max().unwrap_or(0),
             nx: places.clone().map(|p| p.nx).max().unwrap_or(0),
-            rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
+            rows: StageOffsetsIter::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
         };
         let most = places.map(|p| padded_len::<T>(p.next + p.ng)).max().unwrap_or(0);
         let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);

@@ -1,14 +1,14 @@
 //! The stages of the blocks, and the origins of their constraints.
 
 use crate::qp::error::{QpError, QpField};
-use crate::qp::layout::{Places, StageDims, StageOffsets, part};
+use crate::qp::layout::{StageDims, StageOffsets, StageOffsetsIter, part};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
 
 /// The origin of a row of `Z`, or of a constraint of the condensed problem.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Origin {
+pub struct CondensedRow {
     pub kind: Kind,
     /// The original stage.
     pub stage: usize,
@@ -59,7 +59,7 @@ pub fn expand_error<T: Real>(
     qp: QpView<'_, T>,
     size: usize,
     dims: &[StageDims],
-    rows: &[Origin],
+    rows: &[CondensedRow],
 ) -> QpError {
     let find = |stage: usize, field: QpField, index: usize| {
         let range = blocks(qp.dims.len(), size).nth(stage)?;
@@ -67,7 +67,7 @@ pub fn expand_error<T: Real>(
             QpField::GeneralBounds => {
                 let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
                 let origin = rows.get(before + index)?;
-                let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
+                let place = StageOffsetsIter::<T>::new(qp.dims).nth(origin.stage)?;
                 let (field, index) = place.field_of_row(origin.index);
                 Some((origin.stage, field, index))
             }

@@ -56,9 +56,9 @@ impl<T: Real> Iterate<'_, T> {
         self.load_point(solution);
         self.load_initial_state();
         self.evaluate_values::<E>();
-        self.sides.load_multipliers(solution);
-        self.sides.guess();
-        if start == QpStart::Cold && (!self.sides.is_active_set_empty() || over()) {
+        self.inequalities.load_multipliers(solution);
+        self.inequalities.guess();
+        if start == QpStart::Cold && (!self.inequalities.is_active_set_empty() || over()) {
             return Err(statistics);
         }
         self.first_gradient::<E>(limits, solution.dynamics);
@@ -77,11 +77,12 @@ impl<T: Real> Iterate<'_, T> {
             }
             let before = changes;
             // Violations and multipliers below the tolerance change no side.
-            let Terms { forces, values } = limits.of(self.terms);
+            let Terms { gradient_terms: forces, condition_terms: values } = limits.of(self.terms);
             let half = T::from_f64(0.5);
-            changes = self
-                .sides
-                .update_active_set(Terms { forces: half * forces, values: half * values }, self.measure);
+            changes = self.inequalities.update_active_set(
+                Terms { gradient_terms: half * forces, condition_terms: half * values },
+                self.measure,
+            );
             factor = changes > 0;
             if factor {
                 // Converging sets have a non-increasing number of changes.
@@ -90,9 +91,9 @@ impl<T: Real> Iterate<'_, T> {
                 }
                 continue;
             }
-            self.sides.clip_to_feasible_signs();
+            self.inequalities.clip_to_feasible_signs();
             let objective = self.evaluate::<E>(solution.dynamics);
-            let residuals = self.judged::<E>();
+            let residuals = self.evaluated_residuals::<E>();
             if objective.is_finite() && self.is_converged(residuals, limits) {
                 (statistics.objective, statistics.residuals) =
                     (objective.to_f64(), self.unscaled_residuals(residuals));
@@ -101,7 +102,7 @@ impl<T: Real> Iterate<'_, T> {
             if statistics.refinements >= MAX_REFINEMENTS {
                 return Err(QpStatistics { refinements: 0, ..statistics });
             }
-            self.sides.restore_signed_distances();
+            self.inequalities.restore_signed_distances();
             self.clear_dynamics_residuals();
         }
     }
@@ -109,8 +110,8 @@ impl<T: Real> Iterate<'_, T> {
     /// Takes a Newton step with the current active set; returns whether it succeeded.
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
-        let weight = T::ONE / self.sides.compliance;
-        self.sides.assemble_active_weights();
+        let weight = T::ONE / self.inequalities.dual_regularisation;
+        self.inequalities.assemble_active_weights();
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;
         }
@@ -123,9 +124,10 @@ impl<T: Real> Iterate<'_, T> {
         if let Some(coupling) = &mut self.coupling {
             coupling.take_step(T::ONE);
         }
-        let sides = &mut self.sides;
-        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
-        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness) {
+        let sides = &mut self.inequalities;
+        let equations =
+            sides.equations.iter().zip(&mut *sides.equation_multipliers).zip(&mut *sides.equation_residual);
+        for (((&row, free), residual), &stiffness) in equations.zip(&*sides.stiffness_scale) {
             *residual = *residual + at(self.step, row);
             *free = *free - weight * stiffness * *residual;
         }
@@ -153,7 +155,7 @@ impl<T: Real> Inequalities<'_, T> {
         let count = self.counts.sides();
         copy_common(part_mut(self.slack, 0, count), self.scratch);
         for (((activity, &distance), &multiplier), &softness) in
-            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.softness)
+            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier).zip(&*self.regularisation_scale)
         {
             *activity = if multiplier * softness > distance { ACTIVE } else { INACTIVE };
         }
@@ -162,7 +164,7 @@ impl<T: Real> Inequalities<'_, T> {
             let force = self.penalty(j, distance);
             // The violation and the difference of the penalty's slope and the multiplier are
             // complementary.
-            let softness = at(self.softness, side);
+            let softness = at(self.regularisation_scale, side);
             if distance < T::ZERO && -distance > (force - multiplier) * softness {
                 set(self.activity, side as usize, VIOLATED);
                 set(self.multiplier, side as usize, force);
@@ -180,9 +182,9 @@ impl<T: Real> Inequalities<'_, T> {
     /// contains.
     #[inline(always)]
     fn assemble_active_weights(&mut self) {
-        let weight = T::ONE / self.compliance;
+        let weight = T::ONE / self.dual_regularisation;
         for ((&activity, side_weight), &softness) in
-            self.activity.iter().zip(&mut *self.weight).zip(&*self.softness)
+            self.activity.iter().zip(&mut *self.weight).zip(&*self.regularisation_scale)
         {
             *side_weight = if activity == ACTIVE { weight / softness } else { T::ZERO };
         }
@@ -218,7 +220,7 @@ impl<T: Real> Inequalities<'_, T> {
     /// Updates the active set by distances and multipliers. Returns the number of changes.
     #[inline(always)]
     fn update_active_set(&mut self, tolerance: Terms<T>, units: Units<'_, T>) -> usize {
-        let Terms { forces, values } = tolerance;
+        let Terms { gradient_terms: forces, condition_terms: values } = tolerance;
         let mut changes = 0;
         let sides = self.activity.iter_mut().zip(&*self.slack).zip(&*self.rows);
         for (((activity, &distance), &row), multiplier) in sides.zip(&mut *self.multiplier) {

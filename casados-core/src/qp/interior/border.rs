@@ -23,7 +23,7 @@ use super::units::Units;
 use super::vector::{add_scaled, dot, scale_vector};
 use crate::qp::element::{add, set};
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, copy_common, padded_len, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, padded_len, part, part_mut};
 use crate::qp::{QpView, marked_indices};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -89,7 +89,7 @@ impl<T: Real> Coupling<'_, T> {
         for zero in [&mut *self.schur, self.offset] {
             zero.fill(T::ZERO);
         }
-        for place in Places::<T>::with_known_end(qp.dims, riccati.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(qp.dims, riccati.end).rev() {
             let StageOffsets { nx, nu, n, next, .. } = place;
             let minus = Columns { data: &*self.minus, ld };
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld: place.ld };
@@ -171,7 +171,7 @@ impl<T: Real> Coupling<'_, T> {
     fn gather(&mut self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
         copy_common(self.linear, self.offset);
         let ld = padded_len::<T>(self.count);
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let (begin, nu) = (place.v + place.nx, place.nu);
             let y = part_mut(riccati.y, begin, nu);
             for (w, j) in marked_indices(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
@@ -283,7 +283,7 @@ impl<T: Real> Coupling<'_, T> {
     fn distribute_parameter_step<E: Packed<T>>(&self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
         let ld = padded_len::<T>(self.count);
         let controls = self.step.get(self.conditions..).unwrap_or_default();
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let begin = place.v + place.nx;
             let y = part_mut(riccati.y, begin, place.nu);
             let own = part(self.eliminated, begin * ld, place.nu * ld).chunks_exact(ld.max(1));

@@ -7,7 +7,7 @@ use super::kernels::PADDING_COLUMNS;
 use super::riccati::{Extent, InitialStateKind};
 use super::vector::{add_scaled, scale_vector};
 use crate::qp::element::set;
-use crate::qp::layout::{Places, StageOffsets, first_nx, padded_len, take_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, first_nx, padded_len, take_mut};
 use crate::qp::{QpView, StageDims, marked_indices};
 use crate::scalar::Real;
 
@@ -182,9 +182,10 @@ impl<'a, T: Real> Coupling<'a, T> {
         for (theta, i) in self.theta.iter_mut().zip(marked_indices(self.periodic)) {
             *theta = *theta + join(i, last + i);
         }
-        let Some(first) = Places::<T>::new(qp.dims).next() else { return };
+        let Some(first) = StageOffsetsIter::<T>::new(qp.dims).next() else { return };
         for j in marked_indices(self.shared) {
-            for StageOffsets { row, nx, .. } in Places::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
+            for StageOffsets { row, nx, .. } in
+                StageOffsetsIter::<T>::new(qp.dims).skip(1).filter(|place| j < place.nu)
             {
                 join(first.nx + j, row + nx + j);
             }
@@ -194,5 +195,5 @@ impl<'a, T: Real> Coupling<'a, T> {
 
 /// Returns the offset of the last state among the rows.
 fn last_state<T: Real>(qp: QpView<'_, T>) -> usize {
-    Places::<T>::new(qp.dims).next_back().map_or(0, |place| place.row)
+    StageOffsetsIter::<T>::new(qp.dims).next_back().map_or(0, |place| place.row)
 }

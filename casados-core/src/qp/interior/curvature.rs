@@ -5,7 +5,7 @@ use super::kernels::{Columns, add_transposed, symmetric};
 use super::riccati::Riccati;
 use super::vector::largest_magnitude_ignoring_nan;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut, take_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::Real;
 
@@ -23,7 +23,7 @@ impl<T: Real> Riccati<'_, T> {
     ) -> Result<(), QpError> {
         let (mut curvature, mut size) = (T::ZERO, T::ZERO);
         let mut rest = direction.get_mut(from.row..).unwrap_or_default();
-        for place in Places::<T>::new(qp.dims).skip(from.stage) {
+        for place in StageOffsetsIter::<T>::new(qp.dims).skip(from.stage) {
             let StageOffsets { nx, nu, n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };

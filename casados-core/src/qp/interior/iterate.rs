@@ -9,7 +9,8 @@ use super::terms::{LargestTerms, Terms};
 use super::units::Units;
 use crate::qp::element::get;
 use crate::qp::layout::{
-    Places, StageDims, StageOffsets, copy_common, end, first_nx, padded_len, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, end, first_nx, padded_len, part, part_mut,
+    take_mut,
 };
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
@@ -33,7 +34,7 @@ pub struct Iterate<'a, T> {
     /// The units of residuals.
     pub measure: Units<'a, T>,
     pub riccati: Riccati<'a, T>,
-    pub sides: Inequalities<'a, T>,
+    pub inequalities: Inequalities<'a, T>,
     /// Couplings of stages.
     pub coupling: Option<Coupling<'a, T>>,
     /// `v` and `C x + D u`
@@ -97,7 +98,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Returns the length of the memory.
     pub const fn memory(dims: &[StageDims], counts: &Counts) -> usize {
         let end = end::<T>(dims);
-        Riccati::<T>::memory(dims) + counts.numbers() + 5 * end.row + end.dynamics + first_nx(dims)
+        Riccati::<T>::memory(dims) + counts.memory_len() + 5 * end.row + end.dynamics + first_nx(dims)
     }
 
     /// Returns the length of the memory for a QP.
@@ -127,7 +128,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             units: &[],
             measure: Units::NONE,
             riccati,
-            sides,
+            inequalities: sides,
             v: take_mut(numbers, end.row),
             step: take_mut(numbers, end.row),
             stationarity: take_mut(numbers, end.row),
@@ -136,17 +137,17 @@ impl<'a, T: Real> Iterate<'a, T> {
             dynamics: take_mut(numbers, end.dynamics),
             initial: take_mut(numbers, if first == InitialStateKind::Fixed { initial } else { 0 }),
             mu: T::ZERO,
-            terms: Terms { forces: T::ZERO, values: T::ZERO },
-            own_terms: Terms { forces: T::ZERO, values: T::ZERO },
+            terms: Terms { gradient_terms: T::ZERO, condition_terms: T::ZERO },
+            own_terms: Terms { gradient_terms: T::ZERO, condition_terms: T::ZERO },
         }
     }
 
     /// Sets the dual regularisation `δ` and, if requested, the proximal weight, in the units of the
     /// problem.
     pub fn set_regularisation(&mut self, proximal: bool) {
-        let Terms { forces, values } = self.terms;
+        let Terms { gradient_terms: forces, condition_terms: values } = self.terms;
         let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
-        self.sides.compliance = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
+        self.inequalities.dual_regularisation = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
         let stiffness = self.measure.objective * stiffness.max(T::from_f64(1e-4));
         self.proximal = if proximal { small * stiffness } else { T::ZERO };
     }
@@ -201,17 +202,17 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Writes the gradient terms of the constraints, by rows.
     #[inline(always)]
     fn write_forces(&mut self, after_step: bool) {
-        let sides = &mut self.sides;
+        let sides = &mut self.inequalities;
         let forces = &mut *self.gradient;
         forces.fill(T::ZERO);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
         let (of_lower, of_upper) = sides.multiplier.split_at_checked(lower.len()).unwrap_or_default();
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
-        scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
+        scatter(forces, sides.equations, sides.equation_multipliers, |force, &multiplier| force - multiplier);
         if after_step {
             // The proximal term belongs to the step, not to the problem.
-            for place in Places::<T>::new(self.qp.dims) {
+            for place in StageOffsetsIter::<T>::new(self.qp.dims) {
                 let step = part(self.step, place.row, place.n);
                 let forces = part_mut(forces, place.row, place.n);
                 for (i, (force, &step)) in forces.iter_mut().zip(step).enumerate() {
@@ -233,7 +234,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut objective = T::ZERO;
         let mut largest = LargestTerms::NONE;
         largest.add_forces::<E>(self.gradient, units.rows);
-        for place in Places::<T>::with_known_end(self.qp.dims, self.riccati.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(self.qp.dims, self.riccati.end).rev() {
             let StageOffsets { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -305,8 +306,8 @@ impl<'a, T: Real> Iterate<'a, T> {
                 }
             }
         }
-        self.own_terms.forces = largest.own;
-        self.terms.forces = units.choose(largest.own, largest.in_units / units.objective);
+        self.own_terms.gradient_terms = largest.own;
+        self.terms.gradient_terms = units.choose(largest.own, largest.in_units / units.objective);
         objective + self.penalty_cost()
     }
 
@@ -315,7 +316,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let units = self.measure;
         let mut largest = LargestTerms::NONE;
         let mut rest = &mut *self.v;
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             let StageOffsets { n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -333,8 +334,8 @@ impl<'a, T: Real> Iterate<'a, T> {
             }
             add_transposed::<T, E>(dynamics, matrix, v, n, next);
         }
-        self.own_terms.values = largest.own;
-        self.terms.values = units.choose(largest.own, largest.in_units);
+        self.own_terms.condition_terms = largest.own;
+        self.terms.condition_terms = units.choose(largest.own, largest.in_units);
         if let Some(coupling) = &mut self.coupling {
             coupling.evaluate(self.qp, self.v);
         }
@@ -344,7 +345,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Evaluates the residuals of the sides from the values of the rows.
     #[inline(always)]
     pub fn evaluate_side_residuals<E: Packed<T>>(&mut self) {
-        let sides = &mut self.sides;
+        let sides = &mut self.inequalities;
         sides.evaluate_sides(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
         {
@@ -365,7 +366,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     }
 
     fn penalty_cost(&self) -> T {
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
         let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
         costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))

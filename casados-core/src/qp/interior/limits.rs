@@ -30,7 +30,7 @@ impl<T: Real> ResidualTolerances<T> {
         // Units are estimates.
         let in_units = if scaled { T::from_f64(SCALED_TOLERANCE_FACTOR) } else { T::ONE };
         let values = values * in_units;
-        let absolute = Terms { forces: values * T::from_f64(share), values };
+        let absolute = Terms { gradient_terms: values * T::from_f64(share), condition_terms: values };
         Self { absolute, relative: T::from_f64(options.relative_tolerance), share: in_units }
     }
 
@@ -38,30 +38,31 @@ impl<T: Real> ResidualTolerances<T> {
     /// complementarity are products of gradient terms and values.
     pub fn satisfied_relative_to_terms(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
         let relative = self.relative.max(T::from_f64((ROUNDING_FACTOR * T::EPSILON).min(1e-5)));
-        let products = (relative * terms.forces * terms.values).max(self.absolute.forces);
+        let products =
+            (relative * terms.gradient_terms * terms.condition_terms).max(self.absolute.gradient_terms);
         let others = MaxResiduals { complementarity: T::ZERO, ..residuals };
         residuals.complementarity <= products && Self { relative, ..*self }.satisfied_by(others, terms)
     }
 
     /// Returns whether residuals without units are below the whole tolerance.
     fn satisfied_unscaled(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
-        let Terms { forces, values } = self.absolute;
-        let absolute = Terms { forces: forces / self.share, values: values / self.share };
+        let Terms { gradient_terms: forces, condition_terms: values } = self.absolute;
+        let absolute = Terms { gradient_terms: forces / self.share, condition_terms: values / self.share };
         Self { absolute, ..*self }.satisfied_by(residuals, terms)
     }
 
     /// Returns the tolerances of residuals with these terms.
     pub fn of(&self, terms: Terms<T>) -> Terms<T> {
         Terms {
-            forces: (self.relative * terms.forces).max(self.absolute.forces),
-            values: (self.relative * terms.values).max(self.absolute.values),
+            gradient_terms: (self.relative * terms.gradient_terms).max(self.absolute.gradient_terms),
+            condition_terms: (self.relative * terms.condition_terms).max(self.absolute.condition_terms),
         }
     }
 
     /// Returns whether residuals with these terms are below the tolerances.
     pub fn satisfied_by(&self, residuals: MaxResiduals<T>, terms: Terms<T>) -> bool {
         let MaxResiduals { stationarity, dynamics, inequalities, complementarity } = residuals;
-        let Terms { forces, values } = self.of(terms);
+        let Terms { gradient_terms: forces, condition_terms: values } = self.of(terms);
         stationarity <= forces && complementarity <= forces && dynamics <= values && inequalities <= values
     }
 }

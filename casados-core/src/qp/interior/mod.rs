@@ -34,7 +34,9 @@ pub(crate) use kernels::{
 pub(super) use kernels::{PADDING_COLUMNS, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub(crate) use riccati::{Extent, InitialStateKind};
-pub(crate) use sides::{Counts, Inequalities, PenaltyMode, Reading, count, is_initial_state_fixed};
+pub(crate) use sides::{
+    ConstraintInterpretation, Counts, Inequalities, PenaltyMode, count, is_initial_state_fixed,
+};
 pub use store::Store;
 #[cfg(feature = "alloc")]
 pub(crate) use symmetric::Symmetric;
@@ -99,7 +101,7 @@ pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
     pub options: InteriorPointOptions,
     /// The permitted residual, if it is above the tolerance of the options.
-    relaxed: T,
+    permitted_residual: T,
     /// The limit of iterations per call, set by [`QpSolver::limit`].
     limit: Option<usize>,
     numbers: N,
@@ -183,7 +185,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     pub fn in_memory(numbers: N, indices: I) -> Self {
         Self {
             options: InteriorPointOptions::new::<T>(),
-            relaxed: T::ZERO,
+            permitted_residual: T::ZERO,
             limit: None,
             numbers,
             indices,
@@ -214,7 +216,11 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         (result, infeasible): (&mut Result<QpStatistics, QpError>, &mut bool),
     ) -> Result<(), QpError> {
         let no_bound = T::from_f64(self.options.no_bound);
-        let reading = Reading { fixed: is_initial_state_fixed(qp), penalties: attempt.penalties, no_bound };
+        let reading = ConstraintInterpretation {
+            fixed: is_initial_state_fixed(qp),
+            penalties: attempt.penalties,
+            no_bound,
+        };
         let counts = count(qp, &reading);
         let extent = Extent::of::<T>(qp.dims);
         let length = Iterate::<T>::memory_of(qp, &counts) + extent.end.row;
@@ -234,7 +240,12 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if reading.fixed { InitialStateKind::Fixed } else { InitialStateKind::Free };
         let mut iterate = Iterate::new(qp, &extent, first, sides, &mut numbers);
         (iterate.objective, iterate.units, iterate.measure) = (given, units.rows, units);
-        let limits = ResidualTolerances::new(&self.options, self.relaxed, attempt.penalties, found.is_some());
+        let limits = ResidualTolerances::new(
+            &self.options,
+            self.permitted_residual,
+            attempt.penalties,
+            found.is_some(),
+        );
         T::run_precompiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -348,6 +359,6 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
     }
 
     fn permit(&mut self, tolerance: f64) {
-        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
+        self.permitted_residual = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }

@@ -48,14 +48,14 @@ impl<T: Real> Inequalities<'_, T> {
         for (multiplier, given) in self.multiplier.iter_mut().zip(sides) {
             *multiplier = given;
         }
-        for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
+        for (free, &row) in self.equation_multipliers.iter_mut().zip(&*self.equations) {
             *free = at(solution.lower, row) - at(solution.upper, row);
         }
     }
 
     /// Initialises slacks, at least `distance` units from zero, and multipliers, from a solution or
     /// such that all products are equal. `scratch` has the distances from the bounds.
-    pub fn begin(
+    pub fn initialise(
         &mut self,
         start: QpStart,
         distance: T,
@@ -130,11 +130,11 @@ impl<T: Real> Inequalities<'_, T> {
     /// Sets the targets `s Δλ + λ Δs = μ − s λ`.
     #[inline(always)]
     pub fn centring_targets(&mut self, mu: T) {
-        let own = self.compliance;
+        let own = self.dual_regularisation;
         let mut pairs = self.slack.iter().zip(&*self.multiplier);
         let mut targets = self.inverse.iter_mut().zip(&mut *self.target);
         for ((&softness, (&slack, &multiplier)), (inverse, target)) in
-            self.softness.iter().zip(&mut pairs).zip(&mut targets)
+            self.regularisation_scale.iter().zip(&mut pairs).zip(&mut targets)
         {
             *inverse = T::ONE / (slack + own * softness * multiplier);
             *target = (mu - slack * multiplier) * *inverse;
@@ -187,10 +187,10 @@ impl<T: Real> Inequalities<'_, T> {
     /// Computes the changes of slacks, from the changes of rows in `scratch`, and of multipliers.
     #[inline(always)]
     pub fn steps(&mut self) {
-        let (sides, compliance) = (self.counts.sides(), self.compliance);
+        let (sides, compliance) = (self.counts.sides(), self.dual_regularisation);
         let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
         let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
-        let changes = self.scratch.iter().zip(&*self.residual).zip(&*self.softness);
+        let changes = self.scratch.iter().zip(&*self.residual).zip(&*self.regularisation_scale);
         for (
             ((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)),
             ((&change, &residual), &softness),
@@ -223,7 +223,7 @@ impl<T: Real> Inequalities<'_, T> {
         let stiffness = multiplier / slack;
         let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
         let quadratic = *self.quadratic.get(j)?;
-        let own_compliance = self.compliance * *self.softness.get(side)?;
+        let own_compliance = self.dual_regularisation * *self.regularisation_scale.get(side)?;
         let own = *self.target.get(side)? * (T::ONE + own_compliance * stiffness);
         let others = *self.target.get(violation)?;
         let inverse = T::ONE / (quadratic + stiffness + other);
@@ -248,8 +248,8 @@ impl<T: Real> Inequalities<'_, T> {
     /// Returns the largest step length, at most 1, after which slacks and multipliers keep the
     /// fraction `keep` of their values.
     #[inline(always)]
-    pub fn step_to_boundary<E: Packed<T>>(&self, keep: T) -> T {
-        let most = T::ONE - keep;
+    pub fn step_to_boundary<E: Packed<T>>(&self, boundary_fraction: T) -> T {
+        let most = T::ONE - boundary_fraction;
         let ratio = largest_negative_ratio::<T, E>(most, self.slack_step, self.slack);
         most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
     }
@@ -276,7 +276,7 @@ impl<T: Real> Inequalities<'_, T> {
     /// Returns the residuals of inequalities and complementarity in units as
     /// [`qp::residuals`](crate::qp::residuals) does, from the distances and violations in
     /// `scratch`, independently of the slacks.
-    pub fn judge(&self, units: Units<'_, T>) -> (T, T) {
+    pub fn residuals(&self, units: Units<'_, T>) -> (T, T) {
         let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
         let force = units.objective;
         let (distances, violations) = self.scratch.split_at_checked(self.counts.sides()).unwrap_or_default();

@@ -3,7 +3,7 @@
 use super::iterate::Iterate;
 use super::units::Units;
 use super::vector::{largest_product, largest_scaled_magnitude, largest_size};
-use crate::qp::layout::{Places, part};
+use crate::qp::layout::{StageOffsetsIter, part};
 use crate::qp::marked_indices;
 use crate::qp::statistics::{Residuals, nan_max};
 use crate::scalar::{Packed, Real};
@@ -33,15 +33,15 @@ impl<T: Real> Iterate<'_, T> {
     /// Returns the residuals as [`qp::residuals`](crate::qp::residuals) does, in units, after
     /// [`evaluate`](Self::evaluate), at least the rounding errors of their terms.
     #[inline(always)]
-    pub fn judged<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
+    pub fn evaluated_residuals<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
         let MaxResiduals { stationarity, dynamics, inequalities, complementarity } =
             self.point_residuals::<E>();
         // The recursion for `π` makes gradients zero up to rounding errors; another order of
         // summation has other rounding errors.
         let rounding = |terms| T::from_f64(T::EPSILON) * terms;
         MaxResiduals {
-            stationarity: nan_max(stationarity, rounding(self.terms.forces)),
-            dynamics: nan_max(dynamics, rounding(self.terms.values)),
+            stationarity: nan_max(stationarity, rounding(self.terms.gradient_terms)),
+            dynamics: nan_max(dynamics, rounding(self.terms.condition_terms)),
             inequalities,
             complementarity,
         }
@@ -50,7 +50,7 @@ impl<T: Real> Iterate<'_, T> {
     /// As [`judged`](Self::judged), without the rounding errors.
     #[inline(always)]
     pub fn point_residuals<E: Packed<T>>(&mut self) -> MaxResiduals<T> {
-        self.sides.split_soft_distances();
+        self.inequalities.split_soft_distances();
         self.residuals_in_units::<E>(self.measure)
     }
 
@@ -65,7 +65,7 @@ impl<T: Real> Iterate<'_, T> {
 
     #[inline(always)]
     pub fn residuals_in_units<E: Packed<T>>(&self, units: Units<'_, T>) -> MaxResiduals<T> {
-        let (inequalities, complementarity) = self.sides.judge(units);
+        let (inequalities, complementarity) = self.inequalities.residuals(units);
         MaxResiduals {
             stationarity: self.max_gradient::<E>(units),
             dynamics: self.gaps::<E>(units),
@@ -90,7 +90,7 @@ impl<T: Real> Iterate<'_, T> {
         let gaps = if units.rows.is_empty() {
             largest_size::<T, E>(self.dynamics)
         } else {
-            Places::<T>::new(self.qp.dims).fold(T::ZERO, |most, place| {
+            StageOffsetsIter::<T>::new(self.qp.dims).fold(T::ZERO, |most, place| {
                 let gaps = part(self.dynamics, place.dynamics, place.next);
                 largest_scaled_magnitude(most, gaps, units.from(place.row + place.rows), over)
             })
@@ -104,12 +104,13 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     pub fn residuals<E: Packed<T>>(&self) -> MaxResiduals<T> {
         // Products may lose NaN, but their sum does not.
-        let products = largest_product::<T, E>(T::ZERO, self.sides.slack, self.sides.multiplier);
+        let products =
+            largest_product::<T, E>(T::ZERO, self.inequalities.slack, self.inequalities.multiplier);
         let products = if self.mu.is_finite() { products } else { self.mu };
         MaxResiduals {
             stationarity: self.max_gradient::<E>(self.measure),
             dynamics: self.gaps::<E>(self.measure),
-            inequalities: self.sides.max_residual::<E>(self.measure),
+            inequalities: self.inequalities.max_residual::<E>(self.measure),
             complementarity: products / self.measure.objective,
         }
     }

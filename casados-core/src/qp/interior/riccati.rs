@@ -14,7 +14,7 @@ use super::kernels::{Columns, PADDING_COLUMNS, add, add_transposed, copy, copy_n
 use super::shared::Shared;
 use crate::qp::error::QpError;
 use crate::qp::layout::{
-    Places, StageDims, StageOffsets, copy_common, end, padded_len, part, part_mut, take_mut,
+    StageDims, StageOffsets, StageOffsetsIter, copy_common, end, padded_len, part, part_mut, take_mut,
 };
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
@@ -206,7 +206,7 @@ impl<T: Real> Riccati<'_, T> {
             self.negative = 0;
             self.largest = T::ZERO;
         }
-        for place in Places::<T>::with_known_end(qp.dims, self.end).rev() {
+        for place in StageOffsetsIter::<T>::with_known_end(qp.dims, self.end).rev() {
             let StageOffsets { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -248,7 +248,7 @@ impl<T: Real> Riccati<'_, T> {
     pub fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
         let Equations { qp, first, dynamics, .. } = *equations;
         let mut rest = step;
-        for place in Places::<T>::new(qp.dims) {
+        for place in StageOffsetsIter::<T>::new(qp.dims) {
             let StageOffsets { nx, nu, n, ng, ld, next, .. } = place;
             let here = take_mut(&mut rest, place.rows);
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };

@@ -9,7 +9,7 @@ use super::terms::Terms;
 use super::vector::{dot, largest_size};
 use crate::qp::element::set;
 use crate::qp::error::QpError;
-use crate::qp::layout::{Places, copy_common, part, part_mut};
+use crate::qp::layout::{StageOffsetsIter, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::QpStart;
 use crate::qp::statistics::{QpStatistics, nan_max};
@@ -85,7 +85,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                     attempt.statistics = statistics;
                 }
                 if attempt.start == QpStart::Cold {
-                    iterate.forget();
+                    iterate.reset();
                 }
                 iterate.initialise::<E>(options, &attempt, &limits, solution);
                 iterate.iterate_to_convergence::<E>(&attempt, &limits, over, solution, infeasible)
@@ -106,28 +106,28 @@ const TERMS_UPDATE_RATIO: f64 = 0.01;
 
 /// An iteration makes progress if it decreases the residuals by this factor; the maximum number of
 /// iterations without progress.
-const PROGRESS: f64 = 0.9;
+const PROGRESS_RATIO: f64 = 0.9;
 const MAX_IDLE_ITERATIONS: usize = 50;
 /// The number of iterations without progress after which the correctors are assumed to cycle.
 const CYCLE: usize = 8;
 
 /// Slacks and multipliers keep at least this fraction of their values, or, near the solution, the
 /// fraction `μ`.
-const MIN_BOUNDARY_FRACTION: f64 = 0.005;
+const MAX_BOUNDARY_FRACTION: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
     /// Reads states and controls of a solution.
     pub fn load_point(&mut self, solution: &SolutionView<'_, T>) {
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             copy_common(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
         }
     }
 
     /// Sets the point and the multipliers to zero.
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.v.fill(T::ZERO);
-        self.sides.multiplier.fill(T::ZERO);
-        self.sides.free.fill(T::ZERO);
+        self.inequalities.multiplier.fill(T::ZERO);
+        self.inequalities.equation_multipliers.fill(T::ZERO);
     }
 
     /// Writes the fixed initial state.
@@ -153,7 +153,7 @@ impl<T: Real> Iterate<'_, T> {
         self.load_initial_state();
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu).sqrt();
-        let gap = self.gaps::<E>(self.measure).max(self.sides.violation(self.measure));
+        let gap = self.gaps::<E>(self.measure).max(self.inequalities.violation(self.measure));
         let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
             // Slacks and multipliers of a point with large violations are less reliable.
@@ -162,7 +162,7 @@ impl<T: Real> Iterate<'_, T> {
             QpStart::Cold if attempt.proximal => gap.max(cold),
             _ => cold,
         };
-        self.sides.begin(start, distance, self.measure, solution);
+        self.inequalities.initialise(start, distance, self.measure, solution);
         // Residuals depend on the slacks, which are set now.
         self.evaluate_side_residuals::<E>();
         self.first_gradient::<E>(limits, solution.dynamics);
@@ -175,9 +175,9 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     pub fn first_gradient<E: Packed<T>>(&mut self, limits: &ResidualTolerances<T>, multipliers: &mut [T]) {
         self.evaluate_gradient::<E>(multipliers);
-        let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
+        let rounding = T::from_f64(T::EPSILON) * self.terms.gradient_terms;
         // NaN counts as large.
-        let is_seen = rounding <= limits.of(self.terms).forces;
+        let is_seen = rounding <= limits.of(self.terms).gradient_terms;
         if !is_seen {
             multipliers.fill(T::ZERO);
             self.gradient_with_costates::<E>(multipliers);
@@ -199,7 +199,7 @@ impl<T: Real> Iterate<'_, T> {
         let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
         let (mut best, mut idle) = (T::from_f64(f64::INFINITY), 0);
-        let first = (statistics.iterations, self.terms.forces.max(T::ONE));
+        let first = (statistics.iterations, self.terms.gradient_terms.max(T::ONE));
         let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.satisfied_by(residuals, self.terms);
@@ -208,13 +208,13 @@ impl<T: Real> Iterate<'_, T> {
             if small || old {
                 // The updated residuals are small: evaluate them at the point.
                 let objective = self.evaluate::<E>(solution.dynamics);
-                (residuals, known) = (self.judged::<E>(), self.mu);
+                (residuals, known) = (self.evaluated_residuals::<E>(), self.mu);
                 if objective.is_finite() && self.is_converged(residuals, limits) {
                     (statistics.objective, statistics.residuals) =
                         (objective.to_f64(), self.unscaled_residuals(residuals));
                     return Ok(statistics);
                 }
-                let Terms { forces, values } = limits.of(self.terms);
+                let Terms { gradient_terms: forces, condition_terms: values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
                 if limits.satisfied_by(residuals, self.terms) {
                     // The residuals are small in units, but not without units relative to their
@@ -235,7 +235,7 @@ impl<T: Real> Iterate<'_, T> {
             }
             // Products far below the tolerance have no benefit, and cause weights that cancel the
             // digits of all other terms.
-            let floor = share * limits.of(self.terms).forces * self.measure.objective;
+            let floor = share * limits.of(self.terms).gradient_terms * self.measure.objective;
             out_of_time = over();
             if out_of_time || statistics.iterations >= most {
                 break false;
@@ -248,15 +248,16 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
             // NaN makes no progress.
-            let left = nan_max(residuals.stationarity, nan_max(residuals.dynamics, residuals.inequalities));
-            let left = left + self.mu / self.measure.objective;
-            if left < T::from_f64(PROGRESS) * best {
-                (best, idle) = (left, 0);
+            let residual =
+                nan_max(residuals.stationarity, nan_max(residuals.dynamics, residuals.inequalities));
+            let residual = residual + self.mu / self.measure.objective;
+            if residual < T::from_f64(PROGRESS_RATIO) * best {
+                (best, idle) = (residual, 0);
             } else if idle > MAX_IDLE_ITERATIONS {
                 break true;
             }
             idle += 1;
-            self.sides.centring_targets(if refine { self.mu.max(floor) } else { T::ZERO });
+            self.inequalities.centring_targets(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
@@ -266,7 +267,7 @@ impl<T: Real> Iterate<'_, T> {
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
                 break true;
             }
-            self.advance::<E>(alpha);
+            self.take_step::<E>(alpha);
             refine = false;
         };
         self.final_status::<E>(statistics, limits, [out_of_time, stalled], solution)
@@ -284,25 +285,25 @@ impl<T: Real> Iterate<'_, T> {
         floor: T,
         is_cycling: bool,
     ) -> Result<T, QpError> {
-        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(MIN_BOUNDARY_FRACTION));
+        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(MAX_BOUNDARY_FRACTION));
         let distance = (self.mu / self.measure.objective).max(least);
         let keep = if distance < boundary { distance } else { boundary };
-        let mut alpha = self.sides.step_to_boundary::<E>(keep);
+        let mut alpha = self.inequalities.step_to_boundary::<E>(keep);
         let has_products = self.mu > T::ZERO;
         if refine || !has_products {
             return Ok(alpha);
         }
-        let after = self.sides.mu_after::<E>(alpha, self.mu);
+        let after = self.inequalities.mu_after::<E>(alpha, self.mu);
         let ratio = after / self.mu;
-        self.sides.corrector_targets((self.mu * ratio * ratio * ratio).max(floor));
+        self.inequalities.corrector_targets((self.mu * ratio * ratio * ratio).max(floor));
         self.newton::<E>(false)?;
-        alpha = self.sides.step_to_boundary::<E>(keep);
+        alpha = self.inequalities.step_to_boundary::<E>(keep);
         if alpha < T::from_f64(MIN_CORRECTOR_STEP) || is_cycling {
             // The products differ too much for the corrector: a centring step makes them equal
             // first.
-            self.sides.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
+            self.inequalities.centring_targets(self.mu * T::from_f64(MIN_CORRECTOR_STEP));
             self.newton::<E>(false)?;
-            alpha = self.sides.step_to_boundary::<E>(keep);
+            alpha = self.inequalities.step_to_boundary::<E>(keep);
         }
         Ok(alpha)
     }
@@ -318,7 +319,7 @@ impl<T: Real> Iterate<'_, T> {
         solution: &mut SolutionView<'_, T>,
     ) -> Result<QpStatistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
-        let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
+        let (judged, iterations) = (self.evaluated_residuals::<E>(), statistics.iterations);
         let residuals = self.unscaled_residuals(judged);
         let is_solved = self.is_converged(judged, limits) || self.is_converged_unscaled(limits);
         if objective.is_finite() && is_solved {
@@ -336,12 +337,12 @@ impl<T: Real> Iterate<'_, T> {
 
     /// Writes the point and its multipliers.
     pub fn store(&mut self, solution: &mut SolutionView<'_, T>) {
-        for place in Places::<T>::new(self.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(self.qp.dims) {
             copy_common(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
         }
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         for (i, (&row, &multiplier)) in sides.rows.iter().zip(&*sides.multiplier).enumerate() {
             let side = if i < sides.counts.lower { &mut *solution.lower } else { &mut *solution.upper };
             set(side, row as usize, multiplier);
@@ -350,7 +351,7 @@ impl<T: Real> Iterate<'_, T> {
             set(solution.lower, row, force.max(T::ZERO));
             set(solution.upper, row, (-force).max(T::ZERO));
         };
-        for (&row, &free) in sides.equations.iter().zip(&*sides.free) {
+        for (&row, &free) in sides.equations.iter().zip(&*sides.equation_multipliers) {
             equation(row as usize, free);
         }
         if self.first == InitialStateKind::Fixed {

@@ -16,9 +16,9 @@
 //! Riccati recursion is invariant, as the Cholesky factor is (N. J. Higham, "Accuracy and Stability
 //! of Numerical Algorithms", SIAM 2002, section 10.1).
 
-use super::sides::Reading;
+use super::sides::ConstraintInterpretation;
 use crate::qp::element::set;
-use crate::qp::layout::{Places, StageOffsets, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, part, part_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
@@ -64,12 +64,12 @@ fn unit<T: Real>(size: T) -> T {
 }
 
 /// A mean of sizes.
-struct Mean<T> {
+struct MeanSize<T> {
     sum: T,
     count: usize,
 }
 
-impl<T: Real> Mean<T> {
+impl<T: Real> MeanSize<T> {
     const NO_SIZES: Self = Self { sum: T::ZERO, count: 0 };
 
     fn add(&mut self, size: T) {
@@ -115,11 +115,11 @@ impl<T: Real> ScalingBounds<T> {
 /// Computes the units of all rows and returns that of the objective; none if all sizes are near
 /// one.
 #[inline(never)]
-pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
+pub fn find<T: Real>(qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>, rows: &mut [T]) -> Option<T> {
     let objective = objective_unit(qp, reading, rows)?;
     let mut far = SizeRange { least: objective, most: objective }.needs_scaling();
     let root = objective.sqrt();
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let (here, next) = rows.split_at_mut_checked(place.row + place.rows).unwrap_or_default();
         let (variables, general) =
             part_mut(here, place.row, place.rows).split_at_mut_checked(place.ld).unwrap_or_default();
@@ -158,13 +158,19 @@ pub fn find<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) ->
 
 /// Returns the unit of the objective, and writes the square roots of all curvatures; none for a
 /// linear program.
-fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [T]) -> Option<T> {
-    let (mut gains, mut rooms) = (Mean::NO_SIZES, SizeRange::new());
+fn objective_unit<T: Real>(
+    qp: QpView<'_, T>,
+    reading: &ConstraintInterpretation<T>,
+    rows: &mut [T],
+) -> Option<T> {
+    let (mut gains, mut rooms) = (MeanSize::NO_SIZES, SizeRange::new());
     let mut any = false;
-    for place in Places::<T>::new(qp.dims).rev() {
+    for place in StageOffsetsIter::<T>::new(qp.dims).rev() {
         any |= curvatures(qp, &place, rows, &mut gains);
-        let roots = part(rows, place.row, place.n);
-        for ((limits, &root), slope) in stage_bounds(qp, &place, reading).zip(roots).zip(slopes(qp, &place)) {
+        let sqrt_curvatures = part(rows, place.row, place.n);
+        for ((limits, &root), slope) in
+            stage_bounds(qp, &place, reading).zip(sqrt_curvatures).zip(slopes(qp, &place))
+        {
             let room = limits.bound_range();
             rooms.add(root * room);
             gains.add(root * limits.distance());
@@ -181,7 +187,12 @@ fn objective_unit<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>, rows: &mut [
 
 /// Writes the square roots of the curvatures of a stage, and returns whether there is one; offsets
 /// of the dynamics have a cost at the next stage.
-fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], gains: &mut Mean<T>) -> bool {
+fn curvatures<T: Real>(
+    qp: QpView<'_, T>,
+    place: &StageOffsets,
+    rows: &mut [T],
+    objective_gains: &mut MeanSize<T>,
+) -> bool {
     let StageOffsets { n, ld, row, .. } = *place;
     let data = part(qp.data, place.data, place.data_len());
     let (here, behind) = rows.split_at_mut_checked(row + place.rows).unwrap_or_default();
@@ -197,7 +208,7 @@ fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], 
         set(here, row + j, curvature.sqrt());
     }
     for (&offset, &root) in part(data, place.offset(), place.next).iter().zip(roots) {
-        gains.add(offset.abs() * root);
+        objective_gains.add(offset.abs() * root);
     }
     any
 }
@@ -206,7 +217,7 @@ fn curvatures<T: Real>(qp: QpView<'_, T>, place: &StageOffsets, rows: &mut [T], 
 fn stage_bounds<T: Real>(
     qp: QpView<'_, T>,
     place: &StageOffsets,
-    reading: &Reading<T>,
+    reading: &ConstraintInterpretation<T>,
 ) -> impl Iterator<Item = ScalingBounds<T>> {
     let no_bound = reading.no_bound;
     let bound = |row| part(qp.data, place.data + place.constraint_vector_begin(row), place.n).iter();

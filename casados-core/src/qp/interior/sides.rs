@@ -8,7 +8,7 @@
 
 use super::units::Units;
 use crate::qp::element::set;
-use crate::qp::layout::{Places, part, take_mut};
+use crate::qp::layout::{StageOffsetsIter, part, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::stage::ConstraintVector;
 use crate::scalar::Real;
@@ -25,7 +25,7 @@ pub enum PenaltyMode {
 
 /// The interpretation of constraints.
 #[derive(Clone, Copy, Debug)]
-pub struct Reading<T> {
+pub struct ConstraintInterpretation<T> {
     /// Whether the initial state is fixed, and no constraint.
     pub fixed: bool,
     pub penalties: PenaltyMode,
@@ -56,7 +56,7 @@ impl Counts {
         self.sides() + self.soft
     }
     /// Returns the length of the arrays.
-    pub const fn numbers(&self) -> usize {
+    pub const fn memory_len(&self) -> usize {
         8 * self.pair_count() + 3 * self.sides() + 4 * self.equations + 2 * self.soft
     }
     /// Returns the length of the lists of indices.
@@ -107,7 +107,7 @@ pub fn is_initial_state_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
 
 /// Calls `f` for every constraint of the horizon except a fixed initial state.
 fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constraint<T>)) {
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let vector = |row| part(data, place.constraint_vector_begin(row), place.rows);
         let bounds = vector(ConstraintVector::Lower).iter().zip(vector(ConstraintVector::Upper));
@@ -131,7 +131,7 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 
 impl<T: Real> Constraint<T> {
     /// Returns whether it is an equation, and otherwise the kinds of its sides.
-    fn equation_or_sides(&self, reading: &Reading<T>) -> (bool, Kind<T>, Kind<T>) {
+    fn equation_or_sides(&self, reading: &ConstraintInterpretation<T>) -> (bool, Kind<T>, Kind<T>) {
         let ten = T::from_f64(10.0);
         let penalty = match reading.penalties {
             PenaltyMode::Given => None,
@@ -147,7 +147,7 @@ impl<T: Real> Constraint<T> {
 }
 
 /// Returns the numbers of sides and equations.
-pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
+pub fn count<T: Real>(qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>) -> Counts {
     let mut counts = Counts::default();
     constraints(qp, reading.fixed, |constraint| {
         let (equation, lower, upper) = constraint.equation_or_sides(reading);
@@ -168,7 +168,7 @@ pub struct Inequalities<'a, T> {
     pub counts: Counts,
     /// The dual regularisation `δ`, in units: the change of the distance of a side or equation per
     /// change of its multiplier.
-    pub compliance: T,
+    pub dual_regularisation: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],
     /// Rows of equations.
@@ -196,7 +196,7 @@ pub struct Inequalities<'a, T> {
     /// The weights of the sides in the Hessian.
     pub weight: &'a mut [T],
     /// The factor of `δ` for each side: the square of its unit over that of the objective.
-    pub softness: &'a mut [T],
+    pub regularisation_scale: &'a mut [T],
     /// Bounds.
     pub bound: &'a mut [T],
     /// Linear penalties of soft sides.
@@ -204,16 +204,16 @@ pub struct Inequalities<'a, T> {
     /// Quadratic penalties of soft sides.
     pub quadratic: &'a mut [T],
     /// Multipliers of equations, of either sign.
-    pub free: &'a mut [T],
+    pub equation_multipliers: &'a mut [T],
     /// `c v − bound` of equations.
     pub equation_residual: &'a mut [T],
     /// Right-hand sides of equations.
     pub equation_bound: &'a mut [T],
     /// The factor of `1 / δ` for each equation.
-    pub stiffness: &'a mut [T],
+    pub stiffness_scale: &'a mut [T],
     /// Changes of multipliers of equations, for iterative refinement: Newton's equations with the
     /// dual regularisation are solved again from these.
-    pub free_step: &'a mut [T],
+    pub equation_multiplier_steps: &'a mut [T],
 }
 
 impl<'a, T: Real> Inequalities<'a, T> {
@@ -222,7 +222,7 @@ impl<'a, T: Real> Inequalities<'a, T> {
         let (pairs, sides) = (counts.pair_count(), counts.sides());
         Self {
             counts,
-            compliance: T::ZERO,
+            dual_regularisation: T::ZERO,
             rows: take_mut(indices, sides),
             equations: take_mut(indices, counts.equations),
             soft: take_mut(indices, counts.soft),
@@ -236,20 +236,20 @@ impl<'a, T: Real> Inequalities<'a, T> {
             target: take_mut(numbers, pairs),
             scratch: take_mut(numbers, pairs),
             weight: take_mut(numbers, sides),
-            softness: take_mut(numbers, sides),
+            regularisation_scale: take_mut(numbers, sides),
             bound: take_mut(numbers, sides),
             linear: take_mut(numbers, counts.soft),
             quadratic: take_mut(numbers, counts.soft),
-            free: take_mut(numbers, counts.equations),
+            equation_multipliers: take_mut(numbers, counts.equations),
             equation_residual: take_mut(numbers, counts.equations),
             equation_bound: take_mut(numbers, counts.equations),
-            stiffness: take_mut(numbers, counts.equations),
-            free_step: &mut [],
+            stiffness_scale: take_mut(numbers, counts.equations),
+            equation_multiplier_steps: &mut [],
         }
     }
 
     /// Lists the sides of a problem: rows, bounds and penalties.
-    pub fn list(&mut self, qp: QpView<'_, T>, reading: &Reading<T>) {
+    pub fn list(&mut self, qp: QpView<'_, T>, reading: &ConstraintInterpretation<T>) {
         let list = self;
         let (mut lower, mut upper, mut soft, mut equations) = (0, list.counts.lower, 0, 0);
         constraints(qp, reading.fixed, |constraint| {
@@ -258,7 +258,7 @@ impl<'a, T: Real> Inequalities<'a, T> {
             if equation {
                 set(list.equations, equations, row);
                 set(list.equation_bound, equations, constraint.lower);
-                set(list.stiffness, equations, T::ONE);
+                set(list.stiffness_scale, equations, T::ONE);
                 equations += 1;
                 return;
             }
@@ -274,7 +274,7 @@ impl<'a, T: Real> Inequalities<'a, T> {
                 if !matches!(kind, Kind::Absent) {
                     set(list.rows, *at, row);
                     set(list.bound, *at, bound);
-                    set(list.softness, *at, T::ONE);
+                    set(list.regularisation_scale, *at, T::ONE);
                     *at += 1;
                 }
             }
@@ -287,11 +287,11 @@ impl<'a, T: Real> Inequalities<'a, T> {
         if units.rows.is_empty() {
             return;
         }
-        for (softness, &row) in self.softness.iter_mut().zip(&*self.rows) {
+        for (softness, &row) in self.regularisation_scale.iter_mut().zip(&*self.rows) {
             let unit = units.of(row as usize);
             *softness = unit * unit / units.objective;
         }
-        for (stiffness, &row) in self.stiffness.iter_mut().zip(&*self.equations) {
+        for (stiffness, &row) in self.stiffness_scale.iter_mut().zip(&*self.equations) {
             let unit = units.of(row as usize);
             *stiffness = units.objective / (unit * unit);
         }

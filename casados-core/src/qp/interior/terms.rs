@@ -8,9 +8,9 @@ use crate::scalar::{Packed, Real};
 #[derive(Clone, Copy)]
 pub struct Terms<T> {
     /// Terms of gradients: `H v`, `h`, gradients of constraints, `π`.
-    pub forces: T,
+    pub gradient_terms: T,
     /// Terms of conditions: `v`, `C x + D u`, `b`.
-    pub values: T,
+    pub condition_terms: T,
 }
 
 /// The largest terms, in units and without units.

@@ -28,20 +28,20 @@ impl<T: Real> Iterate<'_, T> {
     pub fn suspects_infeasibility<E: Packed<T>>(
         &mut self,
         iterations: usize,
-        known: T,
+        initial_multiplier_size: T,
         (residuals, limits): (MaxResiduals<T>, &ResidualTolerances<T>),
         multipliers: &mut [T],
     ) -> bool {
-        let values = limits.of(self.terms).values;
+        let values = limits.of(self.terms).condition_terms;
         let violates = residuals.inequalities > values || residuals.dynamics > values;
         if iterations < MIN_ITERATIONS_BEFORE_TEST
             || !violates
-            || self.largest_multiplier() < T::from_f64(GROWTH) * known
+            || self.largest_multiplier() < T::from_f64(GROWTH) * initial_multiplier_size
         {
             return false;
         }
         // Soft bounds are no part of a certificate: their multipliers belong to the objective.
-        let sides = &mut self.sides;
+        let sides = &mut self.inequalities;
         copy_common(sides.multiplier_step, sides.multiplier);
         for &side in &*sides.soft {
             set(sides.multiplier, side as usize, T::ZERO);
@@ -49,7 +49,7 @@ impl<T: Real> Iterate<'_, T> {
         let objective = core::mem::replace(&mut self.objective, false);
         let suspicious = self.is_certificate::<E>(T::from_f64(SUSPICION_FACTOR), multipliers);
         self.objective = objective;
-        copy_common(self.sides.multiplier, self.sides.multiplier_step);
+        copy_common(self.inequalities.multiplier, self.inequalities.multiplier_step);
         if !suspicious {
             let _ = self.evaluate::<E>(multipliers);
         }
@@ -58,9 +58,9 @@ impl<T: Real> Iterate<'_, T> {
 
     /// Returns the largest multiplier of a side or an equation in units.
     fn largest_multiplier(&self) -> T {
-        let sides = &self.sides;
+        let sides = &self.inequalities;
         let of_sides = sides.multiplier.iter().zip(&*sides.rows);
-        let of_equations = sides.free.iter().zip(&*sides.equations);
+        let of_equations = sides.equation_multipliers.iter().zip(&*sides.equations);
         let forces = of_sides.chain(of_equations);
         let unit = |row: u32| self.measure.of(row as usize);
         let most = forces.fold(T::ZERO, |most, (force, &row)| (force.abs() * unit(row)).max(most));
@@ -83,19 +83,20 @@ impl<T: Real> Iterate<'_, T> {
     /// The same test for points up to `far` times as large as the iterate.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline(never))]
-    fn is_certificate<E: Packed<T>>(&mut self, far: T, multipliers: &mut [T]) -> bool {
+    fn is_certificate<E: Packed<T>>(&mut self, size_factor: T, multipliers: &mut [T]) -> bool {
         let _ = self.evaluate::<E>(multipliers);
-        let count = self.sides.counts.sides();
-        let (forces, distances) = (part(self.sides.multiplier, 0, count), part(self.sides.scratch, 0, count));
+        let count = self.inequalities.counts.sides();
+        let (forces, distances) =
+            (part(self.inequalities.multiplier, 0, count), part(self.inequalities.scratch, 0, count));
         let mut lagrangian = dot::<T, E>(multipliers, self.dynamics)
             - dot::<T, E>(forces, distances)
-            - dot::<T, E>(self.sides.free, self.sides.equation_residual);
+            - dot::<T, E>(self.inequalities.equation_multipliers, self.inequalities.equation_residual);
         if let Some(coupling) = &self.coupling {
             lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
         }
         let gradient = self.max_gradient::<E>(self.measure);
-        let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
-        let gradient = nan_max(gradient * far, rounding);
-        lagrangian > gradient * (T::ONE + self.terms.values)
+        let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.gradient_terms;
+        let gradient = nan_max(gradient * size_factor, rounding);
+        lagrangian > gradient * (T::ONE + self.terms.condition_terms)
     }
 }

@@ -18,7 +18,7 @@ use crate::scalar::Lanes;
 
 /// The ratio of a pivot to its diagonal element below which it may be a rounding error: such a
 /// problem leaves the group.
-const WEAK: f64 = 1e-7;
+const SMALL_PIVOT: f64 = 1e-7;
 
 /// The dimensions of the problems of a group; all stages are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,7 +79,7 @@ pub struct Group<'m, C> {
     /// The gradient of the Lagrangian by the controls, without multipliers of their bounds.
     pub slope: &'m mut [C],
     /// Nonzero if a pivot is weak.
-    pub weak: &'m mut [C],
+    pub has_small_pivot: &'m mut [C],
     /// `(K; L)`
     panels: &'m mut [C],
     /// Reciprocals of pivots, and `L⁻¹ m_u`.
@@ -111,7 +111,7 @@ impl<'m, C: Copy> Group<'m, C> {
             v: take((intervals + 1) * n),
             multipliers: take((intervals + 1) * nx),
             slope: take(intervals * nu),
-            weak: take(1),
+            has_small_pivot: take(1),
             panels: take(intervals * n * nu),
             inverse: take(intervals * nu),
             y: take(intervals * nu),
@@ -159,7 +159,7 @@ impl<'m, C: Copy> Group<'m, C> {
             product::<E>((self.p, nx), start, (panel, panel), [nx, nx, nu], true);
             mirror(self.p, nx);
         }
-        for to in self.weak.iter_mut() {
+        for to in self.has_small_pivot.iter_mut() {
             weak.store(to);
         }
     }
@@ -213,7 +213,7 @@ impl<'m, C: Copy> Group<'m, C> {
     #[inline(always)]
     fn eliminate<E: Lanes<Cell = C>>(&mut self, k: usize) -> E {
         let (Size { nx, nu, .. }, n) = (self.size, self.size.n());
-        let (zero, one, part_of) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(WEAK));
+        let (zero, one, part_of) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(SMALL_PIVOT));
         let panel = part_mut(self.panels, k * n * nu, n * nu);
         let inverse = part_mut(self.inverse, k * nu, nu);
         let y = part_mut(self.y, k * nu, nu);

@@ -24,7 +24,7 @@ mod transfer;
 use super::error::QpError;
 use super::instance::QpInstance;
 use super::interior::{InteriorPointOptions, is_initial_state_fixed};
-use super::layout::Places;
+use super::layout::StageOffsetsIter;
 use super::memory::{try_reserve, try_resize};
 use super::solver::QpStart;
 use super::stage::ConstraintVector;
@@ -54,12 +54,17 @@ pub struct LaneWorkspace<T> {
     /// Indices of the problems that are not solved yet.
     pending: Vec<u32>,
     /// Indices of the problems to be solved alone.
-    alone: Vec<u32>,
+    left_for_single_solves: Vec<u32>,
 }
 
 impl<T> Default for LaneWorkspace<T> {
     fn default() -> Self {
-        Self { numbers: Vec::new(), sets: Vec::new(), pending: Vec::new(), alone: Vec::new() }
+        Self {
+            numbers: Vec::new(),
+            sets: Vec::new(),
+            pending: Vec::new(),
+            left_for_single_solves: Vec::new(),
+        }
     }
 }
 
@@ -74,7 +79,7 @@ pub fn size<T: Real>(instance: &QpInstance<T>, options: &InteriorPointOptions) -
         return None;
     }
     let (infinity, none) = (T::from_f64(f64::INFINITY), T::from_f64(options.no_bound));
-    for place in Places::<T>::new(qp.dims) {
+    for place in StageOffsetsIter::<T>::new(qp.dims) {
         let variables = if place.next > 0 { place.n } else { place.nx };
         let vector = |row| part(qp.data, place.data + place.constraint_vector_begin(row), variables);
         let (lower, upper) = (vector(ConstraintVector::Lower), vector(ConstraintVector::Upper));
@@ -127,7 +132,7 @@ pub fn solve<T: Real>(
     let length = size.cells().saturating_add(1).saturating_mul(MAX_LANES);
     try_resize(&mut together.numbers, length)?;
     try_resize(&mut together.sets, count.saturating_mul(size.intervals * size.nu))?;
-    for list in [&mut together.pending, &mut together.alone] {
+    for list in [&mut together.pending, &mut together.left_for_single_solves] {
         list.clear();
         try_reserve(list, count)?;
     }
@@ -139,7 +144,7 @@ pub fn solve<T: Real>(
 impl<T> LaneWorkspace<T> {
     /// Returns the problems of the last call that must be solved alone.
     pub fn unsolved_indices(&self) -> impl Iterator<Item = usize> {
-        self.alone.iter().map(|&index| index as usize)
+        self.left_for_single_solves.iter().map(|&index| index as usize)
     }
 }
 
@@ -162,7 +167,7 @@ impl<T: Real> Registers<T> for Solve<'_, T> {
     fn run<E: Packed<T>>(mut self) {
         let bytes = self.size.cells().saturating_mul(size_of::<E::Cell>());
         if E::LANES < 2 || bytes as f64 > CACHE_FRACTION * second_level_cache() as f64 {
-            core::mem::swap(&mut self.together.pending, &mut self.together.alone);
+            core::mem::swap(&mut self.together.pending, &mut self.together.left_for_single_solves);
             return;
         }
         let mut numbers = core::mem::take(&mut self.together.numbers);
@@ -196,7 +201,7 @@ impl<T: Real> Solve<'_, T> {
             self.load_problems::<E>(group, indices);
             let mut convex = (1u32 << members) - 1;
             if first && self.start == QpStart::Warm {
-                convex = self.convex::<E>(group, indices);
+                convex = self.convex_lanes::<E>(group, indices);
             }
             self.load_active_sets::<E>(group, indices, first);
             let left = self.iterate::<E>(group, indices, convex, count > E::LANES);
@@ -230,15 +235,16 @@ impl<T: Real> Solve<'_, T> {
     /// Returns the lanes with convex problems, as bits: their pivots without active bounds are not
     /// weak. A cold start begins with this test. The other problems are left to be solved alone.
     #[inline(always)]
-    fn convex<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
+    fn convex_lanes<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize]) -> u32 {
         group.backward::<E>();
-        let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
+        let weak =
+            group.has_small_pivot.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
         let mut convex = 0;
         for (lane, (&index, &weak)) in indices.iter().zip(&weak).enumerate() {
             if weak == 0.0 {
                 convex |= 1 << lane;
             } else {
-                self.together.alone.push(index as u32);
+                self.together.left_for_single_solves.push(index as u32);
             }
         }
         convex
@@ -255,7 +261,7 @@ impl<T: Real> Solve<'_, T> {
             } else if let (QpStart::Warm, Some(instance)) = (self.start, self.problems.0.get(index)) {
                 let least = T::from_f64(self.options.tolerance);
                 let [lower, upper] = instance.solution.sides();
-                let places = Places::<T>::new(instance.qp.dims()).take(intervals);
+                let places = StageOffsetsIter::<T>::new(instance.qp.dims()).take(intervals);
                 let rows = places.flat_map(|place| place.row + nx..place.row + nx + nu);
                 let is_at = |side: &[T], row: usize| side.get(row).is_some_and(|&force| force > least);
                 let set = rows.map(|row| i8::from(is_at(upper, row)) - i8::from(is_at(lower, row)));
@@ -278,7 +284,8 @@ impl<T: Real> Solve<'_, T> {
         loop {
             group.solve::<E>();
             let changes = lanes::<T, E>(group.update_active_sets::<E>(tolerance));
-            let weak = group.weak.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
+            let weak =
+                group.has_small_pivot.first().map_or([0.0; MAX_LANES], |weak| lanes::<T, E>(E::load(weak)));
             let mut settled = 0;
             let going = left;
             for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| going >> lane & 1 == 1) {
@@ -290,7 +297,7 @@ impl<T: Real> Solve<'_, T> {
                     settled |= 1 << lane;
                 } else if changes.is_nan() || *weak != 0.0 || is_over {
                     left &= !(1 << lane);
-                    self.together.alone.push(index as u32);
+                    self.together.left_for_single_solves.push(index as u32);
                 }
             }
             if settled != 0 {
@@ -306,7 +313,7 @@ impl<T: Real> Solve<'_, T> {
     /// Evaluates and stores the solutions of lanes whose sets have settled.
     #[inline(always)]
     fn store<E: Packed<T>>(&mut self, group: &mut Group<'_, E::Cell>, indices: &[usize], settled: u32) {
-        let LaneResiduals { stationarity, dynamics, inequalities, objective } = group.judge::<E>();
+        let LaneResiduals { stationarity, dynamics, inequalities, objective } = group.residuals::<E>();
         let of = [stationarity, dynamics, inequalities, objective].map(|value| lanes::<T, E>(value));
         for (lane, &index) in indices.iter().enumerate().filter(|(lane, _)| settled >> lane & 1 == 1) {
             let [stationarity, dynamics, inequalities, objective] =
@@ -316,7 +323,7 @@ impl<T: Real> Solve<'_, T> {
             let problem = (self.problems.0.get_mut(index), self.problems.1.get_mut(index));
             let (Some(instance), Some(Ok(statistics))) = problem else { return };
             if !(is_small && objective.is_finite()) {
-                self.together.alone.push(index as u32);
+                self.together.left_for_single_solves.push(index as u32);
                 continue;
             }
             let iterations = statistics.iterations;

@@ -52,7 +52,7 @@ impl<C: Copy> Group<'_, C> {
     /// Returns the residuals of the optimality conditions, evaluated from the data, and the
     /// objective.
     #[inline(always)]
-    pub fn judge<E: Lanes<Cell = C>>(&mut self) -> LaneResiduals<E> {
+    pub fn residuals<E: Lanes<Cell = C>>(&mut self) -> LaneResiduals<E> {
         let zero = E::from_f64(0.0);
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
         let (mut stationarity, mut dynamics, mut inequalities, mut objective) = (zero, zero, zero, zero);

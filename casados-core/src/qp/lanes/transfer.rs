@@ -2,7 +2,7 @@
 
 use super::group::{Group, Size};
 use super::sets::forces;
-use crate::qp::layout::{Places, StageOffsets, copy_common, part, part_mut};
+use crate::qp::layout::{StageOffsets, StageOffsetsIter, copy_common, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::stage::ConstraintVector;
 use crate::qp::{StageDims, element::set};
@@ -56,7 +56,7 @@ impl<C: Copy> Group<'_, C> {
         no_bound: f64,
     ) {
         let (Size { nx, nu, intervals }, n) = (self.size, self.size.n());
-        for (k, place) in Places::<T>::new(dims).enumerate() {
+        for (k, place) in StageOffsetsIter::<T>::new(dims).enumerate() {
             let begin = place.data;
             let variables = if k < intervals { n } else { nx };
             let hessian = part_mut(self.hessian, k * n * n, n * n);
@@ -135,7 +135,7 @@ impl<C: Copy> Group<'_, C> {
         };
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
-        for (k, place) in Places::<T>::new(solution.dims).enumerate() {
+        for (k, place) in StageOffsetsIter::<T>::new(solution.dims).enumerate() {
             let StageOffsets { v, dynamics, row, .. } = place;
             let variables = if k < intervals { n } else { nx };
             copy(part_mut(solution.v, v, variables), part(self.v, k * n, variables));

@@ -151,7 +151,7 @@ pub fn supernodes_backward<A: Arithmetic, M: Plan, V: SupernodeVisitor>(visitor:
 
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
-    use super::super::MAX_LINES;
+    use super::super::MAX_UNROLLED_PIVOTS;
     use super::*;
     use crate::linalg::kernel::arithmetic::Unfused;
     use alloc::vec::Vec;
@@ -179,7 +179,7 @@ mod tests {
         rows::<1>();
         rows::<CHUNK>();
         rows::<{ CHUNK + 1 }>();
-        rows::<{ MAX_LINES * CHUNK - 1 }>();
-        rows::<{ MAX_LINES * CHUNK }>();
+        rows::<{ MAX_UNROLLED_PIVOTS * CHUNK - 1 }>();
+        rows::<{ MAX_UNROLLED_PIVOTS * CHUNK }>();
     }
 }

@@ -94,7 +94,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             objective_unit,
         )?;
         log_row.regularisation = state.delta_w;
-        let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let mean_complementarity = barrier::mean_complementarity(&iterate.inequalities) / objective_unit;
         let monotone_mu = state.adaptive_mu.count_step(
             state.delta_w > 0.0,
             state.mu / objective_unit,
@@ -105,7 +105,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             state.mu = mu * objective_unit;
             resolve(&mut iterate, T::from_f64(state.mu), false)?;
         } else if in_free_mode {
-            state.mu = predictor::probing_mu(&iterate.sides, min_mu);
+            state.mu = predictor::probing_mu(&iterate.inequalities, min_mu);
             is_corrected =
                 predictor::corrected_step(&mut iterate, state.mu, objective_unit, state.violation)?;
         }

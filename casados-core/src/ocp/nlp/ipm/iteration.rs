@@ -106,7 +106,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         }
         if self.options.final_mu > 0.0 {
             (residuals.inequalities, residuals.complementarity) =
-                barrier::barrier_residuals(&iterate.sides, self.options.final_mu);
+                barrier::barrier_residuals(&iterate.inequalities, self.options.final_mu);
         }
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
         let stage_residual = if P::LIFTED { of_stages } else { 0.0 };
@@ -211,7 +211,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
             rounding_violation: rounding,
         };
         let tau = barrier::fraction_to_boundary(state.mu / state.dimensions.scaling.objective_unit);
-        let (primal, dual) = predictor::step_lengths(&iterate.sides, tau);
+        let (primal, dual) = predictor::step_lengths(&iterate.inequalities, tau);
         let mut steps = iterate.step.iter().zip(&*iterate.v).zip(&*work.units);
         let is_tiny = |((&d, &v), &unit): ((&T, &T), &T)| d.abs() <= noise * (unit + v.abs());
         let tiny = here.violation <= 1e-4 && steps.all(is_tiny);
@@ -288,10 +288,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         iterate.units = &*core::mem::take(&mut work.units);
         let (AcceptedStep { alpha, corrected }, mut dual) = (accepted, direction.max_alpha_dual);
         if corrected {
-            dual =
-                max_step_to_boundary(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+            dual = max_step_to_boundary(
+                iterate.inequalities.multiplier,
+                iterate.inequalities.multiplier_step,
+                direction.tau,
+            );
         }
-        if needs_equal_step_lengths(&iterate.sides) {
+        if needs_equal_step_lengths(&iterate.inequalities) {
             dual = dual.min(alpha);
         }
         costates_after_step(&mut iterate, &mut work, T::from_f64(state.delta_w));
@@ -299,14 +302,15 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         for (pi, &after) in view.dynamics.iter_mut().zip(&*work.next_costates) {
             *pi = *pi + alpha_number * (after - *pi);
         }
-        let multipliers_and_steps = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        let multipliers_and_steps =
+            iterate.inequalities.multiplier.iter().zip(&*iterate.inequalities.multiplier_step);
         for (of_hessian, (&multiplier, &step)) in
             work.hessian_multipliers.iter_mut().zip(multipliers_and_steps)
         {
             *of_hessian = *of_hessian + alpha_number * (multiplier + step - *of_hessian);
         }
-        iterate.go(alpha_number, T::from_f64(dual));
-        barrier::correct_bound_multipliers(&mut iterate.sides, state.mu);
+        iterate.step_point(alpha_number, T::from_f64(dual));
+        barrier::correct_bound_multipliers(&mut iterate.inequalities, state.mu);
         iterate.store(&mut view);
         ocp.problem.apply_stage_action(StageAction::Step(alpha_number));
         // The line search has evaluated the accepted point; a tiny step has no line search.

@@ -7,7 +7,7 @@ use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::StageAction;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::Program;
-use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, Store, copy_common, part, part_mut};
 use crate::scalar::Real;
 
 impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
@@ -50,7 +50,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let iterate =
             kkt_view(ocp.qp.view(), &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let to = self.trial_point.view_mut();
-        for place in Places::<T>::new(iterate.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
             copy_common(part_mut(to.v, place.v, place.n), part(iterate.step, place.row, place.n));
         }
         P::expand_stage_steps(ocp, &self.trial_point)

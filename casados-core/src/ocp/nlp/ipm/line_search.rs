@@ -12,7 +12,7 @@ use crate::ocp::nlp::filter::{
     ETA_PHI, Filter, FilterPair, GAMMA_PHI, GAMMA_THETA, S_PHI, S_THETA, switching_condition_holds,
 };
 use crate::qp::interior::Iterate;
-use crate::qp::{Places, Solution, StageDims, Store, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, Store, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// `γ_α`, a factor of the shortest step.
@@ -195,7 +195,7 @@ where
         let slacks = part(self.workspace.trial_slacks, 0, self.dimensions.counts.pair_count());
         let mut violation = gaps
             + barrier_function::violation_sum(
-                &mut iterate.sides,
+                &mut iterate.inequalities,
                 self.workspace.row_values,
                 slacks,
                 self.workspace.units,
@@ -204,7 +204,7 @@ where
             coupling.evaluate(iterate.qp, self.workspace.row_values);
             violation += coupling.residual_sum();
         }
-        let (penalties, barrier) = barrier_function::penalties_and_barrier(&iterate.sides, slacks);
+        let (penalties, barrier) = barrier_function::penalties_and_barrier(&iterate.inequalities, slacks);
         Some(FilterPair {
             objective: (objective + penalties + mu * barrier) / self.dimensions.scaling.objective_unit,
             violation,
@@ -221,14 +221,14 @@ where
         let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
         self.trial_point.copy_from(&ocp.iterate);
         let to = self.trial_point.view_mut();
-        for place in Places::<T>::new(iterate.qp.dims) {
+        for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
             let v = part_mut(to.v, place.v, place.n);
             let from = part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
             for (v, (&from, &step)) in v.iter_mut().zip(from) {
                 *v = from + part_of_step * step;
             }
         }
-        let steps = iterate.sides.slack.iter().zip(&mut *iterate.sides.slack_step);
+        let steps = iterate.inequalities.slack.iter().zip(&mut *iterate.inequalities.slack_step);
         for (slack, (&from, &mut step)) in self.workspace.trial_slacks.iter_mut().zip(steps) {
             *slack = from + part_of_step * step;
         }
@@ -247,9 +247,12 @@ where
         {
             let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
             copy_common(self.workspace.saved_step, iterate.step);
-            copy_common(self.workspace.saved_slack_step, iterate.sides.slack_step);
-            copy_common(self.workspace.saved_multiplier_step, iterate.sides.multiplier_step);
-            copy_common(self.workspace.saved_free_step, iterate.sides.free_step);
+            copy_common(self.workspace.saved_slack_step, iterate.inequalities.slack_step);
+            copy_common(self.workspace.saved_multiplier_step, iterate.inequalities.multiplier_step);
+            copy_common(
+                self.workspace.saved_equation_multipliers,
+                iterate.inequalities.equation_multiplier_steps,
+            );
         }
         let mut violation = model.current.violation;
         let mut accepted = None;
@@ -270,7 +273,10 @@ where
                 let (mu, delta) = (T::from_f64(model.mu), T::from_f64(model.delta_w));
                 let solved = super::kkt::newton::newton_step(&mut iterate, mu, delta)
                     .and_then(|()| refine_step(&mut iterate, self.workspace.units));
-                (solved, max_step_to_boundary(iterate.sides.slack, iterate.sides.slack_step, tau))
+                (
+                    solved,
+                    max_step_to_boundary(iterate.inequalities.slack, iterate.inequalities.slack_step, tau),
+                )
             };
             if solved.is_err() {
                 break;
@@ -289,9 +295,12 @@ where
             let iterate: Iterate<'_, T> =
                 kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices)?;
             copy_common(iterate.step, self.workspace.saved_step);
-            copy_common(iterate.sides.slack_step, self.workspace.saved_slack_step);
-            copy_common(iterate.sides.multiplier_step, self.workspace.saved_multiplier_step);
-            copy_common(iterate.sides.free_step, self.workspace.saved_free_step);
+            copy_common(iterate.inequalities.slack_step, self.workspace.saved_slack_step);
+            copy_common(iterate.inequalities.multiplier_step, self.workspace.saved_multiplier_step);
+            copy_common(
+                iterate.inequalities.equation_multiplier_steps,
+                self.workspace.saved_equation_multipliers,
+            );
         }
         Ok(accepted)
     }

@@ -52,15 +52,16 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let objective_unit = state.dimensions.scaling.objective_unit;
         initialise_inequalities(&mut iterate, &self.options, warm, state.mu, units, &view);
         if state.dimensions.in_restoration {
-            phase::start_on_central_path(&mut iterate.sides, state.mu);
+            phase::start_on_central_path(&mut iterate.inequalities, state.mu);
         }
         iterate.store(&mut view);
         if warm {
-            copy_common(work.hessian_multipliers, iterate.sides.multiplier);
+            copy_common(work.hessian_multipliers, iterate.inequalities.multiplier);
         } else if least_squares_multipliers(&mut iterate, &mut work, objective_unit).is_ok() {
             let is_small =
                 |(y, unit): (T, T)| (y * unit).abs() <= T::from_f64(CONSTR_MULT_INIT_MAX * objective_unit);
-            let sides = scaling::row_values_with_units(iterate.sides.rows, work.hessian_multipliers, rows);
+            let sides =
+                scaling::row_values_with_units(iterate.inequalities.rows, work.hessian_multipliers, rows);
             if scaling::gaps_with_units(iterate.qp.dims, work.next_costates, rows).chain(sides).all(is_small)
             {
                 copy_common(view.dynamics, work.next_costates);
@@ -84,11 +85,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
         let mut view = solution.view_mut();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
         let work = Workspace::new(ends, &state.max_dimensions, self.workspace.as_mut());
-        copy_common(work.trial_slacks, iterate.sides.multiplier);
-        copy_common(iterate.sides.multiplier, work.hessian_multipliers);
+        copy_common(work.trial_slacks, iterate.inequalities.multiplier);
+        copy_common(iterate.inequalities.multiplier, work.hessian_multipliers);
         iterate.load_point(&view);
         iterate.store(&mut view);
-        copy_common(iterate.sides.multiplier, work.trial_slacks);
+        copy_common(iterate.inequalities.multiplier, work.trial_slacks);
         Ok(())
     }
 
@@ -100,7 +101,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: Store<T>, I: Store<u32>> Ipm<T, D, M, I>
     ) -> Result<(), OcpError> {
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = kkt_view(qp, &state.dimensions, &mut self.kkt_numbers, &mut self.kkt_indices)?;
-        barrier::reset_small_slacks(&mut iterate.sides, state.mu, self.options.tolerance);
+        barrier::reset_small_slacks(&mut iterate.inequalities, state.mu, self.options.tolerance);
         let mut view = solution.view_mut();
         iterate.store(&mut view);
         evaluate_residuals(&mut iterate, &mut view);

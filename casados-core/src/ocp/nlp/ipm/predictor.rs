@@ -70,7 +70,7 @@ pub(super) fn corrected_step<T: Real>(
         resolve(iterate, T::from_f64(mu), true)?;
     }
     let tau = barrier::fraction_to_boundary(mu / objective_unit);
-    let (primal, dual) = step_lengths(&iterate.sides, tau);
+    let (primal, dual) = step_lengths(&iterate.inequalities, tau);
     let is_accepted = primal.min(dual) >= MIN_CORRECTED_STEP && iterate.step.iter().all(|d| d.is_finite());
     if !is_accepted {
         resolve(iterate, T::from_f64(mu), false)?;

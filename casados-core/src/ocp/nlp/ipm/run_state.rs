@@ -147,14 +147,14 @@ impl<'c> RunState<'c> {
         options: &IpmOptions,
     ) {
         let objective_unit = self.dimensions.scaling.objective_unit;
-        let Inequalities { slack, multiplier, .. } = &iterate.sides;
+        let Inequalities { slack, multiplier, .. } = &iterate.inequalities;
         let error = |mu| {
             barrier::barrier_error(
                 residuals,
                 barrier::max_complementarity_error(slack, multiplier, mu * objective_unit) / products,
             )
         };
-        let mean_complementarity = barrier::mean_complementarity(&iterate.sides) / objective_unit;
+        let mean_complementarity = barrier::mean_complementarity(&iterate.inequalities) / objective_unit;
         let mu = objective_unit
             * self.adaptive_mu.update_mu(
                 self.mu / objective_unit,

@@ -2,7 +2,7 @@
 
 use crate::ocp::assembly::units::ScalingUnits;
 use crate::qp::interior::{Iterate, at};
-use crate::qp::{Places, part};
+use crate::qp::{StageOffsetsIter, part};
 use crate::scalar::Real;
 
 /// Violations and gaps, in units, up to which the restoration phase ends.
@@ -51,12 +51,16 @@ impl RestorationPhase {
         gaps: f64,
         units: ScalingUnits<'_, T>,
     ) {
-        let inequalities = &iterate.sides;
+        let inequalities = &iterate.inequalities;
         let product = |sum: f64, (&a, &b): (&T, &T)| sum + (a * b).abs().to_f64();
         let slacks = inequalities.slack.iter().zip(&*inequalities.multiplier).fold(0.0, product);
         let of_sides = inequalities.residual.iter().zip(&*inequalities.multiplier).fold(slacks, product);
-        let of_rows = inequalities.equation_residual.iter().zip(&*inequalities.free).fold(of_sides, product);
-        let mut max_decrease = Places::<T>::new(iterate.qp.dims).fold(of_rows, |sum, place| {
+        let of_rows = inequalities
+            .equation_residual
+            .iter()
+            .zip(&*inequalities.equation_multipliers)
+            .fold(of_sides, product);
+        let mut max_decrease = StageOffsetsIter::<T>::new(iterate.qp.dims).fold(of_rows, |sum, place| {
             let gaps = part(iterate.dynamics, place.dynamics, place.next);
             gaps.iter().zip(part(pi, place.dynamics, place.next)).fold(sum, product)
         });

@@ -15,7 +15,8 @@ use crate::ocp::formulation::program::Program;
 use crate::ocp::nlp::elastic_mode::{self, Worst};
 use crate::qp::interior::at;
 use crate::qp::{
-    Arrays, Places, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, padded_len, part, part_mut,
+    Arrays, Qp, QpField, QpSolver, Residuals, SolutionView, StageDims, StageOffsetsIter, padded_len, part,
+    part_mut,
 };
 use crate::scalar::Real;
 
@@ -115,7 +116,7 @@ impl<T: Real> QpScaling<'_, T> {
 
     /// Scales a point with its multipliers.
     fn scale_point(&self, SolutionView { dims, v, dynamics, lower, upper }: SolutionView<'_, T>) {
-        for place in Places::<T>::new(dims) {
+        for place in StageOffsetsIter::<T>::new(dims) {
             let units = self.row_factors(place.row, place.n);
             part_mut(v, place.v, place.n).iter_mut().zip(units).for_each(|(v, unit)| *v = *v / unit);
         }
@@ -125,7 +126,7 @@ impl<T: Real> QpScaling<'_, T> {
     /// Scales multipliers only.
     fn scale_multipliers(&self, SolutionView { dims, dynamics, lower, upper, .. }: SolutionView<'_, T>) {
         let force = self.objective_factor();
-        for place in Places::<T>::new(dims) {
+        for place in StageOffsetsIter::<T>::new(dims) {
             let behind = self.row_factors(place.row + place.rows, place.next);
             let dynamics = part_mut(dynamics, place.dynamics, place.next);
             dynamics.iter_mut().zip(behind).for_each(|(pi, unit)| *pi = *pi * unit / force);
@@ -160,8 +161,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             least = least.min(rounded);
         }
         let are_all_one = force == 1.0 && rows.iter().all(|&unit| unit == T::ONE);
-        state.scaling =
-            (!are_all_one).then_some(ProblemScaling { objective_unit: force, min_row_unit: least });
+        state.scaling = (!are_all_one).then_some(ProblemScaling { objective_unit: force, tolerance: least });
         if !are_all_one {
             // Tolerances of scaled residuals are up to this factor smaller.
             self.qp_solver.require(self.options.tolerance / NEAR_ONE_RATIO);
@@ -246,7 +246,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Converts a violation from scaled units to units of the problem.
     pub(super) fn unscaled_violation<P: Program<T>>(&self, ocp: &Ocp<P, T, D, M>, worst: Worst) -> Worst {
         let rows = self.workspace.as_ref().get(saved_penalties_end(ocp)..).unwrap_or_default();
-        let places = Places::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
+        let places = StageOffsetsIter::<T>::new(ocp.qp.dims()).find(|place| place.stage == worst.stage);
         let unit = places.map_or(1.0, |place| {
             let begin = match worst.field {
                 QpField::StateBounds => 0,

@@ -7,7 +7,7 @@ use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::interior::{Inequalities, Iterate};
-use crate::qp::{Places, Solution, StageDims, add_symmetric, copy_common, part, part_mut};
+use crate::qp::{Solution, StageDims, StageOffsetsIter, add_symmetric, copy_common, part, part_mut};
 use crate::scalar::{Real, Scalar};
 
 /// Returns `Σ λ_e e + ½ q e²` over violations of soft bounds, and `−Σ log` over slacks and
@@ -35,7 +35,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_and_violation<T: Real>(
     units: ScalingUnits<'_, T>,
 ) -> FilterPair {
     let (force, units) = (units.scaling.objective_unit, units.rows);
-    let inequalities = &iterate.sides;
+    let inequalities = &iterate.inequalities;
     let gaps = gaps_with_units(iterate.qp.dims, iterate.dynamics, units);
     let equations = row_values_with_units(inequalities.equations, inequalities.equation_residual, units);
     let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.residual_sum());
@@ -54,7 +54,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
     scratch: &mut [T],
 ) -> f64 {
     let mut slope = T::ZERO;
-    for (place, stage) in Places::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(iterate.qp.dims).zip(iterate.qp.stages()) {
         let view = stage.arrays();
         let gradient = part_mut(scratch, 0, place.ld);
         copy_common(gradient, part(view.gradient, 0, place.ld));
@@ -62,7 +62,7 @@ pub(in crate::ocp::nlp::ipm) fn barrier_slope<T: Real>(
         let step = part(iterate.step, place.row, place.n);
         slope = gradient.iter().zip(step).fold(slope, |sum, (&g, &d)| sum + g * d);
     }
-    let inequalities = &iterate.sides;
+    let inequalities = &iterate.inequalities;
     let mut slope = slope.to_f64();
     for (&s, &d) in inequalities.slack.iter().zip(&*inequalities.slack_step) {
         slope -= mu * d.to_f64() / s.to_f64();
@@ -94,7 +94,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         let qp = qp.view();
         let mut values = ends.get(intervals_end(qp.dims)..).unwrap_or_default();
         let ((v, _), [mut given_lower, mut given_upper]) = (point.variables_and_costates(), given);
-        for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+        for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
             let rows = part_mut(rows, place.row, place.rows);
             copy_common(rows, part(v, place.v, place.n));
             let bounds = stage.g_bounds();
@@ -126,7 +126,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         units: &[T],
     ) -> f64 {
         let (mut sum, mut ends) = (0.0, ends);
-        for (next, place) in point.stages().zip(Places::<T>::new(point.dims())).skip(1) {
+        for (next, place) in point.stages().zip(StageOffsetsIter::<T>::new(point.dims())).skip(1) {
             let (phi, behind) = ends.split_at_checked(place.nx).unwrap_or_default();
             ends = behind;
             for ((&phi, &x), &unit) in phi.iter().zip(next.x).zip(part(units, place.row, place.nx)) {

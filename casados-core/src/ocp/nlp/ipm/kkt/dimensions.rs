@@ -1,7 +1,9 @@
 //! Dimensions of Newton's equations.
 
 use crate::ocp::assembly::units::{ProblemScaling, ScalingUnits};
-use crate::qp::interior::{Counts, Extent, Iterate, PenaltyMode, Reading, count, is_initial_state_fixed};
+use crate::qp::interior::{
+    ConstraintInterpretation, Counts, Extent, Iterate, PenaltyMode, count, is_initial_state_fixed,
+};
 use crate::qp::{InteriorPointOptions, QpView};
 use crate::scalar::Real;
 
@@ -29,7 +31,7 @@ impl KktDimensions {
             has_fixed_initial_state: reading.fixed,
             number_count: numbers,
             extent,
-            scaling: ProblemScaling { objective_unit: 1.0, min_row_unit: 1.0 },
+            scaling: ProblemScaling { objective_unit: 1.0, tolerance: 1.0 },
             in_restoration: false,
         }
     }
@@ -59,7 +61,7 @@ pub(in crate::ocp::nlp::ipm) const fn counts_with_all_bounds_soft(counts: &Count
 }
 
 /// How the constraints of a problem are read.
-pub(in crate::ocp::nlp::ipm) fn reading_options<T: Real>(qp: QpView<'_, T>) -> Reading<T> {
+pub(in crate::ocp::nlp::ipm) fn reading_options<T: Real>(qp: QpView<'_, T>) -> ConstraintInterpretation<T> {
     let no_bound = T::from_f64(InteriorPointOptions::new::<T>().no_bound);
-    Reading { fixed: is_initial_state_fixed(qp), penalties: PenaltyMode::Given, no_bound }
+    ConstraintInterpretation { fixed: is_initial_state_fixed(qp), penalties: PenaltyMode::Given, no_bound }
 }

@@ -4,7 +4,7 @@ use crate::ocp::assembly::units::ScalingUnits;
 use crate::ocp::nlp::ipm::IpmOptions;
 use crate::qp::element::set;
 use crate::qp::interior::{Iterate, at};
-use crate::qp::{Bounds, Places, QpView, SolutionView, part, part_mut};
+use crate::qp::{Bounds, QpView, SolutionView, StageOffsetsIter, part, part_mut};
 use crate::scalar::Real;
 
 /// Moves states and controls with hard bounds inside by `κ max(unit, |bound|)`, at most by `κ` of
@@ -17,7 +17,7 @@ pub(in crate::ocp::nlp::ipm) fn push_inside_bounds<T: Real>(
     solution: &mut SolutionView<'_, T>,
 ) {
     let push = T::from_f64(push);
-    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+    for (place, stage) in StageOffsetsIter::<T>::new(qp.dims).zip(qp.stages()) {
         let v = part_mut(solution.v, place.v, place.n);
         let (x, u) = v.split_at_mut_checked(place.nx).unwrap_or_default();
         if !(fixed && place.stage == 0) {
@@ -61,7 +61,7 @@ pub(in crate::ocp::nlp::ipm) fn initialise_inequalities<T: Real>(
 ) {
     let ([force, mu], units) = ([units.scaling.objective_unit, mu].map(T::from_f64), units.rows);
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     let count = inequalities.counts.sides();
     // Variables are inside their hard bounds, and their slacks are exact. Other slacks are pushed.
     let general = super::newton::general_constraint_flags::<T>(iterate.qp, inequalities.rows);

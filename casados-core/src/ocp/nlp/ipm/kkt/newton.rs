@@ -7,7 +7,9 @@ use super::dimensions::{KktDimensions, reading_options};
 use super::workspace::Workspace;
 use crate::ocp::assembly::units::ProblemScaling;
 use crate::qp::interior::{Inequalities, InitialStateKind, Iterate, at};
-use crate::qp::{Places, QpError, QpField, QpView, Residuals, SolutionView, Store, copy_common, take_mut};
+use crate::qp::{
+    QpError, QpField, QpView, Residuals, SolutionView, StageOffsetsIter, Store, copy_common, take_mut,
+};
 use crate::scalar::{Packed, Real, Registers, Scalar, compiled};
 
 /// Returns the iterate of Newton's method as a view of its memory, whose contents are unchanged.
@@ -25,10 +27,10 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view<'a, T: Real>(
     let first =
         if lengths.has_fixed_initial_state { InitialStateKind::Fixed } else { InitialStateKind::Free };
     let mut inequalities = Inequalities::new(lengths.counts, &mut numbers, &mut indices);
-    let ProblemScaling { objective_unit: force, min_row_unit: least } = lengths.scaling;
-    inequalities.compliance = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
+    let ProblemScaling { objective_unit: force, tolerance: least } = lengths.scaling;
+    inequalities.dual_regularisation = T::from_f64(Scalar::sqrt(T::EPSILON) * least * least / force);
     let mut iterate = Iterate::new(qp, &lengths.extent, first, inequalities, &mut numbers);
-    iterate.sides.free_step = take_mut(&mut numbers, lengths.counts.equations);
+    iterate.inequalities.equation_multiplier_steps = take_mut(&mut numbers, lengths.counts.equations);
     Ok(iterate)
 }
 
@@ -45,9 +47,9 @@ pub(in crate::ocp::nlp::ipm) fn kkt_view_of_new_qp<'a, T: Real>(
     units: &[T],
 ) -> Result<Iterate<'a, T>, QpError> {
     let mut iterate = kkt_view(qp, lengths, numbers, indices)?;
-    iterate.sides.list(qp, &reading_options(qp));
-    let (equations, least) = (&*iterate.sides.equations, T::from_f64(lengths.scaling.min_row_unit));
-    for (stiffness, &row) in iterate.sides.stiffness.iter_mut().zip(equations) {
+    iterate.inequalities.list(qp, &reading_options(qp));
+    let (equations, least) = (&*iterate.inequalities.equations, T::from_f64(lengths.scaling.tolerance));
+    for (stiffness, &row) in iterate.inequalities.stiffness_scale.iter_mut().zip(equations) {
         let ratio = least / at(units, row);
         *stiffness = ratio * ratio;
     }
@@ -85,7 +87,7 @@ impl<T: Real> Registers<T> for EvaluateResiduals<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, pi, output: found } = self;
         iterate.evaluate_with_costates::<E>(pi);
-        let penalties = iterate.sides.violation_cost().to_f64();
+        let penalties = iterate.inequalities.violation_cost().to_f64();
         *found = (iterate.point_residuals::<E>().into(), penalties);
     }
 }
@@ -170,11 +172,11 @@ impl<T: Real> Registers<T> for NewtonStep<'_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, mu, corrected, factor, result } = self;
         if corrected {
-            iterate.sides.corrector_targets(mu);
+            iterate.inequalities.corrector_targets(mu);
         } else {
-            iterate.sides.centring_targets(mu);
+            iterate.inequalities.centring_targets(mu);
         }
-        iterate.sides.free_step.fill(T::ZERO);
+        iterate.inequalities.equation_multiplier_steps.fill(T::ZERO);
         *result = iterate.newton::<E>(factor);
     }
 }
@@ -211,7 +213,7 @@ pub(in crate::ocp::nlp::ipm) fn refine_step<T: Real>(
 /// The largest residual of an equation after the full step, in units; zero if all are rounding
 /// errors.
 fn largest_equation_residual<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
-    let inequalities = &iterate.sides;
+    let inequalities = &iterate.inequalities;
     let rounding = Scalar::powf(T::EPSILON, 2.0 / 3.0);
     let residuals = inequalities.equations.iter().zip(&*inequalities.equation_residual);
     let lacks = residuals.map(|(&row, &residual)| {
@@ -250,13 +252,13 @@ pub(in crate::ocp::nlp::ipm) fn costates_after_step<T: Real>(
     delta: T,
 ) {
     copy_common(work.row_values, iterate.v);
-    copy_common(work.trial_slacks, iterate.sides.multiplier);
-    copy_common(work.saved_free_step, iterate.sides.free);
+    copy_common(work.trial_slacks, iterate.inequalities.multiplier);
+    copy_common(work.saved_equation_multipliers, iterate.inequalities.equation_multipliers);
     iterate.proximal = delta;
     T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
     copy_common(iterate.v, work.row_values);
-    copy_common(iterate.sides.multiplier, work.trial_slacks);
-    copy_common(iterate.sides.free, work.saved_free_step);
+    copy_common(iterate.inequalities.multiplier, work.trial_slacks);
+    copy_common(iterate.inequalities.equation_multipliers, work.saved_equation_multipliers);
 }
 
 struct CostatesAfterStep<'r, 'a, 's, T> {
@@ -292,7 +294,7 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     objective_unit: f64,
 ) -> Result<(), QpError> {
     let identity = T::from_f64(IDENTITY_HESSIAN_WEIGHT * objective_unit);
-    copy_common(work.trial_slacks, iterate.sides.multiplier);
+    copy_common(work.trial_slacks, iterate.inequalities.multiplier);
     set_general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
     T::run_precompiled::<LeastSquaresMultipliersCompiled>(LeastSquaresMultipliers {
@@ -302,7 +304,7 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
         result: &mut result,
     });
     result?;
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     copy_common(work.hessian_multipliers, inequalities.multiplier_step);
     inequalities.multiplier_step.fill(T::ZERO);
     set_general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
@@ -310,13 +312,13 @@ pub(in crate::ocp::nlp::ipm) fn least_squares_multipliers<T: Real>(
     iterate.proximal = identity;
     T::run_precompiled::<CostatesAfterStepCompiled>(CostatesAfterStep { iterate, pi: work.next_costates });
     copy_common(iterate.v, work.row_values);
-    copy_common(iterate.sides.multiplier, work.trial_slacks);
+    copy_common(iterate.inequalities.multiplier, work.trial_slacks);
     Ok(())
 }
 
 /// Sets the multipliers of the inequalities of general constraints.
 fn set_general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
-    let inequalities = &mut iterate.sides;
+    let inequalities = &mut iterate.inequalities;
     let count = inequalities.counts.sides();
     let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);
     for (i, (multiplier, general)) in inequalities.multiplier.iter_mut().zip(general).enumerate().take(count)
@@ -333,12 +335,12 @@ pub(in crate::ocp::nlp::ipm) fn general_constraint_flags<'a, T: Real>(
     qp: QpView<'a, T>,
     rows: &'a [u32],
 ) -> impl Iterator<Item = bool> + 'a {
-    let mut places = Places::<T>::new(qp.dims).peekable();
+    let mut places = StageOffsetsIter::<T>::new(qp.dims).peekable();
     let mut last = 0;
     rows.iter().map(move |&row| {
         let row = row as usize;
         if row < last {
-            places = Places::<T>::new(qp.dims).peekable();
+            places = StageOffsetsIter::<T>::new(qp.dims).peekable();
         }
         last = row;
         while places.next_if(|place| row >= place.row + place.rows).is_some() {}
@@ -364,10 +366,10 @@ impl<T: Real> Registers<T> for LeastSquaresMultipliers<'_, '_, '_, T> {
         iterate.evaluate_with_costates::<E>(pi);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;
-        let inequalities = &mut iterate.sides;
+        let inequalities = &mut iterate.inequalities;
         inequalities.residual.fill(T::ZERO);
         inequalities.equation_residual.fill(T::ZERO);
-        inequalities.free_step.fill(T::ZERO);
+        inequalities.equation_multiplier_steps.fill(T::ZERO);
         inequalities.target.fill(T::ZERO);
         inequalities.inverse.fill(T::ZERO);
         let general = general_constraint_flags::<T>(iterate.qp, inequalities.rows);

@@ -4,7 +4,7 @@
 
 use crate::ocp::assembly::units::{NEAR_ONE_RATIO, ScalingUnits, tolerance_factor};
 use crate::qp::interior::{Inequalities, Iterate, at};
-use crate::qp::{Places, Residuals, StageDims, nan_max, part};
+use crate::qp::{Residuals, StageDims, StageOffsetsIter, nan_max, part};
 use crate::scalar::Real;
 
 /// The unit of a state's gap is at least this fraction of the state.
@@ -18,7 +18,7 @@ pub(in crate::ocp::nlp::ipm) fn gaps_with_units<'a, T: Real>(
     gaps: &'a [T],
     units: &'a [T],
 ) -> impl Iterator<Item = (T, T)> + 'a {
-    Places::<T>::new(dims).flat_map(move |place| {
+    StageOffsetsIter::<T>::new(dims).flat_map(move |place| {
         let gaps = part(gaps, place.dynamics, place.next);
         gaps.iter().copied().zip(part(units, place.row + place.rows, place.next).iter().copied())
     })
@@ -58,7 +58,7 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
     stage_residual: f64,
 ) -> ScaledResiduals {
     let (force, units) = (units.scaling.objective_unit, units.rows);
-    let (inequalities, dims) = (&iterate.sides, iterate.qp.dims);
+    let (inequalities, dims) = (&iterate.inequalities, iterate.qp.dims);
     let size = |sum: f64, (value, unit): (T, T)| sum + (value * unit).abs().to_f64();
     let bound_multiplier_sum =
         row_values_with_units(inequalities.rows, inequalities.multiplier, units).fold(0.0, size);
@@ -71,7 +71,8 @@ pub(in crate::ocp::nlp::ipm) fn scaled_residuals<T: Real>(
         },
     );
     let equation_multiplier_sum =
-        row_values_with_units(inequalities.equations, inequalities.free, units).fold(0.0, size);
+        row_values_with_units(inequalities.equations, inequalities.equation_multipliers, units)
+            .fold(0.0, size);
     let (all, count) = gaps_with_units(dims, pi, units)
         .fold((inequality_multiplier_sum + equation_multiplier_sum, 0), |(sum, count), pair| {
             (size(sum, pair), count + 1)
@@ -117,7 +118,7 @@ fn largest_scaled_gap<T: Real>(iterate: &Iterate<'_, T>, units: &[T]) -> f64 {
         .as_ref()
         .map_or(T::ZERO, |coupling| coupling.residual.iter().fold(T::ZERO, |m, gap| nan_max(m, gap.abs())));
     let mut largest = coupling;
-    for place in Places::<T>::new(iterate.qp.dims) {
+    for place in StageOffsetsIter::<T>::new(iterate.qp.dims) {
         let begin = place.row + place.rows;
         let next = part(iterate.v, begin, place.next).iter().zip(part(units, begin, place.next));
         for (&gap, (&x, &unit)) in part(iterate.dynamics, place.dynamics, place.next).iter().zip(next) {

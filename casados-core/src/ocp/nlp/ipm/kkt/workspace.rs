@@ -18,7 +18,7 @@ pub(in crate::ocp::nlp::ipm) struct Workspace<'a, T> {
     pub saved_step: &'a mut [T],
     pub saved_slack_step: &'a mut [T],
     pub saved_multiplier_step: &'a mut [T],
-    pub saved_free_step: &'a mut [T],
+    pub saved_equation_multipliers: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub next_costates: &'a mut [T],
     /// Multipliers of inequalities in the Hessian. They take the primal step length, the
@@ -55,7 +55,7 @@ impl<'a, T: Real> Workspace<'a, T> {
             saved_step: take_mut(rest, end.row),
             saved_slack_step: take_mut(rest, pairs),
             saved_multiplier_step: take_mut(rest, pairs),
-            saved_free_step: take_mut(rest, capacity.counts.equations),
+            saved_equation_multipliers: take_mut(rest, capacity.counts.equations),
             next_costates: take_mut(rest, end.dynamics),
             hessian_multipliers: take_mut(rest, pairs),
             units: take_mut(rest, end.row),

@@ -19,7 +19,7 @@ use crate::ocp::nlp::ipm::line_search::LineSearch;
 use crate::ocp::nlp::ipm::run_state::RunState;
 use crate::qp::element::set;
 use crate::qp::interior::at;
-use crate::qp::{Places, StageDims, Store, part};
+use crate::qp::{StageDims, StageOffsetsIter, Store, part};
 use crate::scalar::Real;
 
 /// The lengths of the tested points of the ray, relative to the size of the variables: up to the
@@ -95,7 +95,7 @@ where
     fn variable_and_step_sizes<P: Program<T>>(&mut self, ocp: &Ocp<P, T, D, M>) -> Option<[f64; 2]> {
         let iterate = kkt_view(ocp.qp.view(), self.dimensions, self.kkt_numbers, self.kkt_indices).ok()?;
         let sizes = [&*iterate.v, &*iterate.step].map(|numbers| {
-            Places::<T>::new(iterate.qp.dims).fold(0.0, |largest: f64, place| {
+            StageOffsetsIter::<T>::new(iterate.qp.dims).fold(0.0, |largest: f64, place| {
                 let own = part(numbers, place.row, place.n).iter();
                 let units = part(self.workspace.units, place.row, place.n);
                 own.zip(units).fold(largest, |m, (&v, &unit)| m.max((v / unit).abs().to_f64()))
@@ -150,7 +150,7 @@ where
             return tolerance;
         }
         let points = [&ocp.iterate, &*self.trial_point].map(|point| point.variables_and_costates().0);
-        let moved = Places::<T>::new(ocp.qp().dims).fold(0.0, |largest: f64, place| {
+        let moved = StageOffsetsIter::<T>::new(ocp.qp().dims).fold(0.0, |largest: f64, place| {
             let [from, to] = points.map(|v| part(v, place.v, place.n));
             let pairs = from.iter().zip(to).zip(part(self.workspace.units, place.row, place.n));
             pairs.fold(largest, |m, ((&from, &to), &unit)| m.max(((to - from) / unit).abs().to_f64()))
@@ -175,7 +175,7 @@ where
             coupling.evaluate(iterate.qp, rows);
             sum += coupling.residual_sum();
         }
-        let (inequalities, infinity) = (&iterate.sides, T::from_f64(f64::INFINITY));
+        let (inequalities, infinity) = (&iterate.inequalities, T::from_f64(f64::INFINITY));
         let residual = |row: u32, bound: T| at(rows, row) - bound;
         for (&row, &bound) in inequalities.equations.iter().zip(&*inequalities.equation_bound) {
             sum += (residual(row, bound) / at(units, row)).abs().to_f64();
