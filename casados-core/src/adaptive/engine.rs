@@ -1,8 +1,8 @@
 //! The interface of all adaptive methods. Sealed: the traits cannot be named outside of the crate.
 
 use super::replay::{AcceptedStep, DynStepDifferentiator, StepDifferentiator};
-use super::step::{After, Run, Span};
-use super::tape::Entry;
+use super::step::{AfterStep, Run, Span};
+use super::tape::TapeEntry;
 use crate::error::Error;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX};
 use crate::result::{Dense, Forward};
@@ -10,17 +10,17 @@ use crate::scalar::Real;
 use core::marker::PhantomData;
 
 /// The memory of a method. Cannot be named outside of the crate.
-pub trait Kind<M: Dae, T: Real>: 'static {
+pub trait MethodState<M: Dae, T: Real>: 'static {
     /// The memory.
     type State: Default + Send + Sync;
 }
 
 /// An adaptive method, for the models that it can integrate.
-pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
+pub trait Engine<M: Dae, T: Real>: MethodState<M, T> {
     /// Whether `z` at the end of a step is the `z` of a stage; otherwise it is solved for.
     const ENDS_ON_STAGE: bool;
     /// Differentiates the accepted steps.
-    type Replays: StepDifferentiator<M, T>;
+    type Differentiator: StepDifferentiator<M, T>;
     /// Integrates an interval; `after` is called after each accepted step.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
         run: &mut Run<'_, M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
-        after: After<'_, M, T>,
+        after: AfterStep<'_, M, T>,
     ) -> Result<(), Error>;
     /// Dense output of a step from its numbers on the tape; of `inputs`, variables of the model,
     /// `u` and `p` are used.
@@ -40,13 +40,13 @@ pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
     fn interpolate(
         state: &mut Self::State,
         inputs: &[T],
-        entry: &Entry<T>,
+        entry: &TapeEntry<T>,
         numbers: (&[T], &[T]),
         t: T,
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error>;
     /// The object that differentiates accepted steps.
-    fn replays(state: &mut Self::State) -> &mut Self::Replays;
+    fn replays(state: &mut Self::State) -> &mut Self::Differentiator;
 }
 
 /// Differentiates the steps of a method for error control of the sensitivities.

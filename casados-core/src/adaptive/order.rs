@@ -3,7 +3,7 @@
 
 use super::newton_monitor::NewtonMonitor;
 use super::replay::StepDifferentiator;
-use super::stages::Stages;
+use super::stages::StageSolver;
 use crate::error::Error;
 use crate::finite::check_output;
 use crate::model::Dae;
@@ -22,18 +22,18 @@ const STEADY_STEP_RATIO: (f64, f64) = (0.8, 1.2);
 const MIN_STEPS_BEFORE_INCREASE: usize = 5;
 
 /// The methods among which an integrator selects.
-pub trait Family: 'static {
+pub trait MethodFamily: 'static {
     /// The number of methods.
-    const LEVELS: usize;
+    const ORDER_COUNT: usize;
     /// See [`Engine`].
     const ENDS_ON_STAGE: bool;
     /// Differentiates the steps of the methods.
-    type Replays<M: Dae, T: Real>: StepDifferentiator<M, T> + Default + Send + Sync;
+    type Differentiator<M: Dae, T: Real>: StepDifferentiator<M, T> + Default + Send + Sync;
     /// Creates the method of a level.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error>;
+    fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn StageSolver<M, T> + Send + Sync>, Error>;
 }
 
 /// The number of stages, and the criteria for its change.
@@ -83,7 +83,7 @@ impl OrderSelection {
 
 /// The allocated methods of a family.
 pub struct Orders<M: Dae, T: Real> {
-    methods: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
+    methods: [Option<Box<dyn StageSolver<M, T> + Send + Sync>>; 3],
 }
 
 impl<M: Dae, T: Real> Default for Orders<M, T> {
@@ -93,7 +93,7 @@ impl<M: Dae, T: Real> Default for Orders<M, T> {
 }
 
 impl<M: Dae, T: Real> Orders<M, T> {
-    pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
+    pub fn get<B: MethodFamily>(&mut self, level: usize) -> Result<&mut dyn StageSolver<M, T>, Error> {
         let missing = Error::OutOfMemory { bytes: 0 };
         let place = self.methods.get_mut(level).ok_or(missing)?;
         if place.is_none() {
@@ -106,7 +106,7 @@ impl<M: Dae, T: Real> Orders<M, T> {
     }
 
     /// Converts the last accepted step of one level to another.
-    pub fn transfer_last_step<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
+    pub fn transfer_last_step<B: MethodFamily>(&mut self, from: usize, to: usize) -> Result<(), Error> {
         self.get::<B>(from)?;
         self.get::<B>(to)?;
         let [first, second, third] = &mut self.methods;
@@ -135,7 +135,7 @@ pub(super) fn weighted_sum<T: Real>(weights: &[f64], y: &[T]) -> T {
 /// # Errors
 /// [`Error::Overflow`]
 pub(super) fn interpolate_step<M: Dae, T: Real>(
-    stages: &dyn Stages<M, T>,
+    stages: &dyn StageSolver<M, T>,
     x: &[T],
     y: &[T],
     passed: T,

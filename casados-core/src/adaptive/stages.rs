@@ -30,7 +30,7 @@ pub struct StepContext<'a, M: Dae, T: Real> {
 pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
 
 /// A step with any number of stages.
-pub trait Stages<M: Dae, T: Real> {
+pub trait StageSolver<M: Dae, T: Real> {
     /// The number of stages.
     fn stage_count(&self) -> usize;
     /// Factorises the Newton matrix; returns whether the planned pivots hold.
@@ -54,7 +54,7 @@ pub trait Stages<M: Dae, T: Real> {
     /// Predicts the variables in the middle of the step from the initial guess.
     fn predict_midpoint(&self, start: &StepContext<'_, M, T>, middle: &mut ArrayV<M, T>);
     /// Converts the last accepted step of another method.
-    fn adopt_last_step(&mut self, other: &dyn Stages<M, T>);
+    fn adopt_last_step(&mut self, other: &dyn StageSolver<M, T>);
     /// Solves the stages.
     ///
     /// # Errors

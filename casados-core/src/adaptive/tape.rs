@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 
 /// An accepted step.
 #[derive(Clone, Copy, Debug)]
-pub struct Entry<T> {
+pub struct TapeEntry<T> {
     /// The start time.
     pub t: T,
     /// The length.
@@ -22,9 +22,9 @@ pub struct Entry<T> {
 /// stages.
 #[derive(Debug)]
 pub struct Tape<T> {
-    entries: Vec<Entry<T>>,
+    entries: Vec<TapeEntry<T>>,
     /// The entries at the time of freezing.
-    frozen_entries: Vec<Entry<T>>,
+    frozen_entries: Vec<TapeEntry<T>>,
     numbers: Vec<T>,
     /// The numbers of the steps of a replay.
     replayed_numbers: Vec<T>,
@@ -47,7 +47,7 @@ impl<T: Real> Tape<T> {
         self.numbers.clear();
     }
 
-    pub fn entries(&self) -> &[Entry<T>] {
+    pub fn entries(&self) -> &[TapeEntry<T>] {
         &self.entries
     }
 
@@ -57,7 +57,7 @@ impl<T: Real> Tape<T> {
         let begin = self.numbers.len();
         extend(&mut self.numbers, x)?;
         extend(&mut self.numbers, stages)?;
-        push(&mut self.entries, Entry { t, h, order_index: level, offset: begin })
+        push(&mut self.entries, TapeEntry { t, h, order_index: level, offset: begin })
     }
 
     /// The states at the start of a step, and the unknowns of its stages.

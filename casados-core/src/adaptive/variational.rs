@@ -20,7 +20,7 @@ use super::newton_monitor::NewtonFailure;
 use super::pairs::EmbeddedPair;
 use super::point::ModelPoint;
 use super::replay::{AcceptedStep, DynStepDifferentiator};
-use super::stages::{FilteredDefect, MAX_STAGES, Stages, StepContext};
+use super::stages::{FilteredDefect, MAX_STAGES, StageSolver, StepContext};
 use super::tolerances::{Tolerances, root_mean_square};
 use crate::error::Error;
 use crate::linalg::axpy;
@@ -171,13 +171,13 @@ impl<M: Dae, T: Real> Variational<M, T> {
     }
 
     /// The estimated error of the sensitivities over an implicit step, relative to the tolerance;
-    /// `again` as in [`Stages::estimate_error`].
+    /// `again` as in [`StageSolver::estimate_error`].
     ///
     /// # Errors
     /// The step cannot be differentiated.
     pub fn implicit_error(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         at: ModelPoint<'_, M, T>,
         level: usize,
         start: &StepContext<'_, M, T>,

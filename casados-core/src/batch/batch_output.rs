@@ -1,7 +1,7 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
 use super::intervals::{Interval, vector};
-use super::lanes::{MOST_LANES, Unpack, Verdict, yes};
+use super::lanes::{MAX_LANES, MaskedResult, Unpack, all_lanes_true};
 use super::single::{Group, Single};
 use crate::error::Error;
 use crate::linalg::dispatch;
@@ -12,7 +12,7 @@ use crate::shape::{Matrix, Plain, Shape, copy_into};
 
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All
 /// of it is inlined into kernels.
-pub trait Wide<E: Lanes, R> {
+pub trait LaneResults<E: Lanes, R> {
     /// Whether all numbers are finite, lane by lane, but for those that were looked at when they
     /// were written: matrices.
     fn is_finite(&self) -> E::Mask;
@@ -24,7 +24,7 @@ pub trait Wide<E: Lanes, R> {
 /// The elements of a field, for each lane that is good in its result.
 macro_rules! unpack_field {
     ($self:ident, $field:ident, $good:ident, $results:ident, $get:ident) => {{
-        let mut to: [&mut [T]; MOST_LANES] = Default::default();
+        let mut to: [&mut [T]; MAX_LANES] = Default::default();
         for ((to, result), &good) in to.iter_mut().zip($results.iter_mut()).zip($good) {
             if good {
                 *to = $get(result).$field.as_mut_slice();
@@ -36,11 +36,11 @@ macro_rules! unpack_field {
 
 macro_rules! wide {
     ($type:ident $(: $inner:ident)?; $($field:ident),*; $($matrix:ident),*) => {
-        impl<M: Dae, T: Plain, E: Lanes<Cell: AsRef<[T]>>> Wide<E, $type<M, T>> for $type<M, E> {
+        impl<M: Dae, T: Plain, E: Lanes<Cell: AsRef<[T]>>> LaneResults<E, $type<M, T>> for $type<M, E> {
             #[inline(always)]
             fn is_finite(&self) -> E::Mask {
-                let finite = yes::<E>();
-                $(let finite = E::and(finite, Wide::<E, _>::is_finite(&self.$inner));)?
+                let finite = all_lanes_true::<E>();
+                $(let finite = E::and(finite, LaneResults::<E, _>::is_finite(&self.$inner));)?
                 $(let finite = are_finite(self.$field.as_slice(), finite);)*
                 finite
             }
@@ -74,37 +74,37 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
 }
 
 /// What a call of a batch answers for each interval.
-pub trait Answer<M: Dae, T: Real>: Copy + Send {
+pub trait BatchOutput<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
-    type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
+    type LaneResults<E: Lanes<Cell: AsRef<[T]>>>: LaneResults<E, Self>;
     /// How many columns of derivatives are computed for it.
     const COLUMNS: usize;
 
     /// For several intervals at once.
-    fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+    fn compute_group<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
         group: &mut I::Group<E>,
-    ) -> Verdict<'_, E, Self::Wide<E>>;
+    ) -> MaskedResult<'_, E, Self::LaneResults<E>>;
 
     /// For one interval, where it belongs: results that are large are written once.
-    fn alone<I: Single<Model = M, Number = T>>(
+    fn compute_single<I: Single<Model = M, Number = T>>(
         &mut self,
         single: &mut I,
         interval: &Interval<'_, M, T>,
     ) -> Result<(), Error>;
 }
 
-macro_rules! answer {
+macro_rules! batch_output {
     ($type:ident, $together:ident, $columns:expr, |$single:ident, $at:ident, $to:ident| $alone:expr) => {
-        impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
-            type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
+        impl<M: Dae, T: Real> BatchOutput<M, T> for $type<M, T> {
+            type LaneResults<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
             const COLUMNS: usize = $columns;
 
-            fn together<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
+            fn compute_group<I: Single<Model = M, Number = T>, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(
                 group: &mut I::Group<E>,
-            ) -> Verdict<'_, E, Self::Wide<E>> {
+            ) -> MaskedResult<'_, E, Self::LaneResults<E>> {
                 group.$together()
             }
-            fn alone<I: Single<Model = M, Number = T>>(
+            fn compute_single<I: Single<Model = M, Number = T>>(
                 &mut self,
                 $single: &mut I,
                 $at: &Interval<'_, M, T>,
@@ -115,14 +115,15 @@ macro_rules! answer {
         }
     };
 }
-answer!(Nominal, solve, 0, |single, at, to| {
+batch_output!(Nominal, solve, 0, |single, at, to| {
     copy_into(to, single.solve_with_quadrature(at.x0, &vector(at.u), at.h, None)?);
     Ok(())
 });
-answer!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
-answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single.forward_adjoint_to(at, to));
-answer!(Adjoint, adjoint, 1, |single, at, to| {
+batch_output!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
+batch_output!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single
+    .forward_adjoint_to(at, to));
+batch_output!(Adjoint, adjoint, 1, |single, at, to| {
     copy_into(to, single.adjoint_with_quadrature(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
     Ok(())
 });
-answer!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));
+batch_output!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));

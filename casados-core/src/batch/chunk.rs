@@ -1,10 +1,10 @@
 //! What a call of a batch is to do, and its parts: consecutive intervals, with what is found out
 //! about them.
 
-use super::batch_output::Answer;
+use super::batch_output::BatchOutput;
 use super::error::BatchError;
 use super::intervals::BatchInputs;
-use super::lanes::MOST_LANES;
+use super::lanes::MAX_LANES;
 use super::single::Single;
 use crate::error::Error;
 use crate::options::Options;
@@ -20,8 +20,8 @@ const MAX_CACHE_FRACTION: f64 = 5.0 / 8.0;
 
 /// How many intervals are computed together: as many as the widest register has whose group fits
 /// into the cache.
-pub fn lanes_per_group<I: Single, R: Answer<I::Model, I::Number>>(options: &Options) -> usize {
-    let mut max_lanes = MOST_LANES;
+pub fn lanes_per_group<I: Single, R: BatchOutput<I::Model, I::Number>>(options: &Options) -> usize {
+    let mut max_lanes = MAX_LANES;
     loop {
         match I::Number::run_in_widest_register(
             max_lanes,
@@ -46,7 +46,7 @@ impl<I: Single> Widest<I::Number> for CacheFit<'_, I> {
     type Output = (usize, bool);
     fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> (usize, bool) {
         let bytes = I::working_set::<E>(self.options, self.columns) as f64;
-        (E::LANES, I::TOGETHER && bytes <= MAX_CACHE_FRACTION * second_level_cache() as f64)
+        (E::LANES, I::SUPPORTS_GROUPS && bytes <= MAX_CACHE_FRACTION * second_level_cache() as f64)
     }
 }
 

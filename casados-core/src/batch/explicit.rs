@@ -1,7 +1,7 @@
 //! Explicit methods.
 
 use super::intervals::{Interval, vector};
-use super::lanes::{MOST_LANES, Verdict};
+use super::lanes::{MAX_LANES, MaskedResult};
 use super::single::{self, Single, Standard, gather};
 use crate::erk::{ColumnPanels, Engine, Grid, Integrator, NoIntegrand};
 use crate::error::Error;
@@ -21,8 +21,8 @@ impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
     type Stages = ();
     type Group<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>> = Group<M, E, S>;
 
-    const ITERATES: bool = false;
-    const TOGETHER: bool = true;
+    const IS_ITERATIVE: bool = false;
+    const SUPPORTS_GROUPS: bool = true;
 
     fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         Self::build(*options, tableau)
@@ -84,8 +84,8 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
     /// What a call answers.
     fn run_engine<'e, R>(
         &'e mut self,
-        call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> Verdict<'e, E, R>,
-    ) -> Verdict<'e, E, R> {
+        call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> MaskedResult<'e, E, R>,
+    ) -> MaskedResult<'e, E, R> {
         let Self { engine, grid, lambda, .. } = self;
         call(engine, grid, <Heap>::nominal(lambda)?.as_ref())
     }
@@ -98,8 +98,8 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
             &Grid<E>,
             &[E],
             &mut ColumnPanels<M, E, S>,
-        ) -> Verdict<'e, E, R>,
-    ) -> Verdict<'e, E, R> {
+        ) -> MaskedResult<'e, E, R>,
+    ) -> MaskedResult<'e, E, R> {
         let Self { engine, grid, lambda, panels } = self;
         call(engine, grid, <Heap>::nominal(lambda)?.as_ref(), <Heap>::nominal(panels)?)
     }
@@ -119,7 +119,7 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         &mut self,
         intervals: &[&Interval<'_, M, T>],
         _: Option<[&[T]; 2]>,
-        _: Option<&[&[()]; MOST_LANES]>,
+        _: Option<&[&[()]; MAX_LANES]>,
         _: bool,
     ) -> Result<(), Error> {
         let Self { engine, grid, lambda, .. } = self;
@@ -143,25 +143,25 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         self.engine.statistics()
     }
 
-    fn solve(&mut self) -> Verdict<'_, E, Nominal<M, E>> {
+    fn solve(&mut self) -> MaskedResult<'_, E, Nominal<M, E>> {
         self.run_engine(|engine, grid, _| engine.solve(grid, &mut NoIntegrand))
     }
 
-    fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
+    fn forward(&mut self) -> MaskedResult<'_, E, Forward<M, E>> {
         self.run_engine_with_panels(|engine, grid, _, panels| engine.forward(grid, panels, &mut NoIntegrand))
     }
 
-    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
+    fn adjoint(&mut self) -> MaskedResult<'_, E, Adjoint<M, E>> {
         self.run_engine(|engine, grid, lambda| engine.adjoint(grid, lambda, &mut NoIntegrand))
     }
 
-    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+    fn forward_adjoint(&mut self) -> MaskedResult<'_, E, ForwardAdjoint<M, E>> {
         self.run_engine_with_panels(|engine, grid, lambda, panels| {
             engine.forward_adjoint(grid, lambda, panels)
         })
     }
 
-    fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
+    fn hessian(&mut self) -> MaskedResult<'_, E, Hessian<M, E>> {
         self.run_engine_with_panels(|engine, grid, lambda, panels| {
             engine.hessian(grid, lambda, panels, &mut NoIntegrand)
         })

@@ -1,9 +1,9 @@
 //! The intervals of a group side by side, and what each of them gets.
 
-use super::batch_output::{Answer, Wide};
+use super::batch_output::{BatchOutput, LaneResults};
 use super::chunk::{BatchTask, IntervalChunk};
 use super::intervals::Interval;
-use super::lanes::MOST_LANES;
+use super::lanes::MAX_LANES;
 use super::single::{Group, Single};
 use super::statistics::BatchStatistics;
 use crate::error::Error;
@@ -19,18 +19,18 @@ pub type GroupCache = [Option<Box<dyn Any + Send + Sync>>; 2];
 
 /// The intervals of a group that can be computed, each in its lane.
 pub type LaneIntervals<'a, I> =
-    [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MOST_LANES];
+    [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MAX_LANES];
 
 /// Gives every interval its result, where all is well and finite.
 struct Distribute<'a, E: Lanes, W, R> {
     converged_lanes: E::Mask,
     lane_results: &'a W,
     /// On entry which lanes are asked for, on return which are good.
-    valid_lanes: &'a mut [bool; MOST_LANES],
+    valid_lanes: &'a mut [bool; MAX_LANES],
     results: &'a mut [R],
 }
 
-impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
+impl<E: Lanes, W: LaneResults<E, R>, R> Kernel for Distribute<'_, E, W, R> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -55,15 +55,15 @@ pub struct GroupCall<'a, 'b, 'c, I: Single, R> {
     pub chunk: &'a mut IntervalChunk<'c, I, R>,
 }
 
-impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for GroupCall<'_, '_, '_, I, R> {
+impl<I: Single, R: BatchOutput<I::Model, I::Number>> Widest<I::Number> for GroupCall<'_, '_, '_, I, R> {
     /// For which intervals there is a result.
-    type Output = Result<[bool; MOST_LANES], Error>;
+    type Output = Result<[bool; MAX_LANES], Error>;
 
     // What callers have of it they do not have to optimise again.
     #[inline(never)]
     fn call<E: Lanes<Cell: AsRef<[I::Number]> + AsMut<[I::Number]>>>(self) -> Self::Output {
         let Self { task: work, groups, statistics, intervals, chunk: share } = self;
-        let mut valid_lanes = [false; MOST_LANES];
+        let mut valid_lanes = [false; MAX_LANES];
         let has_group_type = |group: &Box<dyn Any + Send + Sync>| (**group).is::<I::Group<E>>();
         // Its own place, or one that is free.
         let cache_slot = groups.iter_mut().find(|place| place.as_ref().is_none_or(has_group_type));
@@ -75,7 +75,7 @@ impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for GroupCall<
         let first_lane = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first_lane)) = (group, first_lane) else { return Ok(valid_lanes) };
         let Some(Some(padding_interval)) = intervals.get(first_lane) else { return Ok(valid_lanes) };
-        let mut lanes = [padding_interval; MOST_LANES];
+        let mut lanes = [padding_interval; MAX_LANES];
         for (lane, interval) in lanes.iter_mut().zip(intervals).take(E::LANES) {
             *lane = interval.as_ref().unwrap_or(padding_interval);
         }
@@ -83,9 +83,9 @@ impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for GroupCall<
             |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first_lane };
 
         let steps = work.options.steps;
-        let mut stages: [&[I::Stages]; MOST_LANES] = [&[]; MOST_LANES];
+        let mut stages: [&[I::Stages]; MAX_LANES] = [&[]; MAX_LANES];
         let mut has_initial_stages =
-            I::ITERATES && (work.options.start == Start::Warm || work.reuses_solutions);
+            I::IS_ITERATIVE && (work.options.start == Start::Warm || work.reuses_solutions);
         if has_initial_stages {
             for (lane, stages) in stages.iter_mut().enumerate().take(E::LANES) {
                 let from = share.stages.chunks_exact(steps).nth(source_lane(lane));
@@ -101,7 +101,7 @@ impl<I: Single, R: Answer<I::Model, I::Number>> Widest<I::Number> for GroupCall<
             work.reuses_solutions,
         )?;
 
-        let (good, wide) = R::together::<I, E>(group)?;
+        let (good, wide) = R::compute_group::<I, E>(group)?;
         for (done, interval) in valid_lanes.iter_mut().zip(intervals).take(E::LANES) {
             *done = interval.is_some();
         }

@@ -1,6 +1,6 @@
 //! The batch as its users see it.
 
-use super::batch_output::Answer;
+use super::batch_output::BatchOutput;
 use super::chunk::{BatchTask, IntervalChunk, Sink, lanes_per_group, try_resize};
 use super::error::BatchError;
 use super::intervals::{BatchInputs, Intervals};
@@ -318,7 +318,7 @@ impl<I: Single> Integrator<I> {
     ///
     /// # Errors
     /// See [`Integrator`].
-    pub(crate) fn for_each_result<R: Answer<I::Model, I::Number> + Zeroable>(
+    pub(crate) fn for_each_result<R: BatchOutput<I::Model, I::Number> + Zeroable>(
         &mut self,
         intervals: &Intervals<'_, I::Model, I::Number>,
         (lambda, nu): Weights<'_, I>,
@@ -334,18 +334,18 @@ impl<I: Single> Integrator<I> {
     /// How many intervals are computed together for such a result, and how many are simulated
     /// together before each is differentiated alone: stages of models that are too large to be
     /// differentiated side by side may still be found so.
-    fn group_sizes<R: Answer<I::Model, I::Number>>(&self) -> [usize; 2] {
+    fn group_sizes<R: BatchOutput<I::Model, I::Number>>(&self) -> [usize; 2] {
         let lacks_start_values =
-            I::ITERATES && self.options.start == Start::Given && self.start_values.is_none();
+            I::IS_ITERATIVE && self.options.start == Start::Given && self.start_values.is_none();
         match if lacks_start_values { 1 } else { lanes_per_group::<I, R>(&self.options) } {
-            1 if I::ITERATES && !lacks_start_values => {
+            1 if I::IS_ITERATIVE && !lacks_start_values => {
                 [1, lanes_per_group::<I, Nominal<I::Model, I::Number>>(&self.options)]
             }
             lanes => [lanes, 1],
         }
     }
 
-    fn run<R: Answer<I::Model, I::Number>>(
+    fn run<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         inputs: &BatchInputs<'_, I::Model, I::Number>,
         results: &mut [R],
@@ -354,7 +354,7 @@ impl<I: Single> Integrator<I> {
         let (count, steps) = (inputs.len(), self.options.steps);
         self.status.clear();
         try_resize(&mut self.status, count, Ok(()))?;
-        if I::ITERATES && (self.options.start == Start::Warm || self.stores_stages) {
+        if I::IS_ITERATIVE && (self.options.start == Start::Warm || self.stores_stages) {
             try_resize(&mut self.has_stages, count, false)?;
             try_resize(&mut self.stages, count.saturating_mul(steps), Zeroable::zeroed())?;
         }

@@ -1,24 +1,24 @@
 //! Numbers of several intervals in the lanes of registers, and back.
 
-pub(super) use crate::erk::Verdict;
+pub(super) use crate::erk::MaskedResult;
 use crate::linalg::{Arithmetic, Kernel, kernels};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 
 /// More lanes than any register has.
-pub const MOST_LANES: usize = 16;
+pub const MAX_LANES: usize = 16;
 
 /// True in every lane.
 #[inline(always)]
-pub fn yes<E: Lanes>() -> E::Mask {
+pub fn all_lanes_true<E: Lanes>() -> E::Mask {
     E::le(E::from_f64(0.0), E::from_f64(0.0))
 }
 
 kernels! {
     /// The elements of several slices, one of each in the lanes of a register.
     pub fn pack [T: Plain, E: Lanes<Cell: AsMut<[T]>>] [T, E] <A>(
-        from: &'k [&'k [T]; MOST_LANES],
+        from: &'k [&'k [T]; MAX_LANES],
         to: &'k mut [E],
     ) {
         let mut cell: E::Cell = Zeroable::zeroed();
@@ -37,7 +37,7 @@ kernels! {
 /// function for all fields of all models.
 pub struct Unpack<'a, 'b, T, E> {
     pub from: &'a [E],
-    pub to: &'a mut [&'b mut [T]; MOST_LANES],
+    pub to: &'a mut [&'b mut [T]; MAX_LANES],
 }
 
 impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, '_, T, E> {
@@ -49,7 +49,7 @@ impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, '_, T, E> {
         let mut begin = 0;
         let mut whole = from.chunks_exact(E::LANES);
         for from in &mut whole {
-            let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
+            let mut tile: [E::Cell; MAX_LANES] = Zeroable::zeroed();
             let Some(tile) = tile.get_mut(..E::LANES) else { return };
             E::transpose(from, tile);
             for (to, cell) in to.iter_mut().zip(&*tile) {

@@ -29,7 +29,7 @@ mod single;
 mod statistics;
 mod worker;
 
-pub(crate) use batch_output::Answer;
+pub(crate) use batch_output::BatchOutput;
 pub use error::{BatchError, Slice};
 pub use integrator::Integrator;
 pub use intervals::Intervals;

@@ -1,7 +1,7 @@
 //! What integrates intervals: one of them alone, and several side by side.
 
 use super::intervals::Interval;
-use super::lanes::{MOST_LANES, Verdict, pack};
+use super::lanes::{MAX_LANES, MaskedResult, pack};
 use crate::error::Error;
 use crate::integrator::Integrator;
 use crate::memory::{WithAdjoint, WithForward, WithHessian};
@@ -54,10 +54,10 @@ pub trait Single:
     /// Whether stages are found by iterations: then start values matter, and those that were found
     /// before.
     #[doc(hidden)]
-    const ITERATES: bool;
+    const IS_ITERATIVE: bool;
     /// Whether there are groups.
     #[doc(hidden)]
-    const TOGETHER: bool;
+    const SUPPORTS_GROUPS: bool;
 
     /// An integrator with a tableau.
     ///
@@ -157,7 +157,7 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
         &mut self,
         intervals: &[&Interval<'_, I::Model, I::Number>],
         given: Option<[&[I::Number]; 2]>,
-        stages: Option<&[&[I::Stages]; MOST_LANES]>,
+        stages: Option<&[&[I::Stages]; MAX_LANES]>,
         reuses_solutions: bool,
     ) -> Result<(), Error>;
     /// The stages of a lane in the last call.
@@ -168,14 +168,14 @@ pub trait Group<I: Single, E: Lanes>: Any + Send + Sync {
     /// What the last call did.
     fn statistics(&self) -> Statistics;
 
-    fn solve(&mut self) -> Verdict<'_, E, Nominal<I::Model, E>>;
-    fn forward(&mut self) -> Verdict<'_, E, Forward<I::Model, E>>;
-    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<I::Model, E>>;
-    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<I::Model, E>>;
-    fn hessian(&mut self) -> Verdict<'_, E, Hessian<I::Model, E>>;
+    fn solve(&mut self) -> MaskedResult<'_, E, Nominal<I::Model, E>>;
+    fn forward(&mut self) -> MaskedResult<'_, E, Forward<I::Model, E>>;
+    fn adjoint(&mut self) -> MaskedResult<'_, E, Adjoint<I::Model, E>>;
+    fn forward_adjoint(&mut self) -> MaskedResult<'_, E, ForwardAdjoint<I::Model, E>>;
+    fn hessian(&mut self) -> MaskedResult<'_, E, Hessian<I::Model, E>>;
 }
 
-/// The group of integrators that take one interval after the other ([`Single::TOGETHER`]): nobody
+/// The group of integrators that take one interval after the other ([`Single::SUPPORTS_GROUPS`]): nobody
 /// asks it for anything.
 pub struct NoGroup;
 
@@ -188,7 +188,7 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
         &mut self,
         _: &[&Interval<'_, I::Model, I::Number>],
         _: Option<[&[I::Number]; 2]>,
-        _: Option<&[&[I::Stages]; MOST_LANES]>,
+        _: Option<&[&[I::Stages]; MAX_LANES]>,
         _: bool,
     ) -> Result<(), Error> {
         Err(Error::NoResult)
@@ -202,23 +202,23 @@ impl<I: Single, E: Lanes> Group<I, E> for NoGroup {
         Statistics::default()
     }
 
-    fn solve(&mut self) -> Verdict<'_, E, Nominal<I::Model, E>> {
+    fn solve(&mut self) -> MaskedResult<'_, E, Nominal<I::Model, E>> {
         Err(Error::NoResult)
     }
 
-    fn forward(&mut self) -> Verdict<'_, E, Forward<I::Model, E>> {
+    fn forward(&mut self) -> MaskedResult<'_, E, Forward<I::Model, E>> {
         Err(Error::NoResult)
     }
 
-    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<I::Model, E>> {
+    fn adjoint(&mut self) -> MaskedResult<'_, E, Adjoint<I::Model, E>> {
         Err(Error::NoResult)
     }
 
-    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<I::Model, E>> {
+    fn forward_adjoint(&mut self) -> MaskedResult<'_, E, ForwardAdjoint<I::Model, E>> {
         Err(Error::NoResult)
     }
 
-    fn hessian(&mut self) -> Verdict<'_, E, Hessian<I::Model, E>> {
+    fn hessian(&mut self) -> MaskedResult<'_, E, Hessian<I::Model, E>> {
         Err(Error::NoResult)
     }
 }
@@ -232,7 +232,7 @@ pub fn gather<M: Dae, T: Plain, E: Lanes<Cell: AsMut<[T]>>>(
     if to.is_empty() {
         return;
     }
-    let mut from: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
+    let mut from: [&[T]; MAX_LANES] = [&[]; MAX_LANES];
     for (from, interval) in from.iter_mut().zip(intervals) {
         *from = field(interval);
     }

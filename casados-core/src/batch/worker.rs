@@ -1,13 +1,13 @@
 //! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a
 //! result for.
 
-use super::batch_output::Answer;
+use super::batch_output::BatchOutput;
 use super::chunk::{BatchTask, IntervalChunk, Sink, try_resize};
 #[cfg(feature = "parallel")]
 use super::error::BatchError;
 use super::group_call::{GroupCache, GroupCall, LaneIntervals};
 use super::intervals::{Interval, vector};
-use super::lanes::MOST_LANES;
+use super::lanes::MAX_LANES;
 use super::single::Single;
 use super::statistics::BatchStatistics;
 use crate::error::Error;
@@ -29,7 +29,7 @@ pub fn default_threads() -> usize {
 
 /// Gives every thread as many groups as every other.
 #[cfg(feature = "parallel")]
-pub fn run_parallel<I: Single, R: Answer<I::Model, I::Number>>(
+pub fn run_parallel<I: Single, R: BatchOutput<I::Model, I::Number>>(
     task: &BatchTask<'_, I>,
     workers: &mut Vec<Worker<I>>,
     threads: usize,
@@ -97,7 +97,7 @@ impl<I: Single> Worker<I> {
         }
     }
 
-    pub fn run<R: Answer<I::Model, I::Number>>(
+    pub fn run<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,
         mut chunk: IntervalChunk<'_, I, R>,
@@ -110,7 +110,7 @@ impl<I: Single> Worker<I> {
 
     /// Shows results to `sink`, up to the first interval that fails. There is memory for those of
     /// one group, or of one interval where no group is differentiated.
-    pub fn for_each_result<R: Answer<I::Model, I::Number>>(
+    pub fn for_each_result<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,
         mut chunk: IntervalChunk<'_, I, R>,
@@ -132,13 +132,13 @@ impl<I: Single> Worker<I> {
 
     /// The intervals of one group; those with a result are shown to `sink`.
     #[inline(never)]
-    fn compute_group<R: Answer<I::Model, I::Number>>(
+    fn compute_group<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,
         mut chunk: IntervalChunk<'_, I, R>,
         sink: Sink<'_, R>,
     ) {
-        let mut intervals = [None; MOST_LANES];
+        let mut intervals = [None; MAX_LANES];
         for (i, (interval, status)) in intervals.iter_mut().zip(chunk.status.iter_mut()).enumerate() {
             match task.inputs.interval(chunk.first_interval + i) {
                 Ok(good) => *interval = Some(good),
@@ -147,7 +147,7 @@ impl<I: Single> Worker<I> {
         }
         let count = intervals.iter().flatten().count();
         let has_several = count > 1;
-        let (mut done, mut solved) = ([false; MOST_LANES], [false; MOST_LANES]);
+        let (mut done, mut solved) = ([false; MAX_LANES], [false; MAX_LANES]);
         if has_several && task.lanes > 1 {
             let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut chunk);
             let group_call = GroupCall { task, groups, statistics, intervals: &intervals, chunk: share };
@@ -190,12 +190,12 @@ impl<I: Single> Worker<I> {
         task: &BatchTask<'_, I>,
         intervals: &LaneIntervals<'_, I>,
         chunk: &IntervalChunk<'_, I, R>,
-    ) -> Option<[bool; MOST_LANES]> {
+    ) -> Option<[bool; MAX_LANES]> {
         let Self { groups, stages, end_states: ends, statistics, .. } = self;
         let (count, steps) = (chunk.status.len(), task.options.steps);
-        try_resize(stages, MOST_LANES.saturating_mul(steps), Zeroable::zeroed()).ok()?;
-        try_resize(ends, MOST_LANES, Zeroable::zeroed()).ok()?;
-        let mut has_stages = [false; MOST_LANES];
+        try_resize(stages, MAX_LANES.saturating_mul(steps), Zeroable::zeroed()).ok()?;
+        try_resize(ends, MAX_LANES, Zeroable::zeroed()).ok()?;
+        let mut has_stages = [false; MAX_LANES];
         for (to, from) in stages.iter_mut().zip(chunk.stages.iter()) {
             copy_into(to, from);
         }
@@ -214,7 +214,7 @@ impl<I: Single> Worker<I> {
     }
 
     /// One interval; its stages may be known.
-    fn compute_single<R: Answer<I::Model, I::Number>>(
+    fn compute_single<R: BatchOutput<I::Model, I::Number>>(
         &mut self,
         task: &BatchTask<'_, I>,
         interval: &Interval<'_, I::Model, I::Number>,
@@ -240,7 +240,7 @@ impl<I: Single> Worker<I> {
             _ => single.start(None, false)?,
         }
         if let Some(result) = chunk.results.get_mut(result_index) {
-            result.alone(single, interval)?;
+            result.compute_single(single, interval)?;
         }
         if let (Some(stages), Some(has_stages)) = (stages, has_stages) {
             single.stages(stages)?;

@@ -3,7 +3,7 @@
 
 use super::dependence::{self, Dimensions};
 use super::sparsity::Dependence;
-use crate::ocp::{Constraints, Cost, DerivativeEntry, Dynamics, Formulation, Origin, Problem};
+use crate::ocp::{Constraints, Cost, DerivativeEntry, Dynamics, DynamicsStructure, Formulation, Problem};
 use crate::shape::Shape;
 use crate::structure::Pattern;
 
@@ -44,15 +44,15 @@ impl Stage {
     }
 
     /// The end of the interval.
-    fn add_interval_end(&mut self, origin: Origin, dimensions: Dimensions, controls: usize) {
+    fn add_interval_end(&mut self, origin: DynamicsStructure, dimensions: Dimensions, controls: usize) {
         let Dimensions { nx, nz, .. } = dimensions;
         match origin {
-            Origin::Unknown => {
+            DynamicsStructure::Unknown => {
                 (0..self.next).for_each(|row| self.pattern.jacobian.fill(row));
                 (0..nx + controls).for_each(|row| self.pattern.interval.fill(row));
                 (0..nz).for_each(|row| self.variables.fill(nx + controls + row));
             }
-            Origin::Equations(jacobian, hessian) => {
+            DynamicsStructure::Equations(jacobian, hessian) => {
                 let on = dependence::variables(dimensions, jacobian, None);
                 for row in 0..nx {
                     self.pattern.jacobian.add_row(row, &on, nx + row);
@@ -64,7 +64,7 @@ impl Stage {
                     self.pattern.interval.add_row_products(&on, one, other);
                 }
             }
-            Origin::Map(jacobian, hessian) => self.map(jacobian, hessian, dimensions, controls),
+            DynamicsStructure::Map(jacobian, hessian) => self.map(jacobian, hessian, dimensions, controls),
         }
     }
 
@@ -103,7 +103,7 @@ pub fn stage_pattern<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: 
         stage.add(next + rows, |visit| terminal_cost.visit_sparsity(visit));
     } else {
         let dimensions = Dimensions { nx, nz, nw: P::Shape::NW };
-        stage.add_interval_end(<P::Dynamics as Dynamics<f64>>::ORIGIN, dimensions, nu);
+        stage.add_interval_end(<P::Dynamics as Dynamics<f64>>::STRUCTURE, dimensions, nu);
         stage.add(next, |visit| path.visit_sparsity(visit));
         stage.add(next + rows, |visit| stage_cost.visit_sparsity(visit));
     }

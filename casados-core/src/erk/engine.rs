@@ -20,7 +20,7 @@ use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
 /// What a call answers, and the lanes for which it is good: those all of whose values were finite.
-pub(crate) type Verdict<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
+pub(crate) type MaskedResult<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
 
 /// The base of a call with derivatives, and where these are.
 type Differentiated<'a, M, E, const S: usize> =
@@ -103,7 +103,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         &mut self,
         grid: &Grid<E>,
         integrand: &mut impl StageIntegrand<M, E>,
-    ) -> Verdict<'_, E, Nominal<M, E>> {
+    ) -> MaskedResult<'_, E, Nominal<M, E>> {
         integrand.reset();
         let workspace = W::nominal(&mut self.workspace)?;
         let outcome = workspace.integrate(&self.scheme, grid, integrand);
@@ -120,7 +120,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         forward_sweep: &mut impl ForwardSweep<M, E, S>,
         integrand: &mut impl StageIntegrand<M, E>,
-    ) -> Verdict<'_, E, Forward<M, E>>
+    ) -> MaskedResult<'_, E, Forward<M, E>>
     where
         W: WithForward,
     {
@@ -133,7 +133,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         lambda: &[E],
         forward_sweep: &mut impl ForwardSweep<M, E, S>,
-    ) -> Verdict<'_, E, ForwardAdjoint<M, E>>
+    ) -> MaskedResult<'_, E, ForwardAdjoint<M, E>>
     where
         W: WithForward,
     {
@@ -184,7 +184,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         lambda: &[E],
         integrand: &mut impl StageIntegrand<M, E>,
-    ) -> Verdict<'_, E, Adjoint<M, E>> {
+    ) -> MaskedResult<'_, E, Adjoint<M, E>> {
         integrand.reset();
         let workspace = W::nominal(&mut self.workspace)?;
         let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
@@ -210,7 +210,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         lambda: &[E],
         forward_sweep: &mut impl ForwardSweep<M, E, S>,
         integrand: &mut impl StageIntegrand<M, E>,
-    ) -> Verdict<'_, E, Hessian<M, E>>
+    ) -> MaskedResult<'_, E, Hessian<M, E>>
     where
         W: WithHessian,
     {

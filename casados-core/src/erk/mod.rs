@@ -33,7 +33,7 @@ pub(crate) use step::{StagePoint, StepRecord, UnitStride};
 // What computes a batch.
 #[cfg(feature = "alloc")]
 pub(crate) use {
-    engine::{Engine, Verdict},
+    engine::{Engine, MaskedResult},
     panels::ColumnPanels,
     stage_integrand::NoIntegrand,
 };

@@ -35,7 +35,10 @@ pub(crate) use kernel::{
 pub use newton_matrix::{Factors, kinematic, slot};
 pub(crate) use sparse_lu::{
     factor::PlannedFactors,
-    solve::{Down, TransposedDown, TransposedUp, Up, Visitor, solve_triangular_pair},
+    solve::{
+        BackSubstitution, ForwardSubstitution, TransposedBackSubstitution, TransposedForwardSubstitution,
+        Visitor, solve_triangular_pair,
+    },
 };
 pub(crate) use transformed::{basis::Eigenbasis, shared_factor::SharedFactors};
 #[cfg(feature = "alloc")]

@@ -122,7 +122,7 @@ pub use formulation::functions::dynamics::{
 };
 pub use formulation::functions::least_squares::LeastSquaresCost;
 #[cfg(feature = "casadi")]
-pub(crate) use formulation::functions::sparsity::{DerivativeEntry, Origin};
+pub(crate) use formulation::functions::sparsity::{DerivativeEntry, DynamicsStructure};
 pub use formulation::horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use formulation::instance::HeapOcp;

@@ -5,7 +5,7 @@ mod derivatives;
 mod settings;
 
 use crate::adaptive::consistent::Consistent;
-use crate::adaptive::engine::{Engine, Kind, MethodStepDifferentiator};
+use crate::adaptive::engine::{Engine, MethodState, MethodStepDifferentiator};
 use crate::adaptive::options::{AdaptiveOptions, check_atol, check_rtol};
 use crate::adaptive::point::write_inputs;
 use crate::adaptive::sensitivities::{RecordedSteps, SensitivityMemory};
@@ -55,7 +55,7 @@ use core::marker::PhantomData;
 /// assert!((cart.dense(11.0)?.x - vector![1.0, 2.0]).norm() < 1e-9);
 /// # Ok::<(), casados::Error>(())
 /// ```
-pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
+pub struct Integrator<M: Dae, B: MethodState<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
     pub(super) workspace: Box<Workspace<M, T>>,
     pub(super) consistent: Consistent<M, T>,
@@ -76,7 +76,7 @@ pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
 }
 
 /// Steps that later calls repeat.
-struct FrozenSteps<M: Dae, B: Kind<M, T>, T: Real> {
+struct FrozenSteps<M: Dae, B: MethodState<M, T>, T: Real> {
     /// Their interval.
     span: Span<T>,
     /// Repeats the steps without derivatives. A function pointer: programs that freeze no steps do

@@ -5,9 +5,9 @@ pub(super) mod explicit;
 mod implicit;
 mod kernels;
 
-use crate::adaptive::order::Family;
+use crate::adaptive::order::MethodFamily;
 use crate::adaptive::replay::{OneMethod, ThreeMethods};
-use crate::adaptive::stages::Stages;
+use crate::adaptive::stages::StageSolver;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
@@ -36,15 +36,15 @@ use alloc::boxed::Box;
 #[derive(Clone, Copy, Debug)]
 pub struct Radau;
 
-impl Family for Radau {
-    const LEVELS: usize = 3;
+impl MethodFamily for Radau {
+    const ORDER_COUNT: usize = 3;
     const ENDS_ON_STAGE: bool = true;
-    type Replays<M: Dae, T: Real> = ThreeMethods<
+    type Differentiator<M: Dae, T: Real> = ThreeMethods<
         OneMethod<M, RadauIIA<3>, T, 3>,
         OneMethod<M, RadauIIA<5>, T, 5>,
         OneMethod<M, RadauIIA<7>, T, 7>,
     >;
-    fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
+    fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn StageSolver<M, T> + Send + Sync>, Error> {
         match level {
             0 => RadauIIA::<3>::open(0),
             1 => RadauIIA::<5>::open(0),
@@ -55,11 +55,11 @@ impl Family for Radau {
 
 macro_rules! single {
     ($($method:ident: $stages:literal, $groups:literal, $ends_on_stage:literal);*) => {
-        $(impl Family for $method<$stages> {
-            const LEVELS: usize = 1;
+        $(impl MethodFamily for $method<$stages> {
+            const ORDER_COUNT: usize = 1;
             const ENDS_ON_STAGE: bool = $ends_on_stage;
-            type Replays<M: Dae, T: Real> = OneMethod<M, Self, T, $stages>;
-            fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
+            type Differentiator<M: Dae, T: Real> = OneMethod<M, Self, T, $stages>;
+            fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn StageSolver<M, T> + Send + Sync>, Error> {
                 // The lanes of all eigenvalues, padded to registers; stages in groups of four.
                 let tableau = <Self as Method<$stages>>::TABLEAU;
                 Ok(Box::new(collocation::Collocation::<M, T, $stages, $groups>::new(tableau)?))

@@ -73,7 +73,7 @@ impl<M: Dae, T: Real> RecordedSteps<'_, M, T> {
         state: &mut B::State,
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
-            &mut B::Replays,
+            &mut B::Differentiator,
             &AcceptedStep<'_, M, T>,
             usize,
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,

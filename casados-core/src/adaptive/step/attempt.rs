@@ -22,7 +22,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub(super) fn choose_order<B: Family>(
+    pub(super) fn choose_order<B: MethodFamily>(
         &mut self,
         levels: &mut Orders<M, T>,
         state: &mut StepState<T>,
@@ -30,7 +30,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let ratio = state.last_step_size.map(|before| (state.h / before).to_f64());
         if state.matrix_update >= MatrixUpdate::Factors {
             let level = state.order.order_index;
-            let next = state.order.select_order(&state.newton, ratio.unwrap_or(1.0), B::LEVELS);
+            let next = state.order.select_order(&state.newton, ratio.unwrap_or(1.0), B::ORDER_COUNT);
             if next != level {
                 levels.transfer_last_step::<B>(level, next)?;
                 state.order.set_order(next);
@@ -54,16 +54,16 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// A Jacobian that is not finite; matrices that remain singular.
-    pub(super) fn prepare_factors<B: Family>(
+    pub(super) fn prepare_factors<B: MethodFamily>(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         state: &mut StepState<T>,
     ) -> Result<bool, Error> {
         if state.matrix_update == MatrixUpdate::Jacobian {
             self.evaluate_midpoint_jacobian(stages, state)?;
         }
         if state.matrix_update < MatrixUpdate::Factors {
-            return Ok(!state.may_increase_order(B::LEVELS));
+            return Ok(!state.may_increase_order(B::ORDER_COUNT));
         }
         let mut factored = self.factor_matrix(stages, state);
         if state.verifies_pivots
@@ -96,7 +96,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// Factorises the matrix, by the plan or with pivoting.
-    fn factor_matrix(&mut self, stages: &mut dyn Stages<M, T>, state: &StepState<T>) -> Result<bool, usize> {
+    fn factor_matrix(
+        &mut self,
+        stages: &mut dyn StageSolver<M, T>,
+        state: &StepState<T>,
+    ) -> Result<bool, usize> {
         stages.set_pivoted(state.uses_pivoting);
         self.statistics.factorizations += 1;
         stages.factor(&self.workspace.jacobian, state.h)
@@ -107,18 +111,20 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// factors are tested before use.
     pub(super) fn retry_with_pivoting(
         &mut self,
-        stages: &dyn Stages<M, T>,
+        stages: &dyn StageSolver<M, T>,
         state: &mut StepState<T>,
         attempt: &Result<f64, NewtonFailure>,
     ) -> bool {
-        let may_be = match attempt {
+        let may_be_available = match attempt {
             Ok(error) => *error >= 1.0,
             Err(failure) => matches!(
                 failure,
                 NewtonFailure::TooSlow(_) | NewtonFailure::Diverges | NewtonFailure::NotFinite
             ),
         };
-        if !may_be || state.uses_pivoting || stages.are_factors_accurate(&self.workspace.step_context(state))
+        if !may_be_available
+            || state.uses_pivoting
+            || stages.are_factors_accurate(&self.workspace.step_context(state))
         {
             return false;
         }
@@ -137,7 +143,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// A value that is not finite.
     fn evaluate_midpoint_jacobian(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         state: &mut StepState<T>,
     ) -> Result<(), Error> {
         state.jacobian_is_current = state.needs_second_estimate();
@@ -163,7 +169,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`NewtonFailure`]
     pub(super) fn attempt_step(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         state: &mut StepState<T>,
     ) -> Result<f64, NewtonFailure> {
         let Workspace { point, u, parameters, tolerances, .. } = &*self.workspace;
@@ -200,7 +206,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`NewtonFailure::Discontinuity`], and a value that is not finite.
     fn reject_across_branches(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         state: &StepState<T>,
         error: f64,
     ) -> Result<(), NewtonFailure> {
@@ -233,10 +239,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Those of `after`; no consistent `(ẋ, z)` at the end.
     pub(super) fn accept_step(
         &mut self,
-        stages: &mut dyn Stages<M, T>,
+        stages: &mut dyn StageSolver<M, T>,
         state: &mut StepState<T>,
         factor: f64,
-        after: After<'_, M, T>,
+        after: AfterStep<'_, M, T>,
     ) -> Result<bool, Error> {
         let (t, h, nx) = (state.t, state.h, M::Shape::NX);
         self.statistics.steps += 1;

@@ -35,7 +35,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     /// [`Error::StepSizeUnderflow`], with the equation and unknown that do not converge.
     pub(super) fn check_convergence(
         &self,
-        stages: &dyn Stages<M, T>,
+        stages: &dyn StageSolver<M, T>,
         state: &StepState<T>,
         span: Span<T>,
     ) -> Result<(), Error> {

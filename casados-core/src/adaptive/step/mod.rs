@@ -9,9 +9,9 @@ mod state;
 use crate::adaptive::consistent::Consistent;
 use crate::adaptive::newton_monitor::{NewtonFailure, THET};
 use crate::adaptive::options::AdaptiveOptions;
-use crate::adaptive::order::{Family, Orders, interpolate_step};
+use crate::adaptive::order::{MethodFamily, Orders, interpolate_step};
 use crate::adaptive::point::ModelPoint;
-use crate::adaptive::stages::{Stages, StepContext};
+use crate::adaptive::stages::{StageSolver, StepContext};
 use crate::adaptive::statistics::AdaptiveStatistics;
 use crate::adaptive::tape::Tape;
 use crate::adaptive::tolerances::Tolerances;
@@ -102,7 +102,7 @@ pub struct Run<'a, M: Dae, T: Real> {
 }
 
 /// A function that is called after each accepted step, with memory for dense output.
-pub type After<'a, M, T> =
+pub type AfterStep<'a, M, T> =
     &'a mut dyn FnMut(&mut AcceptedStepOutput<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>;
 
 /// Dense output.
@@ -135,7 +135,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// Sets the tolerances of a method with this number of stages.
-    fn set_estimator_tolerances<B: Family>(&mut self, stages: usize) {
+    fn set_estimator_tolerances<B: MethodFamily>(&mut self, stages: usize) {
         self.workspace.tolerances.set_estimator_tolerances(stages, B::ENDS_ON_STAGE);
         self.update_scales();
     }
@@ -150,12 +150,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ///
     /// # Errors
     /// No consistent start; the errors that end a run.
-    pub fn integrate<B: Family>(
+    pub fn integrate<B: MethodFamily>(
         &mut self,
         levels: &mut Orders<M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
-        after: After<'_, M, T>,
+        after: AfterStep<'_, M, T>,
     ) -> Result<(), Error> {
         self.prepare_run(x0, span)?;
         self.begin_sensitivities(x0, span.start)?;

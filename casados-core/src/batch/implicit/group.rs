@@ -4,7 +4,7 @@
 //! their equations; lanes never mix, so that one that fails takes nobody with it.
 
 use crate::batch::intervals::Interval;
-use crate::batch::lanes::{MOST_LANES, Unpack, Verdict, pack, yes};
+use crate::batch::lanes::{MAX_LANES, MaskedResult, Unpack, all_lanes_true, pack};
 use crate::batch::single::{self, gather};
 use crate::error::Error;
 use crate::irk::{
@@ -50,7 +50,7 @@ pub struct Group<M: Dae, E: Lanes, const S: usize> {
 }
 
 /// What a pass over the steps works in.
-struct Pass<'a, M: Dae, E: Lanes, const S: usize> {
+struct StepPass<'a, M: Dae, E: Lanes, const S: usize> {
     options: &'a Options,
     coefficients: &'a Coefficients<E, S>,
     statistics: &'a mut Statistics,
@@ -71,7 +71,7 @@ macro_rules! pass {
             _ if $group.given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
         };
-        Pass {
+        StepPass {
             options: &$group.options,
             coefficients: &$group.coefficients,
             statistics: &mut $group.statistics,
@@ -82,7 +82,7 @@ macro_rules! pass {
     }};
 }
 impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
-    fn differentiate(&mut self, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+    fn differentiate(&mut self, adjoint: bool) -> MaskedResult<'_, E, ForwardAdjoint<M, E>> {
         let mut step_pass = pass!(self);
         let ForwardMemory { result, pass: forward, .. } = <Heap>::forward(&mut self.forward)?;
         let count = step_pass.steps.len();
@@ -136,7 +136,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         &mut self,
         intervals: &[&Interval<'_, M, T>],
         given: Option<[&[T]; 2]>,
-        stages: Option<&[&[ArrayK<M, [T; S]>]; MOST_LANES]>,
+        stages: Option<&[&[ArrayK<M, [T; S]>]; MAX_LANES]>,
         solved: bool,
     ) -> Result<(), Error> {
         let count = self.options.steps;
@@ -152,7 +152,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         self.given = given.is_some();
         let (xdot, z) = work.start_values.as_mut().split_at_mut(M::Shape::NX);
         for (given, to) in given.iter().flatten().zip([xdot, z]) {
-            pack(&[*given; MOST_LANES], to);
+            pack(&[*given; MAX_LANES], to);
         }
         gather(intervals, <Heap>::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
         // All of them have some, or none.
@@ -173,7 +173,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
 
     fn copy_stages(&mut self, lane: usize, stages: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error> {
         for (y, step) in stages.iter_mut().zip(<Heap>::tape(&mut self.steps, self.options.steps)?) {
-            let mut to: [&mut [T]; MOST_LANES] = Default::default();
+            let mut to: [&mut [T]; MAX_LANES] = Default::default();
             if let Some(to) = to.get_mut(lane) {
                 *to = y.as_mut().as_flattened_mut();
             }
@@ -186,22 +186,22 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         self.statistics
     }
 
-    fn solve(&mut self) -> Verdict<'_, E, Nominal<M, E>> {
+    fn solve(&mut self) -> MaskedResult<'_, E, Nominal<M, E>> {
         let mut step_pass = pass!(self);
-        let converged = step_pass.integrate(&mut [], |_, _, _, _, _| yes::<E>());
+        let converged = step_pass.integrate(&mut [], |_, _, _, _, _| all_lanes_true::<E>());
         Ok((converged, &step_pass.work.result))
     }
 
-    fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
+    fn forward(&mut self) -> MaskedResult<'_, E, Forward<M, E>> {
         let (converged, result) = self.differentiate(false)?;
         Ok((converged, &result.forward))
     }
 
-    fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+    fn forward_adjoint(&mut self) -> MaskedResult<'_, E, ForwardAdjoint<M, E>> {
         self.differentiate(true)
     }
 
-    fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
+    fn adjoint(&mut self) -> MaskedResult<'_, E, Adjoint<M, E>> {
         let mut step_pass = pass!(self);
         let adjoint = <Heap>::nominal(&mut self.adjoint)?;
         let lambda = <Heap>::nominal(&mut self.lambda)?;
@@ -211,10 +211,10 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             if n + 1 == count {
                 pass.linearize(None, n, step, exact);
             }
-            yes::<E>()
+            all_lanes_true::<E>()
         });
         adjoint.backward.set_seeds(lambda.as_ref(), &[]);
-        let Pass { steps, coefficients, work, statistics, .. } = step_pass;
+        let StepPass { steps, coefficients, work, statistics, .. } = step_pass;
         for (n, step) in steps.iter().enumerate().rev() {
             if n + 1 < count {
                 work.linearize_planned(coefficients, None, n, step, false, statistics);
@@ -226,7 +226,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         Ok((converged, &adjoint.result))
     }
 
-    fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
+    fn hessian(&mut self) -> MaskedResult<'_, E, Hessian<M, E>> {
         let mut step_pass = pass!(self);
         let forward = &mut <Heap>::forward(&mut self.forward)?.pass;
         let HessianMemory { result, pass: hessian } = <Heap>::hessian(&mut self.hessian)?;
@@ -235,7 +235,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         let count = step_pass.steps.len();
         let records = <Heap>::hessian_tape(&mut self.tape, count)?;
         let mut converged = step_pass.integrate(records, |pass, n, step, exact, record| {
-            let Some(record) = record else { return yes::<E>() };
+            let Some(record) = record else { return all_lanes_true::<E>() };
             let at = StepIndex { n, count, prefetch_output: false };
             let last = at.is_last();
             let (linear, _) = record.linearization_and_rows();
@@ -262,7 +262,7 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
             )
         });
         let finite = forward.finish_unchecked::<Pivoting>(&step_pass.work.result, &mut result.first.forward);
-        let Pass { steps, coefficients, work, .. } = step_pass;
+        let StepPass { steps, coefficients, work, .. } = step_pass;
         hessian.set_seeds(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
             let stored_linearization = record.stored_linearization(n + 1 == count);
@@ -282,14 +282,14 @@ impl<M: Dae, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> StepPass<'_, M, E, S> {
     /// The steps of the interval, with `after` called after each, with what is remembered of it, if
     /// anything is; whether all went well, lane by lane.
     fn integrate(
         &mut self,
         records: &mut [HessianStep<M, E, S>],
         mut after_step: impl FnMut(
-            &mut Pass<'_, M, E, S>,
+            &mut StepPass<'_, M, E, S>,
             usize,
             &Step<M, E, S>,
             bool,
@@ -297,7 +297,7 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         ) -> E::Mask,
     ) -> E::Mask {
         self.work.begin_call();
-        let (mut converged, count) = (yes::<E>(), self.steps.len());
+        let (mut converged, count) = (all_lanes_true::<E>(), self.steps.len());
         for n in 0..count {
             let Self { options, coefficients, statistics, work, steps, from } = self;
             let (earlier_steps, rest) = steps.split_at_mut(n);
@@ -322,8 +322,14 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
                 factors_at_solution = newton_result.factors_at_solution;
             }
             work.advance(coefficients, options.compensated, step, n, count);
-            let mut step_pass =
-                Pass { options, coefficients, statistics, work, steps: &mut [], from: InitialGuess::Zero };
+            let mut step_pass = StepPass {
+                options,
+                coefficients,
+                statistics,
+                work,
+                steps: &mut [],
+                from: InitialGuess::Zero,
+            };
             converged = E::and(
                 converged,
                 after_step(&mut step_pass, n, step, factors_at_solution, record.first_mut()),

@@ -16,15 +16,15 @@ use crate::tableau::{Method, Tableau};
 
 /// Integrators of a memory, with the groups that it has.
 macro_rules! single {
-    ([$M:ident, $S:ident] $memory:ty { type Group<$E:ident> = $group:ty; const TOGETHER = $together:expr; }) => {
+    ([$M:ident, $S:ident] $memory:ty { type Group<$E:ident> = $group:ty; const SUPPORTS_GROUPS = $together:expr; }) => {
         impl<$M: Dae, B, const $S: usize, T: Real> Single for Integrator<M, B, S, T, $memory> {
             type Method = B;
             type Tableau = Tableau<S>;
             type Stages = ArrayK<M, [T; S]>;
             type Group<$E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>> = $group;
 
-            const ITERATES: bool = true;
-            const TOGETHER: bool = $together;
+            const IS_ITERATIVE: bool = true;
+            const SUPPORTS_GROUPS: bool = $together;
 
             fn of(options: &Options, tableau: &Tableau<S>) -> Result<Self, Error> {
                 Self::build(*options, *tableau)
@@ -94,10 +94,10 @@ macro_rules! single {
 // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
 single!([M, S] Heap {
     type Group<E> = Group<M, E, S>;
-    const TOGETHER = M::STRUCTURE.elimination.has_plan();
+    const SUPPORTS_GROUPS = M::STRUCTURE.elimination.has_plan();
 });
 // A group would have kernels of its own to compile.
 single!([M, S] Shared {
     type Group<E> = NoGroup;
-    const TOGETHER = false;
+    const SUPPORTS_GROUPS = false;
 });

@@ -11,8 +11,8 @@ use crate::irk::directions::{Directions, L1_CACHE_BYTES, panel, panel_mut, panel
 use crate::irk::kinematic::KinematicPanel;
 use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::linalg::{
-    Arithmetic, Block, Down, Factors, Kernel, PlannedFactors, Prefetch, Up, dispatch, is_large_plan,
-    is_unrolled, kernels, minus_ha, solve_triangular_pair,
+    Arithmetic, BackSubstitution, Block, Factors, ForwardSubstitution, Kernel, PlannedFactors, Prefetch,
+    dispatch, is_large_plan, is_unrolled, kernels, minus_ha, solve_triangular_pair,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -312,7 +312,12 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
         let minus_weights = &minus_weights::<E, W>(column, self.with_second_weights);
         if self.part == SweepPart::All {
             if const { Self::sums_after_solve::<A>() } {
-                solve_triangular_pair::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
+                solve_triangular_pair::<A, M, E, [E; W], S, W, ForwardSubstitution, BackSubstitution>(
+                    self.factors,
+                    dy,
+                    0,
+                    &mut (),
+                );
             } else {
                 let ahead = match &self.result {
                     Some(to) if self.prefetch_output => Prefetch(to.next_columns::<W>(column)),
@@ -320,7 +325,12 @@ impl<M: Plan, E: Lanes, D: Directions<E>, G: DerivativeOutput<E>, F: Fallback, c
                 };
                 let sums = &mut *self.sums;
                 let visitor = &mut ChecksumVisitor { sums, minus_weights, prefetch: ahead };
-                solve_triangular_pair::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
+                solve_triangular_pair::<A, M, E, [E; W], S, W, ForwardSubstitution, BackSubstitution>(
+                    self.factors,
+                    dy,
+                    0,
+                    visitor,
+                );
             }
         }
         self.process_solution::<A, W>(column, minus_weights, shared);

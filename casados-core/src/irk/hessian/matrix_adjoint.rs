@@ -22,8 +22,8 @@ use crate::irk::forward::sweep::SweepPart;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, condense};
 use crate::irk::workspace::{Linearization, StageWorkspace};
 use crate::linalg::{
-    Arithmetic, Block, Factors, Kernel, PanelRow, PlannedFactors, Prefetch, TransposedDown, TransposedUp,
-    dispatch, is_large_plan, minus_ha, solve_triangular_pair,
+    Arithmetic, Block, Factors, Kernel, PanelRow, PlannedFactors, Prefetch, TransposedBackSubstitution,
+    TransposedForwardSubstitution, dispatch, is_large_plan, minus_ha, solve_triangular_pair,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -231,12 +231,16 @@ impl<M: Plan, E: Lanes, const S: usize> PanelKernel<'_, M, E, S> {
             let own = self.prefetch.get(column * plan.nx()..).unwrap_or_default();
             let own = own.get(..W * plan.nx()).unwrap_or(own);
             let ahead = &mut Prefetch(own);
-            solve_triangular_pair::<A, M, E, [E; W], S, W, TransposedDown, TransposedUp>(
-                self.factors,
-                m,
-                0,
-                ahead,
-            );
+            solve_triangular_pair::<
+                A,
+                M,
+                E,
+                [E; W],
+                S,
+                W,
+                TransposedForwardSubstitution,
+                TransposedBackSubstitution,
+            >(self.factors, m, 0, ahead);
         }
         if self.part != SweepPart::RightHandSide {
             condense::<A, M, E, S, W, RECONSTRUCT_TRANSPOSED>(

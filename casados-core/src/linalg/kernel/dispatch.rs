@@ -10,7 +10,7 @@ use super::arithmetic::Arithmetic;
 use super::arithmetic::Fused;
 use super::arithmetic::Unfused;
 #[cfg(target_arch = "x86_64")]
-use crate::scalar::lanes::{Level, level, may_be};
+use crate::scalar::lanes::{Level, level, may_be_available};
 #[cfg(target_arch = "x86_64")]
 use core::{marker::PhantomData, mem::ManuallyDrop};
 
@@ -145,18 +145,23 @@ impl<K: Kernel> EntryPoints<K> {
         if K::WIDE { compiled::avx2::run::<K, false> } else { compiled::avx2::run::<K, true> };
     /// Short kernels are faster without AVX-512.
     const AVX512_ENTRY: Option<EntryPoint<K>> =
-        if Self::ARE_FAST_SCALARS && K::WIDE && may_be(Level::Avx512) { Some(Self::IN_AVX512) } else { None };
-    const AVX2_ENTRY: Option<EntryPoint<K>> =
-        if Self::ARE_FAST_SCALARS && (may_be(Level::Avx2) || !K::WIDE && may_be(Level::Avx512)) {
-            Some(Self::IN_AVX2)
+        if Self::ARE_FAST_SCALARS && K::WIDE && may_be_available(Level::Avx512) {
+            Some(Self::IN_AVX512)
         } else {
             None
         };
+    const AVX2_ENTRY: Option<EntryPoint<K>> = if Self::ARE_FAST_SCALARS
+        && (may_be_available(Level::Avx2) || !K::WIDE && may_be_available(Level::Avx512))
+    {
+        Some(Self::IN_AVX2)
+    } else {
+        None
+    };
     /// Where the machine has neither, or the kernel. Numbers that are registers, which are aligned
     /// to themselves, need what these are made of. Where the build names more than every machine
     /// has, nobody gets here.
     const FALLBACK: EntryPoint<K> = match (align_of::<K::Number>(), Self::AVX2_ENTRY, Self::AVX512_ENTRY) {
-        (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be(Level::Base) => run,
+        (0..32, Some(run), _) | (0..32, _, Some(run)) if !may_be_available(Level::Base) => run,
         (0..32, ..) => compiled::base::run::<K>,
         (32, ..) => Self::IN_AVX2,
         _ => Self::IN_AVX512,

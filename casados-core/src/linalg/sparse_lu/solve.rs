@@ -27,7 +27,11 @@ pub fn solve<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve::<M, E, R, Down, Up, S> { factors, rows, systems: PhantomData });
+    dispatch(Solve::<M, E, R, ForwardSubstitution, BackSubstitution, S> {
+        factors,
+        rows,
+        systems: PhantomData,
+    });
 }
 
 /// Solves `Mᵀ X = R` in place.
@@ -35,7 +39,11 @@ pub fn solve_transposed<M: Plan, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve::<M, E, R, TransposedDown, TransposedUp, S> { factors, rows, systems: PhantomData });
+    dispatch(Solve::<M, E, R, TransposedForwardSubstitution, TransposedBackSubstitution, S> {
+        factors,
+        rows,
+        systems: PhantomData,
+    });
 }
 
 /// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
@@ -46,8 +54,14 @@ struct Solve<'a, M, E, R, First, Second, const S: usize> {
     systems: PhantomData<(First, Second)>,
 }
 
-impl<M: Plan, E: Field + Plain, R: Array<E>, First: System, Second: System, const S: usize> Kernel
-    for Solve<'_, M, E, R, First, Second, S>
+impl<
+    M: Plan,
+    E: Field + Plain,
+    R: Array<E>,
+    First: TriangularSystem,
+    Second: TriangularSystem,
+    const S: usize,
+> Kernel for Solve<'_, M, E, R, First, Second, S>
 {
     type Number = E;
     type Output = ();
@@ -109,8 +123,8 @@ pub fn solve_triangular_pair<
     R: Array<E>,
     const S: usize,
     const W: usize,
-    First: System,
-    Second: System,
+    First: TriangularSystem,
+    Second: TriangularSystem,
 >(
     factors: PlannedFactors<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -144,7 +158,7 @@ pub struct Substitution<'a, M, E, R, V, const S: usize, const W: usize> {
 }
 
 /// A triangular system.
-pub trait System {
+pub trait TriangularSystem {
     /// What is done at a pivot.
     fn at<
         A: Arithmetic,
@@ -163,8 +177,15 @@ pub trait System {
 /// A way through a system.
 struct SystemVisitor<Y, T>(T, PhantomData<Y>);
 
-impl<Y: System, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
-    PivotVisitor for SystemVisitor<Y, Substitution<'_, M, E, R, V, S, W>>
+impl<
+    Y: TriangularSystem,
+    M: Plan,
+    E: Field + Plain,
+    R: Array<E>,
+    V: Visitor<E, S, W>,
+    const S: usize,
+    const W: usize,
+> PivotVisitor for SystemVisitor<Y, Substitution<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
@@ -183,7 +204,7 @@ macro_rules! system {
         $(#[$text])*
         pub struct $name;
 
-        impl System for $name {
+        impl TriangularSystem for $name {
             #[inline(always)]
             fn at<A: Arithmetic, M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
                 substitution: &mut Substitution<'_, M, E, R, V, S, W>,
@@ -197,19 +218,19 @@ macro_rules! system {
 
 system!(
     /// `I + L`
-    Down: down
+    ForwardSubstitution: down
 );
 system!(
     /// `P + U`
-    Up: up
+    BackSubstitution: up
 );
 system!(
     /// `(P + U)ᵀ`
-    TransposedDown: transposed_down
+    TransposedForwardSubstitution: transposed_down
 );
 system!(
     /// `(I + L)ᵀ`
-    TransposedUp: transposed_up
+    TransposedBackSubstitution: transposed_up
 );
 
 impl<M: Plan, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>

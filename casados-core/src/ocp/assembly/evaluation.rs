@@ -4,7 +4,7 @@ use crate::ocp::assembly::kkt;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::curvature::Curvature;
-use crate::ocp::formulation::program::{Parts, Program, ends};
+use crate::ocp::formulation::program::{Program, ProgramParts, ends};
 use crate::qp::{Residuals, Solution, StageDims, nan_max};
 use crate::scalar::Real;
 
@@ -40,7 +40,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// objective with penalties of soft bounds; after [`Ocp::linearise`].
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
-        let Parts { qp, iterate, scratch, .. } = P::split(self);
+        let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let (mut residuals, penalties) = kkt::residuals(qp.view(), iterate, scratch);
         if P::LIFTED {
             let [_, largest_stage_residual] = self.stage_residuals;

@@ -15,7 +15,7 @@ use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nod
 use crate::ocp::formulation::instance::data::{Layout, Node, path_row_count, split_data};
 use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::{Formulation, Problem};
-use crate::ocp::formulation::program::{Parts, Program, intervals_end};
+use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::qp::{Arrays, Solution, StageDims, copy_common, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -122,7 +122,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         trial_point: &Solution<T, D, M>,
         ends: &[T],
     ) {
-        let Parts { qp, given, .. } = P::split(self);
+        let ProgramParts { qp, given, .. } = P::split(self);
         let ((v, _), mut begin, mut row) = (trial_point.variables_and_costates(), 0, 0);
         let (mut ends, values) = ends.split_at_checked(intervals_end(qp.dims())).unwrap_or_default();
         for mut stage in qp.stages_mut() {

@@ -72,7 +72,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> DenseOutput<T> for erk::Inte
 ///
 /// # Errors
 /// [`OcpError::Integration`]
-pub(in crate::ocp) fn each_inside<T: Real>(
+pub(in crate::ocp) fn for_each_interval_inside<T: Real>(
     integrator: &mut impl DenseOutput<T>,
     nodes: &Nodes<'_, T>,
     parts: &[T],

@@ -9,7 +9,7 @@ use crate::ocp::formulation::functions::dynamics::{
 use crate::ocp::formulation::functions::node_evaluation::{
     check_finite_outputs, parameter_index, write_variables,
 };
-use crate::ocp::formulation::functions::sparsity::Origin;
+use crate::ocp::formulation::functions::sparsity::DynamicsStructure;
 use crate::ocp::formulation::names::Names;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
@@ -166,7 +166,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
         }
     };
     const IS_FLOW: bool = false;
-    const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
+    const STRUCTURE: DynamicsStructure = DynamicsStructure::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         for (k, interval) in nodes.iter().enumerate() {

@@ -3,7 +3,7 @@
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::Show;
+use crate::ocp::formulation::functions::cost::TermWriter;
 use crate::ocp::formulation::functions::dynamics::{Dynamics, IntervalResult, Nodes, SecondOrder, Sink};
 use crate::ocp::formulation::functions::node_evaluation::{check_finite_outputs, write_variables};
 use crate::ocp::formulation::names::Names;
@@ -128,7 +128,7 @@ impl<G: Function<Shape = D::Shape>, D: Dynamics<T>, T: Real> Dynamics<T> for Ret
     fn check(&self) -> Result<(), OcpError> {
         self.dynamics.check()
     }
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         self.dynamics.terms(show)
     }
     fn has_pieces(&self) -> bool {

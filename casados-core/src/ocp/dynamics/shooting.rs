@@ -1,15 +1,15 @@
 //! A batch as dynamics: all intervals in one call.
 
-use crate::batch::{Answer, Integrator, Intervals, Single};
+use crate::batch::{BatchOutput, Integrator, Intervals, Single};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::ocp::dynamics::dense_output::DenseOutput;
 use crate::ocp::dynamics::interval_setup::in_interval;
-use crate::ocp::dynamics::single_interval::{names, origin};
+use crate::ocp::dynamics::single_interval::{model_structure, names};
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntervalResult, Nodes, SecondOrder, Sink, vector,
 };
-use crate::ocp::formulation::functions::sparsity::Origin;
+use crate::ocp::formulation::functions::sparsity::DynamicsStructure;
 use crate::ocp::formulation::names::Names;
 use crate::qp::try_reserve;
 use crate::result::{Forward, Hessian, Nominal};
@@ -134,7 +134,7 @@ impl<I: Single> Shooting<I> {
 
     /// The results of all intervals, of which a few at a time are in memory; with the multipliers
     /// of ends and algebraic states, if these are asked for.
-    fn evaluate_intervals<R: Answer<I::Model, I::Number> + Zeroable>(
+    fn evaluate_intervals<R: BatchOutput<I::Model, I::Number> + Zeroable>(
         &mut self,
         nodes: &Nodes<'_, I::Number>,
         [of_ends, of_algebraic]: [bool; 2],
@@ -180,7 +180,7 @@ impl<I: Single<Number = T> + DenseOutput<T>, T: Real> Dynamics<T> for Shooting<I
     type Shape = <I::Model as Dae>::Shape;
     const NAMES: Names = names::<I::Model>();
     const ALGEBRAIC: bool = true;
-    const ORIGIN: Origin = origin::<I::Model>();
+    const STRUCTURE: DynamicsStructure = model_structure::<I::Model>();
 
     /// They are in any case, and found where the point is the same.
     #[cfg(feature = "casadi")]

@@ -6,14 +6,14 @@ use crate::integrator::Integrator as _;
 use crate::memory::{WithForward, WithHessian};
 use crate::model::{Dae, Ode};
 #[cfg(feature = "alloc")]
-use crate::ocp::dynamics::dense_output::each_inside;
+use crate::ocp::dynamics::dense_output::for_each_interval_inside;
 use crate::ocp::dynamics::interval_setup::{IntervalSetup, each};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::Show;
+use crate::ocp::formulation::functions::cost::TermWriter;
 use crate::ocp::formulation::functions::dynamics::{
     Dynamics, IntegralTerms, IntervalResult, Nodes, SecondOrder, Sink, vector,
 };
-use crate::ocp::formulation::functions::sparsity::Origin;
+use crate::ocp::formulation::functions::sparsity::DynamicsStructure;
 use crate::ocp::formulation::names::Names;
 use crate::quadrature::{Integrand, LeastSquares, Quadrature};
 use crate::scalar::Real;
@@ -38,8 +38,8 @@ pub(in crate::ocp) const fn names<M: Dae>() -> Names {
 }
 
 /// The equations of a model.
-pub(in crate::ocp) const fn origin<M: Dae>() -> Origin {
-    Origin::Equations(M::STRUCTURE.jacobian, M::STRUCTURE.hessian)
+pub(in crate::ocp) const fn model_structure<M: Dae>() -> DynamicsStructure {
+    DynamicsStructure::Equations(M::STRUCTURE.jacobian, M::STRUCTURE.hessian)
 }
 
 /// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the
@@ -115,7 +115,7 @@ pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
     /// # Errors
     /// Those of what shows it.
     #[doc(hidden)]
-    fn term(&self, show: Show<'_>) -> fmt::Result;
+    fn term(&self, show: TermWriter<'_>) -> fmt::Result;
     /// Before every interval.
     #[doc(hidden)]
     fn prepare(&mut self);
@@ -128,7 +128,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for Leas
     fn check(&self) -> Result<(), OcpError> {
         crate::ocp::formulation::functions::weights::check::<F, T>(&self.weights, true)
     }
-    fn term(&self, show: Show<'_>) -> fmt::Result {
+    fn term(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("½∫‖{}‖²_W dt", F::STRUCTURE.name))
     }
     fn prepare(&mut self) {}
@@ -147,7 +147,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for Leas
 impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T: Real> IntegralCost<M, T>
     for Quadrature<F, T>
 {
-    fn term(&self, show: Show<'_>) -> fmt::Result {
+    fn term(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("∫{} dt", F::STRUCTURE.name))
     }
     fn prepare(&mut self) {
@@ -172,7 +172,7 @@ macro_rules! single {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
             const ALGEBRAIC: bool = true;
-            const ORIGIN: Origin = origin::<M>();
+            const STRUCTURE: DynamicsStructure = model_structure::<M>();
 
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 each::<M, T, _>(self, nodes, sink, |integrator, at, x, u| {
@@ -193,7 +193,7 @@ macro_rules! single {
                 parts: &[T],
                 sink: Sink<'_, T>,
             ) -> Result<bool, OcpError> {
-                each_inside(self, nodes, parts, sink)
+                for_each_interval_inside(self, nodes, parts, sink)
             }
         }
 
@@ -220,7 +220,7 @@ macro_rules! single {
             fn check(&self) -> Result<(), OcpError> {
                 self.integral.check()
             }
-            fn terms(&self, show: Show<'_>) -> fmt::Result {
+            fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
                 self.integral.term(show)
             }
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
@@ -247,7 +247,7 @@ macro_rules! single {
                 parts: &[T],
                 sink: Sink<'_, T>,
             ) -> Result<bool, OcpError> {
-                each_inside(&mut self.integrator, nodes, parts, sink)
+                for_each_interval_inside(&mut self.integrator, nodes, parts, sink)
             }
         }
 

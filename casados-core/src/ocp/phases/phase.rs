@@ -8,7 +8,7 @@ use crate::ocp::formulation::names::Names;
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Exact, GaussNewton};
-use crate::ocp::formulation::program::{Parts, Program};
+use crate::ocp::formulation::program::{Program, ProgramParts};
 use crate::qp::{
     HeapSolution, QpError, QpField, QpView, Side, SolutionStage, copy_common, marked_indices, part,
 };
@@ -151,7 +151,7 @@ impl<P: Formulation<T, Dynamics: SecondOrder<T>>, T: Real> Phase<T> for HeapOcp<
         &mut self.iterate
     }
     fn given_constraint_bounds(&mut self) -> [&[T]; 2] {
-        let Parts { given, .. } = <P as Program<T>>::split(self);
+        let ProgramParts { given, .. } = <P as Program<T>>::split(self);
         given
     }
     fn linearise(&mut self, Kind { exact, convexification }: Kind) -> Result<T, OcpError> {

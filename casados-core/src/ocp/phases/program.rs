@@ -11,7 +11,7 @@ use crate::ocp::formulation::functions::node_evaluation::QuadraticTerms;
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::program::curvature::Convexification;
 use crate::ocp::formulation::program::curvature::{Curvature, Exact, GaussNewton};
-use crate::ocp::formulation::program::{Parts, Program, intervals_end};
+use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::qp::{
     Arrays, Qp, QpError, QpField, Side, Solution, SolutionStage, StageDims, add_symmetric, check,
     copy_common, part, part_mut, take_mut,
@@ -93,12 +93,12 @@ macro_rules! programs {
 
             fn split<D: AsRef<[StageDims]>, M: AsRef<[$number]> + AsMut<[$number]>>(
                 ocp: &mut Ocp<Self, $number, D, M>,
-            ) -> Parts<'_, $number, D, M> {
+            ) -> ProgramParts<'_, $number, D, M> {
                 let Ocp { qp, iterate, data, .. } = ocp;
                 let rows = qp.dims().iter().map(|stage| stage.ng).sum();
                 let (lower, rest) = data.as_mut().split_at_mut_checked(rows).unwrap_or_default();
                 let (upper, scratch) = rest.split_at_mut_checked(rows).unwrap_or_default();
-                Parts { qp, iterate, given: [lower, upper], scratch }
+                ProgramParts { qp, iterate, given: [lower, upper], scratch }
             }
 
             fn spans(&self, _: usize) -> impl Iterator<Item = Range<usize>> {

@@ -6,7 +6,7 @@ use crate::ocp::formulation::instance::data::{Data, split_data};
 use crate::ocp::formulation::instance::{Ocp, interval_nodes};
 use crate::ocp::formulation::problem::Formulation;
 use crate::ocp::formulation::program::curvature::{Curvature, FirstOrder};
-use crate::ocp::formulation::program::{Parts, Program};
+use crate::ocp::formulation::program::{Program, ProgramParts};
 use crate::qp::{QpError, QpField, Side, Solution, StageDims};
 use crate::scalar::Real;
 use core::ops::Range;
@@ -38,11 +38,11 @@ impl<P: Formulation<T>, T: Real> Program<T> for P {
 
     fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Parts<'_, T, D, M> {
+    ) -> ProgramParts<'_, T, D, M> {
         let layout = ocp.layout();
         let Ocp { qp, iterate, data, .. } = ocp;
         let Data { lower, upper, scratch, .. } = split_data::<P, T>(data.as_mut(), layout);
-        Parts { qp, iterate, given: [lower, upper], scratch }
+        ProgramParts { qp, iterate, given: [lower, upper], scratch }
     }
 
     fn spans(&self, stages: usize) -> impl Iterator<Item = Range<usize>> {

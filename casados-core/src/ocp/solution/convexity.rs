@@ -5,7 +5,7 @@ use crate::ocp::formulation::error::ConstraintName;
 use crate::ocp::formulation::functions::constraint::Constraints;
 use crate::ocp::formulation::functions::cost::Cost;
 use crate::ocp::formulation::functions::dynamics::Dynamics;
-use crate::ocp::formulation::functions::sparsity::{DerivativeEntry, Origin};
+use crate::ocp::formulation::functions::sparsity::{DerivativeEntry, DynamicsStructure};
 use crate::ocp::formulation::instance::Ocp;
 use crate::ocp::formulation::problem::{Formulation, Problem};
 use crate::qp::StageDims;
@@ -27,9 +27,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Whether dynamics and constraints are known to be linear, and costs to be convex.
     fn is_convex(&self) -> bool {
-        let is_linear = match P::Dynamics::ORIGIN {
-            Origin::Unknown => false,
-            Origin::Equations(_, hessian) | Origin::Map(_, hessian) => hessian.is_empty(),
+        let is_linear = match P::Dynamics::STRUCTURE {
+            DynamicsStructure::Unknown => false,
+            DynamicsStructure::Equations(_, hessian) | DynamicsStructure::Map(_, hessian) => {
+                hessian.is_empty()
+            }
         };
         let costs = P::StageCost::CONVEX_IN_VARIABLES && P::TerminalCost::CONVEX_IN_VARIABLES;
         let Problem { path, terminal, .. } = self.problem.parts_ref();

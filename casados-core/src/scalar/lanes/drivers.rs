@@ -44,7 +44,7 @@ macro_rules! side_by_side {
                 return Ok(());
             }
             #[cfg(target_arch = "x86_64")]
-            if const { S > $more && S <= $most && lanes::may_be(lanes::Level::Avx512) }
+            if const { S > $more && S <= $most && lanes::may_be_available(lanes::Level::Avx512) }
                 && lanes::level() == lanes::Level::Avx512
             {
                 computation.call::<lanes::$avx512<S>>();
@@ -69,8 +69,8 @@ macro_rules! widest_register {
             lanes: usize,
             computation: C,
         ) -> Result<C::Output, C> {
-            use crate::scalar::lanes::{self, Level, level, may_be};
-            if const { may_be(Level::Avx512) } && level() == Level::Avx512 && lanes >= $most {
+            use crate::scalar::lanes::{self, Level, level, may_be_available};
+            if const { may_be_available(Level::Avx512) } && level() == Level::Avx512 && lanes >= $most {
                 return Ok(computation.call::<lanes::$avx512<$most>>());
             }
             if const { lanes::AVX2 } && level() >= Level::Avx2 && lanes >= $more {
@@ -107,20 +107,22 @@ macro_rules! packed_registers {
             use crate::scalar::lanes::{self, Inside};
             // Registers of sixteen numbers are no faster than those of eight.
             #[cfg(target_arch = "x86_64")]
-            if const { $most <= 8 && lanes::may_be(lanes::Level::Avx512) }
+            if const { $most <= 8 && lanes::may_be_available(lanes::Level::Avx512) }
                 && lanes::level() == lanes::Level::Avx512
             {
                 type Register = lanes::$avx512<$most>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
             #[cfg(target_arch = "x86_64")]
-            if const { lanes::may_be(lanes::Level::Avx2) || $most > 8 && lanes::may_be(lanes::Level::Avx512) }
-                && lanes::level() >= lanes::Level::Avx2
+            if const {
+                lanes::may_be_available(lanes::Level::Avx2)
+                    || $most > 8 && lanes::may_be_available(lanes::Level::Avx512)
+            } && lanes::level() >= lanes::Level::Avx2
             {
                 type Register = lanes::$avx2<$more>;
                 return Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }
-            if const { lanes::may_be(lanes::Level::Base) } {
+            if const { lanes::may_be_available(lanes::Level::Base) } {
                 type Register = lanes::$base<$few>;
                 Register::vectorize(Inside::<Register, _, Self>::new(computation));
             }

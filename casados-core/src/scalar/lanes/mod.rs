@@ -136,7 +136,7 @@ const BUILD_LEVEL: Option<Level> = if is_enabled_by_build(Level::Avx512) {
 
 /// Whether this may be the [`level`] of a machine that runs the program. Without `std` nobody asks
 /// the machine, and it has what the program was compiled for.
-pub const fn may_be(level: Level) -> bool {
+pub const fn may_be_available(level: Level) -> bool {
     match BUILD_LEVEL {
         Some(named) => level as u8 == named as u8,
         None => cfg!(feature = "std") || (level as u8) <= Level::Base as u8,
@@ -144,7 +144,7 @@ pub const fn may_be(level: Level) -> bool {
 }
 
 /// Whether a machine that runs the program may have AVX2.
-pub const AVX2: bool = may_be(Level::Avx2) || may_be(Level::Avx512);
+pub const AVX2: bool = may_be_available(Level::Avx2) || may_be_available(Level::Avx512);
 
 /// The widest registers that this machine has and [`limit`] allows; those that the build names,
 /// where it does.
@@ -176,7 +176,7 @@ fn detect_level() -> Level {
 /// The widest registers that this machine has, up to a limit.
 fn widest_level(limit: Level) -> Level {
     let levels = [Level::Avx512, Level::Avx2, Level::Base];
-    levels.into_iter().find(|&level| level <= limit && is_there(level)).unwrap_or(Level::Single)
+    levels.into_iter().find(|&level| level <= limit && is_detected(level)).unwrap_or(Level::Single)
 }
 
 /// Whether the build says that every machine has these registers.
@@ -189,7 +189,7 @@ const fn is_enabled_by_build(level: Level) -> bool {
 
 /// Whether the machine has these registers.
 #[inline(always)]
-pub fn is_there(level: Level) -> bool {
+pub fn is_detected(level: Level) -> bool {
     #[cfg(all(target_arch = "x86_64", feature = "std"))]
     macro_rules! has {
         ($($feature:tt)*) => { $(std::is_x86_feature_detected!($feature))&&* };

@@ -6,7 +6,7 @@ use super::shared::{define, through_memory};
 use core::arch::aarch64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the
-// machine has the instructions, and NEON is compiled in (`is_there` says so where it is not: such a
+// machine has the instructions, and NEON is compiled in (`is_detected` says so where it is not: such a
 // target has no `std`). Loads and stores, which take pointers, are made on arrays that are as large
 // as the register, and ask for no alignment.
 

@@ -10,7 +10,7 @@ use super::wasm::{wasm_f32 as base_f32, wasm_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
-use super::{Level, functions::Elementary, level, may_be};
+use super::{Level, functions::Elementary, level, may_be_available};
 use crate::scalar::{Field, Lanes, Packed, Piece, Rows, Scalar, Sealed, as_it_is, field::power};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};

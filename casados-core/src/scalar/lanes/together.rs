@@ -85,9 +85,9 @@ macro_rules! of_fours {
                 }
                 results
             },
-            const { COUNT == 4 && may_be(Level::Avx512) } && level() == Level::Avx512 =>
+            const { COUNT == 4 && may_be_available(Level::Avx512) } && level() == Level::Avx512 =>
                 results!(avx512_f64::enter_with_eight::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1 2 3))),
-            const { COUNT == 2 && may_be(Level::Avx512) } && level() == Level::Avx512 =>
+            const { COUNT == 2 && may_be_available(Level::Avx512) } && level() == Level::Avx512 =>
                 results!(avx512_f64::enter_with_four::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
         );
     };

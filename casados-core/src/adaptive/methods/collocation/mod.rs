@@ -22,7 +22,7 @@ use crate::adaptive::methods::kernels::{
 use crate::adaptive::newton_monitor::{FailureLocation, NewtonFailure, NewtonMonitor, SurfaceCrossing};
 use crate::adaptive::order::weighted_sum;
 use crate::adaptive::point::variable_of_unknown;
-use crate::adaptive::stages::{FilteredDefect, MAX_STAGES, Stages, StepContext};
+use crate::adaptive::stages::{FilteredDefect, MAX_STAGES, StageSolver, StepContext};
 use crate::adaptive::tolerances::{MAX_UNROLLED_LENGTH, ORDER_REDUCTION_RATIO, norm, root_mean_square};
 use crate::error::Error;
 use crate::finite::find_non_finite;
@@ -83,7 +83,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Collocation<M, T, S, G> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocation<M, T, S, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> StageSolver<M, T> for Collocation<M, T, S, G> {
     fn stage_count(&self) -> usize {
         S
     }
@@ -172,7 +172,7 @@ impl<M: Dae, T: Real, const S: usize, const G: usize> Stages<M, T> for Collocati
         }
     }
 
-    fn adopt_last_step(&mut self, other: &dyn Stages<M, T>) {
+    fn adopt_last_step(&mut self, other: &dyn StageSolver<M, T>) {
         let count = other.stage_count();
         for (stage, node) in self.scheme.tableau.c().iter().enumerate() {
             let weights = other.lagrange(*node);

@@ -4,13 +4,13 @@
 mod rounding;
 mod stepper;
 
-use crate::adaptive::engine::{Engine, Kind};
+use crate::adaptive::engine::{Engine, MethodState};
 use crate::adaptive::pairs::EmbeddedPair;
 use crate::adaptive::point::ModelPoint;
 use crate::adaptive::replay::{AcceptedStep, StepDifferentiator};
-use crate::adaptive::step::{AcceptedStepOutput, After, Run, Span, Workspace};
+use crate::adaptive::step::{AcceptedStepOutput, AfterStep, Run, Span, Workspace};
 use crate::adaptive::step_size::{ExplicitStep, PiController, first_step_size};
-use crate::adaptive::tape::Entry;
+use crate::adaptive::tape::TapeEntry;
 use crate::adaptive::tolerances::{Tolerances, norm, root_mean_square};
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
@@ -142,7 +142,7 @@ impl<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
         run: &mut Run<'_, M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
-        after: After<'_, M, T>,
+        after: AfterStep<'_, M, T>,
     ) -> Result<(), Error> {
         run.write_start(x0, &ArrayK::<M, T>::zeroed(), span.start);
         run.begin_sensitivities(x0, span.start)?;
@@ -166,7 +166,7 @@ fn integrate_steps<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
     step: &mut dyn ExplicitStepper<M, T>,
     run: &mut Run<'_, M, T>,
     span: Span<T>,
-    after: After<'_, M, T>,
+    after: AfterStep<'_, M, T>,
 ) -> Result<VectorX<M, T>, Error> {
     let nx = M::Shape::NX;
     let mut x = VectorX::<M, T>::zeroed();
@@ -336,20 +336,20 @@ fn initial_step_size<M: Ode, B: EmbeddedPair<S>, T: Real, const S: usize>(
 
 macro_rules! explicit {
     ($($method:ty: $stages:literal),*) => {
-        $(impl<M: Dae, T: Real> Kind<M, T> for $method {
+        $(impl<M: Dae, T: Real> MethodState<M, T> for $method {
             type State = Steps<M, $method, T, $stages>;
         }
 
         impl<M: Ode, T: Real> Engine<M, T> for $method {
             const ENDS_ON_STAGE: bool = true;
-            type Replays = Self::State;
+            type Differentiator = Self::State;
 
             fn integrate(
                 state: &mut Self::State,
                 run: &mut Run<'_, M, T>,
                 x0: &VectorX<M, T>,
                 span: Span<T>,
-                after: After<'_, M, T>,
+                after: AfterStep<'_, M, T>,
             ) -> Result<(), Error> {
                 state.integrate(run, x0, span, after)
             }
@@ -357,7 +357,7 @@ macro_rules! explicit {
             fn interpolate(
                 state: &mut Self::State,
                 inputs: &[T],
-                entry: &Entry<T>,
+                entry: &TapeEntry<T>,
                 numbers: (&[T], &[T]),
                 t: T,
                 dense: &mut Dense<M, T>,
@@ -370,7 +370,7 @@ macro_rules! explicit {
                 step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
             }
 
-            fn replays(state: &mut Self::State) -> &mut Self::Replays {
+            fn replays(state: &mut Self::State) -> &mut Self::Differentiator {
                 state
             }
         })*

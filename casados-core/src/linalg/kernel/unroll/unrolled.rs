@@ -58,7 +58,7 @@ pub fn for_each_row<A: Arithmetic, V: RowVisitor>(visitor: &mut V) {
 /// A pivot.
 macro_rules! pivot {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
-        $(if const { Nth::<$M, $n>::EXISTS } && let Some((pivot, updates)) = Nth::<$M, $n>::PIVOT {
+        $(if const { NthPivot::<$M, $n>::EXISTS } && let Some((pivot, updates)) = NthPivot::<$M, $n>::PIVOT {
             $visit.at::<$A>(pivot, updates);
         })*
     };
@@ -82,9 +82,9 @@ macro_rules! sizes {
 
 /// A pivot of a plan by its number: found once for each model, and not once more for each function
 /// that goes through its pivots.
-struct Nth<M, const N: usize>(PhantomData<M>);
+struct NthPivot<M, const N: usize>(PhantomData<M>);
 
-impl<M: Plan, const N: usize> Nth<M, N> {
+impl<M: Plan, const N: usize> NthPivot<M, N> {
     const EXISTS: bool = Self::PIVOT.is_some();
     const PIVOT: Option<(&'static Pivot, &'static [Update])> = match M::KNOWN_STRUCTURE {
         Some(structure) => nth(&structure.elimination, N),

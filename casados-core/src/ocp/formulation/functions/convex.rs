@@ -2,7 +2,7 @@
 
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::{Cost, CostContext, Show};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext, TermWriter};
 use crate::ocp::formulation::functions::least_squares::{GaussNewtonTerms, subtract_reference_derivatives};
 use crate::ocp::formulation::functions::node_evaluation::{
     AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_value, depends_on_algebraic,
@@ -317,7 +317,7 @@ impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for Con
         })
     }
 
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("φ({} − r)", F::STRUCTURE.name))
     }
 

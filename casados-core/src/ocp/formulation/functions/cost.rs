@@ -83,7 +83,7 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// Those of what shows them.
     #[doc(hidden)]
-    fn terms(&self, show: Show<'_>) -> fmt::Result;
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result;
 
     /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
     #[doc(hidden)]
@@ -145,7 +145,7 @@ pub trait Cost<S: Shape, T: Real> {
 }
 
 /// What takes terms of an objective.
-pub type Show<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
+pub type TermWriter<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
 
 /// Where, how much, and whether the Hessian is to be exact.
 #[derive(Clone, Copy, Debug)]
@@ -166,7 +166,7 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     fn check(&self, _: AvailableVariables) -> Result<(), OcpError> {
         Ok(())
     }
-    fn terms(&self, _: Show<'_>) -> fmt::Result {
+    fn terms(&self, _: TermWriter<'_>) -> fmt::Result {
         Ok(())
     }
     fn visit_sparsity(&self, _: EntryVisitor<'_>) -> bool {
@@ -209,7 +209,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         self.0.check_weights()?;
         self.1.check_weights()
     }
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         self.0.terms(show)?;
         self.1.terms(show)
     }
@@ -319,7 +319,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T>
         there.check::<F>()
     }
 
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("{}", F::STRUCTURE.name))
     }
 

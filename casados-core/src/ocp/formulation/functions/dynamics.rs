@@ -2,9 +2,9 @@
 
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::free_parameters::FreeParametersView;
-use crate::ocp::formulation::functions::cost::Show;
+use crate::ocp::formulation::functions::cost::TermWriter;
 pub use crate::ocp::formulation::functions::result::{IntegralTerms, IntervalResult};
-use crate::ocp::formulation::functions::sparsity::Origin;
+use crate::ocp::formulation::functions::sparsity::DynamicsStructure;
 use crate::ocp::formulation::names::Names;
 use crate::qp::nan_max;
 use crate::scalar::Real;
@@ -175,7 +175,7 @@ pub trait Dynamics<T: Real> {
     const INTEGRAL: bool = false;
     /// What the ends of intervals follow from.
     #[doc(hidden)]
-    const ORIGIN: Origin = Origin::Unknown;
+    const STRUCTURE: DynamicsStructure = DynamicsStructure::Unknown;
     /// Whether stages of intervals are variables, which a solver moves with its iterate: by
     /// `initialise_stages`, `expand_stage_steps` and `apply_stage_action`.
     const LIFTED: bool = false;
@@ -199,7 +199,7 @@ pub trait Dynamics<T: Real> {
     /// # Errors
     /// Those of what shows them.
     #[doc(hidden)]
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         let _ = show;
         Ok(())
     }

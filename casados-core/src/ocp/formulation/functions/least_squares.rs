@@ -3,7 +3,7 @@
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, Kernel, RowVisitor, dispatch, for_each_row};
 use crate::ocp::formulation::error::OcpError;
-use crate::ocp::formulation::functions::cost::{Cost, CostContext, Show};
+use crate::ocp::formulation::functions::cost::{Cost, CostContext, TermWriter};
 use crate::ocp::formulation::functions::node_evaluation::{
     AvailableVariables, ParameterDerivatives, QuadraticTerms, check_finite_value, depends_on_algebraic,
 };
@@ -161,7 +161,7 @@ impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<
         }
     }
 
-    fn terms(&self, show: Show<'_>) -> fmt::Result {
+    fn terms(&self, show: TermWriter<'_>) -> fmt::Result {
         show(format_args!("½‖{} − r‖²_W", F::STRUCTURE.name))
     }
 

@@ -18,7 +18,7 @@ pub type EntryVisitor<'a> = &'a mut dyn FnMut(DerivativeEntry);
 
 /// What the ends of intervals follow from.
 #[derive(Clone, Copy, Debug)]
-pub enum Origin {
+pub enum DynamicsStructure {
     /// Nothing is known.
     Unknown,
     /// The equations of a model: where these and their second derivatives have entries.

@@ -67,7 +67,7 @@ pub trait Program<T: Real>: Sized {
     #[doc(hidden)]
     fn split<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         ocp: &mut Ocp<Self, T, D, M>,
-    ) -> Parts<'_, T, D, M>;
+    ) -> ProgramParts<'_, T, D, M>;
 
     /// Ranges of stages whose variables are the same, of so many stages.
     #[doc(hidden)]
@@ -125,7 +125,7 @@ pub trait Program<T: Real>: Sized {
 /// What there is of a problem, whatever it is.
 #[doc(hidden)]
 #[derive(Debug)]
-pub struct Parts<'a, T, D, M> {
+pub struct ProgramParts<'a, T, D, M> {
     pub(in crate::ocp) qp: &'a mut Qp<T, D, M>,
     pub(in crate::ocp) iterate: &'a Solution<T, D, M>,
     /// Lower and upper bounds of the constraints of all stages, as they were given.

@@ -3,7 +3,7 @@
 use crate::linalg::dot;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::program::{Parts, Program, intervals_end};
+use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::element::get;
 use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, copy_common, part, part_mut};
@@ -13,7 +13,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
     /// change of `penalties`.
     pub(in crate::ocp) fn objective_slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
-        let Parts { qp, iterate, scratch, .. } = P::split(self);
+        let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let (from, _) = iterate.variables_and_costates();
         let (to, _) = solution.variables_and_costates();
         let (mut slope, mut begin) = (T::ZERO, 0);
@@ -45,7 +45,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
 
     /// `dᵀ H d / dᵀ d` along the line from the iterate to the solution of its QP.
     pub(super) fn curvature_along_step(&mut self, solution: &Solution<T, D, M>) -> f64 {
-        let Parts { qp, iterate, scratch, .. } = P::split(self);
+        let ProgramParts { qp, iterate, scratch, .. } = P::split(self);
         let ((from, _), (to, _)) = (iterate.variables_and_costates(), solution.variables_and_costates());
         let (mut curvature, mut square, mut begin) = (T::ZERO, T::ZERO, 0);
         for stage in qp.view().stages() {
@@ -78,7 +78,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
     ) -> Result<FilterPair, OcpError> {
         let objective = self.evaluate(trial_point, ends)?;
         let mut sum = FilterPair { objective: objective.to_f64(), violation: 0.0 };
-        let Parts { qp, given: [lower, upper], .. } = P::split(self);
+        let ProgramParts { qp, given: [lower, upper], .. } = P::split(self);
         let (mut ends, values) = ends.split_at_checked(intervals_end(qp.dims())).unwrap_or_default();
         let (mut stages, mut row) = (trial_point.stages().peekable(), 0);
         let mut weights = weights.stages();

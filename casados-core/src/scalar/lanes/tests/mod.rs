@@ -202,17 +202,17 @@ fn transposed<L: Lanes>() {
 /// Checks each kind of register that the machine has, with the numbers of lanes that are listed.
 macro_rules! on_every_register {
     ($check:ident) => {
-        if is_there(Level::Base) {
+        if is_detected(Level::Base) {
             $check!(F64x2, f64, 1, 2);
             $check!(F32x4, f32, 1, 2, 3, 4);
         }
         #[cfg(target_arch = "x86_64")]
-        if is_there(Level::Avx2) {
+        if is_detected(Level::Avx2) {
             $check!(F64x4, f64, 1, 2, 3, 4);
             $check!(F32x8, f32, 1, 3, 5, 8);
         }
         #[cfg(target_arch = "x86_64")]
-        if is_there(Level::Avx512) {
+        if is_detected(Level::Avx512) {
             $check!(F64x8, f64, 1, 3, 5, 6, 7, 8);
             $check!(F32x16, f32, 1, 7, 9, 16);
         }
@@ -233,11 +233,11 @@ fn arithmetic_has_the_bits_of_single_numbers() {
 fn products_are_subtracted_with_one_rounding_where_the_machine_can() {
     check_fused_products::<F64x2<2>>(cfg!(target_arch = "aarch64"));
     #[cfg(target_arch = "x86_64")]
-    if is_there(Level::Avx2) {
+    if is_detected(Level::Avx2) {
         check_fused_products::<F64x4<3>>(true);
     }
     #[cfg(target_arch = "x86_64")]
-    if is_there(Level::Avx512) {
+    if is_detected(Level::Avx512) {
         check_fused_products::<F64x8<5>>(true);
     }
 }
@@ -245,7 +245,7 @@ fn products_are_subtracted_with_one_rounding_where_the_machine_can() {
 #[test]
 fn the_level_is_one_that_the_machine_has_and_the_limit_allows() {
     let widest = level();
-    assert!(is_there(widest) && widest >= Level::Base);
+    assert!(is_detected(widest) && widest >= Level::Base);
     for lower in [Level::Base, Level::Single] {
         limit_level(lower);
         assert_eq!(level(), lower);

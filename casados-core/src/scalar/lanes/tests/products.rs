@@ -71,12 +71,12 @@ fn all<T: Real, const WIDE: bool>() {
 #[test]
 fn products_of_blocks() {
     #[cfg(target_arch = "x86_64")]
-    if is_there(Level::Avx2) {
+    if is_detected(Level::Avx2) {
         inside::<F64x4<4>>(all::<f64, false>);
         inside::<F64x4<4>>(all::<f32, false>);
     }
     #[cfg(target_arch = "x86_64")]
-    if is_there(Level::Avx512) {
+    if is_detected(Level::Avx512) {
         inside::<F64x8<8>>(all::<f64, true>);
         inside::<F64x8<8>>(all::<f32, true>);
     }

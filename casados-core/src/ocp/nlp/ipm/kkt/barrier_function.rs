@@ -4,7 +4,7 @@ use super::scaling::{gaps_with_units, row_values_with_units, sum_in_units};
 use crate::ocp::assembly::units::ScalingUnits;
 use crate::ocp::formulation::error::OcpError;
 use crate::ocp::formulation::instance::Ocp;
-use crate::ocp::formulation::program::{Parts, Program, intervals_end};
+use crate::ocp::formulation::program::{Program, ProgramParts, intervals_end};
 use crate::ocp::nlp::filter::FilterPair;
 use crate::qp::interior::{Inequalities, Iterate};
 use crate::qp::{Places, Solution, StageDims, add_symmetric, copy_common, part, part_mut};
@@ -89,7 +89,7 @@ impl<P: Program<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> 
         rows: &mut [T],
     ) -> Result<f64, OcpError> {
         let objective = self.evaluate(point, ends)?.to_f64();
-        let Parts { qp, given, .. } = P::split(self);
+        let ProgramParts { qp, given, .. } = P::split(self);
         let qp = qp.view();
         let mut values = ends.get(intervals_end(qp.dims)..).unwrap_or_default();
         let ((v, _), [mut given_lower, mut given_upper]) = (point.variables_and_costates(), given);
